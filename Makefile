@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers properties robustness robustness-cluster ray simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster ray simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -116,6 +116,11 @@ contract: .venv/.check  ## with a release: the contract that later ones must not
 
 workers: .venv/.test  ## the tests of server, client, command line and dashboard, run against two gateways and two workers
 	$(BIN)/pytest tests/server tests/cluster tests/client tests/cli tests/dashboard --shape workers -n 2
+
+SHARDED = stream watch entities windows verification resume query deadlines queries
+
+shards: .venv/.test  ## tests of the server whose promises a hull over shards keeps, run on such hulls
+	$(BIN)/pytest $(SHARDED:%=tests/server/test_%.py) --shape shards -n 2
 
 fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
 	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics

@@ -2,25 +2,35 @@
 
     python benchmarks/shards.py traffic [--points 1000000] [--updates 1000000]
     python benchmarks/shards.py model
+    python benchmarks/shards.py served [--shards 2] [--rounds 3]
 
 `traffic` measures. Points of a distribution are divided among k shards; an update deletes a random point or inserts
 another one. It counts the updates that change the hull of their shard, which are what the root hears of if each is a
 batch of its own; and the vertices that are sent in batches of 1,000 updates, in which some come and go unseen. On a
 circle, where all points are vertices, take few points: each batch reads them all.
 
+`served` measures real servers: a stream of messages of 10,000 points, inserted and deleted, stored with the durability
+of the default, to one hull and to one over shards, which take turns; and the time of a call with one point.
+
 `model` measures what the root does for a vertex, a message and a row on this machine, and multiplies. Nobody has run a
 thousand shards.
 """
 
 import argparse
+import subprocess
+import sys
+import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from math import pi
+from statistics import median
 
 import numpy as np
 
 from dynhull import DynamicHull, convex_hull
-from dynhull_cluster.shards.logs import Decision
+from dynhull_client import HullClient
+from dynhull_cluster.shards.logs import Decided, Decision
 from dynhull_cluster.shards.messages import Apply, Corners, Done, Effect, Opened, Reply, Request, Totals
 from dynhull_cluster.shards.parts import divided
 from dynhull_cluster.shards.placement import point_hashes, shards_of
@@ -162,8 +172,8 @@ def row_seconds() -> float:
 
 
 class NoLog:
-    def begin(self, _: int | None) -> tuple[int, list[Decision]]:
-        return 1, []
+    def begin(self, _: int | None) -> tuple[int, Decided]:
+        return 1, Decided()
 
     def decide(self, epoch: int, decisions: Sequence[Decision]) -> None:
         pass
@@ -198,6 +208,59 @@ def message_seconds() -> float:
     return ((time.perf_counter() - begun) / rounds - dividing) / SHARDS
 
 
+# Real servers
+
+SERVED = {"one process": [], "2 workers, 2 gateways": ["--workers", "2", "--gateways", "2"]}
+MESSAGES, POINTS, CALLS = 100, 10_000, 200
+
+
+def served(shards: int, rounds: int) -> None:
+    print("| server | hull | messages of 10,000 points a second | range | a call with one point, ms |")
+    print("| --- | --- | ---: | ---: | ---: |")
+    for name, options in SERVED.items():
+        with tempfile.TemporaryDirectory() as folder, serving(["--data", folder, *options]) as address:
+            with HullClient(address) as client:
+                client.create_hull("one")
+                client.create_hull("many", shards=shards)
+                found: dict[str, list[tuple[float, float]]] = {"one": [], "many": []}
+                for turn in range(rounds + 1):  # the first one warms up
+                    for hull, measured in found.items():
+                        each = timed(client, hull)
+                        measured += [each] if turn else []
+            for hull, measured in found.items():
+                rates, calls = zip(*measured, strict=True)
+                kind = "one" if hull == "one" else f"{shards} shards"
+                spread = f"{min(rates):.0f} to {max(rates):.0f}"
+                print(f"| {name} | {kind} | {median(rates):.0f} | {spread} | {1e3 * median(calls):.2f} |", flush=True)
+
+
+def timed(client: HullClient, hull: str) -> tuple[float, float]:
+    """Messages a second, and the seconds of a call with one point."""
+    points = random.normal(size=(POINTS, 2))
+    begun = time.perf_counter()
+    with client.writer(hull, batch_points=POINTS) as writer:
+        for _ in range(MESSAGES // 2):
+            writer.put(points)
+            writer.put(delete=points)
+    rate = MESSAGES / (time.perf_counter() - begun)
+    begun = time.perf_counter()
+    for _ in range(CALLS // 2):
+        client.apply(hull, insert=points[:1])
+        client.apply(hull, delete=points[:1])
+    return rate, (time.perf_counter() - begun) / CALLS
+
+
+@contextmanager
+def serving(options: Sequence[str]) -> Iterator[str]:
+    command = [sys.executable, "-m", "dynhull_cli", "serve", "--port", "0", "--scrub-cpu", "0", "--log-level", "error"]
+    with subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            yield process.stdout.readline().split()[-1]
+        finally:
+            process.terminate()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
@@ -206,9 +269,14 @@ def main() -> None:
     measured.add_argument("--points", type=int, default=1_000_000)
     measured.add_argument("--updates", type=int, default=1_000_000)
     commands.add_parser("model")
+    real = commands.add_parser("served")
+    real.add_argument("--shards", type=int, default=2)
+    real.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
     if arguments.command == "traffic":
         traffic(arguments.distributions, arguments.points, arguments.updates)
+    elif arguments.command == "served":
+        served(arguments.shards, arguments.rounds)
     else:
         model()
 

@@ -2,6 +2,7 @@ import re
 from collections import Counter
 from collections.abc import Generator, Iterator
 
+import divided_shape
 import pytest
 import server_process as servers
 from hypothesis import HealthCheck, Phase, settings
@@ -38,6 +39,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     servers.shape = config.getoption("--shape")
+    if servers.shape == "shards":
+        divided_shape.install()
 
 
 @pytest.fixture(scope="session")
@@ -57,7 +60,7 @@ def postgres() -> Iterator[PostgreSQL]:
 @pytest.fixture
 def name(request: pytest.FixtureRequest) -> str:
     """A hull name of the test's own. Names that begin with it have a worker in common."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:] + ("/h" if servers.shape == "workers" else "")
+    return re.sub(r"[^A-Za-z0-9]+", "-", request.node.nodeid)[-150:] + ("/h" if servers.shape != "process" else "")
 
 
 @pytest.hookimpl(wrapper=True)
@@ -74,6 +77,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for each in items:
             if marker := each.get_closest_marker("one_process"):
                 each.add_marker(pytest.mark.skip(reason=f"about a server of one process: {marker.args[0]}"))
+    if servers.shape == "shards":
+        for each in items:
+            if marker := each.get_closest_marker("whole_hull"):
+                each.add_marker(pytest.mark.skip(reason=f"about a hull that is not divided: {marker.args[0]}"))
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)  # after pytest's own summary

@@ -21,9 +21,10 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     if settings.workers is None:
         from dynhull_server.process import run as run_one
 
+        from .divisions.divisions import ServedDivisions
         from .journal import storage_of
 
-        run_one(settings, partial(storage_of, settings))
+        run_one(settings, partial(storage_of, settings), partial(ServedDivisions, settings))
     else:
         from .process import run
 

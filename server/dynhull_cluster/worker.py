@@ -12,6 +12,8 @@ from dynhull_server.settings import Settings
 from dynhull_server.storage.worker_folders import worker_folder
 
 from .callers import authenticator
+from .divisions.divisions import ServedDivisions
+from .divisions.peers import Peers, peer_handler
 from .frame_server import FrameServer
 from .journal import storage_of
 from .sockets import Sockets
@@ -33,15 +35,24 @@ def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
             "max_health_calls_per_caller": HEALTH_CALLS,
         }
     )
-    return Server(own, PrivateEntrance(number, sockets), storage_of(settings, number))
+    divisions = ServedDivisions(settings, number, Peers(sockets))
+    letters = peer_handler(divisions.receive)
+    return Server(own, PrivateEntrance(number, sockets, letters), storage_of(settings, number), divisions)
 
 
 class PrivateEntrance:
-    """The sockets of a worker, which gateways reach."""
+    """The sockets of a worker, which gateways and other workers reach.
 
-    def __init__(self, number: int, sockets: Sockets) -> None:
+    Args:
+        number: the number of the worker.
+        sockets: where it listens.
+        letters: the handler of what other workers send.
+    """
+
+    def __init__(self, number: int, sockets: Sockets, letters: grpc.GenericRpcHandler) -> None:
         self._number = number
         self._sockets = sockets
+        self._letters = letters
         self._frames: FrameServer | None = None
 
     def authenticator(self, tokens: TokenFile | None) -> Callable[[Context], Caller]:
@@ -54,7 +65,7 @@ class PrivateEntrance:
         """Listen on both sockets."""
         address = f"unix:{self._sockets.grpc(self._number)}"
         server.add_insecure_port(address)
-        self._frames = FrameServer(handlers, runs)
+        self._frames = FrameServer((self._letters, *handlers), runs)
         await self._frames.listen(self._sockets.frames(self._number))
         return address
 

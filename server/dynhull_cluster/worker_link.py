@@ -55,7 +55,7 @@ class WorkerLink:
         self.health = dict.fromkeys(watched, UNKNOWN)
         self._sockets = sockets
         self._changed = changed
-        self._frames: _Frames | None = None
+        self._frames: AskingFrames | None = None
 
     @property
     def present(self) -> bool:
@@ -69,7 +69,7 @@ class WorkerLink:
             lost: asyncio.Future[None] = loop.create_future()
             try:
                 _, frames = await loop.create_unix_connection(
-                    partial(_Frames, lost), str(self._sockets.frames(self.number))
+                    partial(AskingFrames, lost), str(self._sockets.frames(self.number))
                 )
             except OSError:
                 await asyncio.sleep(LOOK_SECONDS)
@@ -124,7 +124,7 @@ class WorkerLink:
         self._present()
         return Upstream(self._channel.stream_stream(method)(metadata=caller, wait_for_ready=True))
 
-    def _present(self) -> "_Frames":
+    def _present(self) -> "AskingFrames":
         if self._frames is None or not self._frames.connected:
             raise WorkerAwayError(self.number)
         return self._frames
@@ -152,7 +152,7 @@ class WorkerLink:
             await asyncio.sleep(LOOK_SECONDS)
 
 
-class _Frames(Frames):
+class AskingFrames(Frames):
     """The calls in progress.
 
     Args:
@@ -171,6 +171,7 @@ class _Frames(Frames):
         self._waiting: dict[int, asyncio.Future[bytes]] = {}
 
     async def ask(self, method: str, caller: bytes, message: bytes) -> bytes:
+        """The answer to a request. Raises RelayedError if it is refused, or the connection is lost."""
         self._last = number = (self._last + 1) % 2**32
         answer: asyncio.Future[bytes] = self._loop.create_future()
         self._waiting[number] = answer
@@ -184,6 +185,7 @@ class _Frames(Frames):
             self._waiting.pop(number, None)
 
     def received(self, number: int, kind: Kind, rest: bytes) -> None:
+        """Resume the caller."""
         answer = self._waiting.get(number)
         if answer is None or answer.done():
             return
@@ -201,6 +203,7 @@ class _Frames(Frames):
         self.writable.set()
 
     def connection_lost(self, error: Exception | None) -> None:
+        """Refuse what waits."""
         super().connection_lost(error)
         self.writable.set()
         for answer in self._waiting.values():

@@ -10,6 +10,7 @@ from functools import partial
 from grpc_health.v1 import health_pb2
 from prometheus_client import CollectorRegistry
 
+from .engine.division import Divisions
 from .engine.engine import Engine
 from .engine.fence_verification import FenceVerification
 from .engine.fences import LiveFence
@@ -79,6 +80,7 @@ class Server:
         settings: the settings.
         entrance: how callers reach it; by default, as the settings say.
         storage: what keeps the hulls; by default, memory or a folder, as the settings say.
+        divisions: runs hulls over shards; None for a server that has none.
 
     Attributes:
         address: the host:port it listens on, once started.
@@ -86,7 +88,13 @@ class Server:
         registry: its metrics; other threads may read them once it has started.
     """
 
-    def __init__(self, settings: Settings, entrance: Entrance | None = None, storage: Storage | None = None) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        entrance: Entrance | None = None,
+        storage: Storage | None = None,
+        divisions: Divisions | None = None,
+    ) -> None:
         self._settings = settings
         self._entrance = PublicEntrance(settings) if entrance is None else entrance
         self._machine = machine = Machine()
@@ -106,7 +114,7 @@ class Server:
             ),
         )
         self._storage = storage = _storage(settings) if storage is None else storage
-        self._engine = Engine(limits, storage, self._supervisor, machine)
+        self._engine = Engine(limits, storage, self._supervisor, machine, divisions)
         self._metrics = Metrics()
         self.registry = self._metrics.registry
         self._tokens = token_file(settings)

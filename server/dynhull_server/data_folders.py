@@ -77,6 +77,8 @@ def export_hull(data: Path, name: str, file: Path) -> None:
         row, kept, notes = _read(data, name)
         for note in notes:
             typer.echo(note, err=True)
+        if row.settings.divided:
+            raise StorageError(f"hull {name!r} is divided among shards: read its points from a running server")
         contents = replayed(kept, row.settings).stored()
         with progress_bar("points") as progress:
             WRITERS[file.suffix](file, contents, progress, geographic=row.settings.geographic)

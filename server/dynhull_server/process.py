@@ -14,6 +14,7 @@ from dynhull import set_threads
 
 from . import event_loop, logs
 from .app import Server
+from .engine.division import Divisions
 from .failure import code_of, fail, text_of
 from .malloc import return_large_blocks
 from .progress import progress_bar
@@ -25,19 +26,24 @@ log = logging.getLogger(__name__)
 SIGNALS = signal.SIGTERM, signal.SIGINT
 
 
-def run(settings: Settings, storage: Callable[[], Storage | None] = lambda: None) -> None:
+def run(
+    settings: Settings,
+    storage: Callable[[], Storage | None] = lambda: None,
+    divisions: Callable[[], Divisions | None] = lambda: None,
+) -> None:
     """Serve, then return; an error of the settings, the storage or the operating system ends the process.
 
     Args:
         settings: the settings.
         storage: returns what keeps the hulls, None for memory or a folder as the settings say.
+        divisions: returns what runs hulls over shards, None for a server without.
     """
     logs.configure(settings.log_level, settings.log_format)
     return_large_blocks()
     share_processors(settings)
     allow_connections(settings.max_connections)
     try:
-        event_loop.run(_serve(settings, storage))
+        event_loop.run(_serve(settings, storage, divisions))
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
 
@@ -57,9 +63,11 @@ def allow_connections(most: int) -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
-async def _serve(settings: Settings, storage: Callable[[], Storage | None]) -> None:
+async def _serve(
+    settings: Settings, storage: Callable[[], Storage | None], divisions: Callable[[], Divisions | None]
+) -> None:
     with stop_signal() as stop:
-        server = Server(settings, storage=storage())
+        server = Server(settings, storage=storage(), divisions=divisions())
         try:
             with progress_bar("hulls read") as progress:
                 await server.start(progress)

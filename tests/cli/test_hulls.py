@@ -123,3 +123,13 @@ def test_a_pipe_that_closes_early_is_success(served, name, command):
     environment = {**os.environ, "DYNHULL_ADDRESS": served}
     done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+@pytest.mark.usefixtures("served")
+def test_a_hull_over_shards(name):
+    assert dynhull("create", name, "--shards", "3").stdout == f"{name}: created\n"
+    assert json.loads(dynhull("list", name, "--json").stdout)["shards"] == 3
+    refused = dynhull("create", f"{name}-2", "--shards", "2", "--geographic")
+    assert (refused.exit_code, "is geographic, so it cannot be divided" in refused.stderr) == (1, True)
+    refused = dynhull("create", f"{name}-2", "--shards", "2000")
+    assert "--shards is 2000: must be at most 1024" in refused.stderr

@@ -372,3 +372,11 @@ def test_numbers_are_those_of_the_hull(gateway: Gateway, address: str, name: str
     with HullClient(address) as client:
         assert client.count(name, xy).counts.all()
         assert gateway.get(f"/hulls/{name}").json["vertices"] == client.get_hull(name).vertices.tolist()
+
+
+def test_a_hull_over_shards(gateway: Gateway, name: str) -> None:
+    assert gateway.post("/hulls", {"name": name, "shards": 2}).json["shards"] == 2
+    assert gateway.post(f"/hulls/{name}/points", SQUARE).json["revision"] == 1
+    assert gateway.post(f"/hulls/{name}/count", {"points": SQUARE[:2]}).json["counts"] == [1, 1]
+    refused = gateway.post("/hulls", {"name": f"{name}-2", "shards": 2, "geographic": True})
+    assert "is geographic, so it cannot be divided" in refused.json["detail"]

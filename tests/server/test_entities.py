@@ -93,6 +93,7 @@ def test_packed_keys_in_streams_are_applied_once(stub: HullServiceStub, name: st
         assert stub.GetHull(pb.GetHullRequest(name=f"{name}-{suffix}")).hull.config.identity == identity
 
 
+@pytest.mark.whole_hull("keys of another hull")
 def test_questions_about_keys(stub: HullServiceStub, hull: str, name: str) -> None:
     apply(stub, hull, puts({"p": (2, 2), "q": (4, 2), "aa": (4, 0)}))
     found = stub.GetPositions(pb.GetPositionsRequest(name=hull, keys=keys("q", "nobody"), encoding=COORDINATES))

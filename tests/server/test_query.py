@@ -96,6 +96,7 @@ def reason(answer: pb.ReadAnswer) -> str:
     return info.reason
 
 
+@pytest.mark.whole_hull("inner layers")
 def test_every_kind_of_read_is_answered_as_its_own_method_does(stub: HullServiceStub, filled: str) -> None:
     reads = reads_of(filled)
     assert {read.WhichOneof("read") for read in reads} == {field.name for field in pb.Read.DESCRIPTOR.fields}
@@ -128,6 +129,7 @@ def bad_reads(hull: str) -> list[pb.Read]:
     ]
 
 
+@pytest.mark.whole_hull("inner layers")
 def test_a_refused_read_has_the_error_of_its_own_method_and_ends_nothing(stub: HullServiceStub, filled: str) -> None:
     good, bad = reads_of(filled), bad_reads(filled)
     mixed = [read for pair in itertools.zip_longest(bad, good) for read in pair if read is not None]

@@ -160,6 +160,7 @@ def test_what_a_reader_was_told_can_be_gone_on_from(address: str, name: str) -> 
         assert copy.vertices.tolist() == [[0, 0], [4, 0], [0, 4]]
 
 
+@pytest.mark.whole_hull("its server keeps no batches")
 def test_history_is_bounded() -> None:
     with server_process("--history-bytes", "2000") as server, HullClient(server.address) as client:
         client.create_hull("a")

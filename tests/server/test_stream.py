@@ -107,6 +107,7 @@ def test_a_message_has_several_batches_and_a_response_several_results(stub: Hull
     assert vertices.tolist() == DynamicHull(np.concatenate(batches)).vertices().tolist()
 
 
+@pytest.mark.whole_hull("batches of one hull are answered together")
 def test_many_batches_share_responses(stub: HullServiceStub, hull: str) -> None:
     requests = [pb.StreamRequest(name=hull, producer="p", accept_results=True)]
     requests.append(several(*[insert([[i, i * i]]) for i in range(200)], sequences=range(1, 201)))
@@ -296,6 +297,7 @@ def test_what_follows_a_refused_batch_follows_the_one_before_it(address: str, hu
         assert writer.sequence == 9
 
 
+@pytest.mark.whole_hull("batches over several hulls")
 def test_numbers_that_may_skip_are_counted_in_each_of_several_hulls(address: str, hull: str) -> None:
     with HullClient(address) as client:
         other = f"{hull}-other"
@@ -310,6 +312,7 @@ def test_numbers_that_may_skip_are_counted_in_each_of_several_hulls(address: str
         assert (client.last_sequence(hull, "t/0"), client.last_sequence(other, "t/0")) == (9, 9)
 
 
+@pytest.mark.whole_hull("it compares the settings of the hull")
 @pytest.mark.parametrize("durability", ["sync", "none"])
 def test_numbers_that_may_skip_outlive_the_server(tmp_path: Path, durability: str) -> None:
     """From the journal and from a snapshot."""

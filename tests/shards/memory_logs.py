@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from dynhull_cluster.shards.logs import Decision, FencedError
+from dynhull_cluster.shards.logs import Decided, Decision, FencedError
 from dynhull_cluster.shards.requests import Request
 from dynhull_cluster.shards.root import Root
 from dynhull_cluster.shards.shard import Shard
@@ -23,13 +23,28 @@ class MemoryRootLog:
         self.decisions: list[Decision] = []
         self.hook = hook
 
-    def begin(self, epoch: int | None) -> tuple[int, list[Decision]]:
+    def begin(self, epoch: int | None) -> tuple[int, Decided]:
         if epoch not in (None, self.epoch):
             raise FencedError
         self.hook()
         self.epoch += 1
         self.hook()
-        return self.epoch, list(self.decisions)
+        return self.epoch, self._decided()
+
+    def _decided(self) -> Decided:
+        if not self.decisions:
+            return Decided()
+        last = self.decisions[-1]
+        logged = [each for each in self.decisions if each.shards]
+        return Decided(
+            logged[-1].number if logged else 0,
+            last.revision,
+            last.cause,
+            last.clock,
+            {each.producer: each.sequence for each in self.decisions if each.producer},
+            frozenset(each.producer for each in self.decisions if each.may_skip),
+            {shard: each.number for each in self.decisions for shard in each.shards},
+        )
 
     def decide(self, epoch: int, decisions: Sequence[Decision]) -> None:
         if epoch != self.epoch:
@@ -64,8 +79,9 @@ class MemoryShardLog:
         self.steps = [step for step in self.steps if step[0] < number]
         self.hook()
 
-    def read(self) -> Kept:
-        return Kept(records=[record for _, records in self.steps for record in records])
+    def read(self) -> tuple[Kept, int]:
+        number = self.steps[-1][0] if self.steps else 0
+        return Kept(records=[record for _, records in self.steps for record in records]), number
 
 
 class Cluster:

@@ -49,6 +49,8 @@ from dynhull_server.state.records import (
     PointRows,
     QuarantineRules,
     Record,
+    Shares,
+    Tally,
     Window,
 )
 from dynhull_server.storage.durability import Durability
@@ -702,3 +704,64 @@ def test_changes_of_fences_that_do_not_fit_are_refused(opened, change):
         kept = read_fence(opened.storage, 9)
         assert (kept.events, list(kept.consumers)) == (events(1, 2), ["mail"])
         opened.reopen()
+
+
+def test_the_newest_revisions_of_a_shard_can_be_dropped(make):
+    """What a shard has logged beyond the last decision of its root did not happen."""
+    storage = make()
+    storage.open(no_progress)
+    storage.commit([Create(HullRow(1, "hull#0", "u", 0.0, HullSettings(shards=2, shard=0)))])
+    for revision in range(1, 7):
+        storage.commit([Append(1, [steps_record(revision)])])
+    assert storage.cut(1, 6) is None
+    storage.commit([storage.cut(1, 3), Append(1, [steps_record(4, 40.0)])])
+    kept = storage.read(1)
+    assert [record.rows.inserts[0, 0] for record in kept.records] == [1, 2, 3, 40]
+    storage.close()
+    storage = make()
+    assert storage.open(no_progress).notes == []
+    kept = storage.read(1)
+    assert [record.rows.inserts[0, 0] for record in kept.records] == [1, 2, 3, 40]
+    assert (kept.records[-1].producer, kept.records[-1].sequence) == ("steps", 40)
+    storage.commit([Append(1, [steps_record(5)])])
+    storage.close()
+
+
+def steps_record(revision, x=0.0):
+    points = np.array([[x or revision, 0.0]])
+    return Record(revision, PointRows(points, NOTHING), "steps", 10 * revision, may_skip=True)
+
+
+def test_a_deleted_shard_has_nothing_to_drop(make):
+    storage = make()
+    storage.open(no_progress)
+    storage.commit([Create(HullRow(1, "hull#0", "u", 0.0, HullSettings(shards=2, shard=0)))])
+    for revision in (1, 2):
+        storage.commit([Append(1, [steps_record(revision)])])
+    cut = storage.cut(1, 1)
+    storage.commit([Delete(1)])
+    storage.commit([cut])
+    assert storage.row(1) is None
+    storage.close()
+
+
+def test_what_a_root_knows_of_its_shards_comes_back(make):
+    storage = make()
+    storage.open(no_progress)
+    settings = HullSettings(shards=3)
+    storage.commit([Create(HullRow(1, "hull", "u", 0.0, settings))])
+    decided = [
+        Record(1, PointRows(np.eye(2), NOTHING), "ship", 1, shares=Shares({0: Tally(1, 2, 1), 2: Tally(1, 5, 5)})),
+        Record(2, PointRows(NOTHING, np.eye(2)), clock=7, shares=Shares({2: Tally(2, 4, 4)}, expiry=True)),
+    ]
+    storage.commit([Append(1, decided)])
+    same(storage.read(1).records, decided)
+    tallies = {0: Tally(1, 2, 1), 1: Tally(), 2: Tally(2, 4, 4)}
+    for step in storage.snapshot(1, Kept(2, Contents(), {"ship": 1}, tallies=tallies)):
+        storage.commit([step])
+    storage.close()
+    storage = make()
+    (row,) = storage.open(no_progress).hulls
+    kept = storage.read(1)
+    assert (row.settings, kept.revision, kept.tallies) == (settings, 2, tallies)
+    storage.close()

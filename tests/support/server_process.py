@@ -4,7 +4,7 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from subprocess import PIPE
 
@@ -12,7 +12,8 @@ from forked import COMMAND, Process
 from patience import PATIENCE
 
 # How the servers of the tests run: as one process, or as several, set by `pytest --shape`.
-SHAPES = {"process": (), "workers": ("--workers", "2", "--gateways", "2")}
+SEVERAL = "--workers", "2", "--gateways", "2"
+SHAPES = {"process": (), "workers": SEVERAL, "shards": SEVERAL}
 shape = "process"
 
 
@@ -46,10 +47,14 @@ def server_process(
     wrote: it may say that it dropped the commit that was under way.
     """
     memory = [] if {"--data", "--journal"} & set(options) else ["--in-memory"]
+    folder = nullcontext("")
+    if memory and shape == "shards":  # several workers with shards in memory are refused
+        memory, folder = [], tempfile.TemporaryDirectory()
     command = [*wrap, COMMAND, "serve", "--port", "0", "--log-level", "warning", *shape_options(), *memory, *options]
     with (
+        folder as data,
         tempfile.TemporaryFile("w+") as errors,
-        Process(command, stdout=PIPE, stderr=errors, text=True) as process,
+        Process([*command, "--data", data] if data else command, stdout=PIPE, stderr=errors, text=True) as process,
     ):
         try:
             first_line = process.stdout.readline()

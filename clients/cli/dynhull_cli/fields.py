@@ -14,6 +14,7 @@ FIELDS = {
     "config.window.max_points": "--max-points",
     "config.window.max_skew": "--max-skew",
     "config.center": "--center",
+    "config.shards": "--shards",
     "config.quarantine.max_speed": "--max-speed",
     "config.quarantine.max_growth": "--max-growth",
     "config.quarantine.confirmations": "--confirmations",

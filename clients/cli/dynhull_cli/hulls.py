@@ -124,6 +124,13 @@ def create(
     max_speed: MaxSpeed = None,
     max_growth: MaxGrowth = None,
     confirmations: Confirmations = None,
+    shards: Annotated[
+        int | None,
+        _setting(
+            "Number of shards to divide the points among, each on one of the server's workers. Default: one hull.",
+            **COUNTS,
+        ),
+    ] = None,
     exist_ok: Annotated[
         bool, typer.Option("--exist-ok", help="Accept a hull that exists already with the same settings.")
     ] = False,
@@ -152,6 +159,7 @@ def create(
         "geographic": geographic,
         "center": None if center is None else _place(center),
         "quarantine": given_rules(max_speed, max_growth, confirmations),
+        "shards": shards,
     }
     _require("--geographic", geographic, {"--center": center is not None})
     _require(
@@ -281,6 +289,7 @@ def _members(info: "HullInfo") -> dict[str, Any]:
         "geographic": info.geographic,
         "center": info.center,
         "held": info.held,
+        "shards": info.shards,
         **rule_members(info.quarantine),
     }
 

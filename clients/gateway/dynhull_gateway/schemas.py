@@ -211,6 +211,9 @@ class NewHull(Request):
     geographic: StrictBool = Field(False, description="Whether points are longitudes and latitudes in degrees.")
     center: Point | None = Field(None, description="Longitude and latitude of the centre of a geographic hull.")
     quarantine: QuarantineRules | None = Field(None, description="Rules that hold bad positions of keys out.")
+    shards: Annotated[int, Field(strict=True, ge=1, le=1024)] | None = Field(
+        None, description="The number of shards to divide the points among; null for a hull that is not divided."
+    )
     exist_ok: StrictBool = Field(False, description="Return an existing hull with these settings.")
 
     @field_validator("center")
@@ -262,6 +265,7 @@ class HullInfo(Response):
     center: Place | None
     quarantine: PresentRules | None = Field(description="Null for a hull that has never had any rules.")
     held: int = Field(description="Keys in quarantine.")
+    shards: int | None = Field(description="The shards that its points are divided among; null for a whole hull.")
 
 
 class HullPage(Response):

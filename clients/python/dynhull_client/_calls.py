@@ -122,6 +122,7 @@ def create_hull(
     geographic: bool = False,
     center: tuple[float, float] | None = None,
     quarantine: Quarantine | None = None,
+    shards: int | None = None,
     exist_ok: bool = False,
     timeout: float | None = None,
 ) -> Call[HullInfo]:
@@ -149,6 +150,8 @@ def create_hull(
             None for the mean direction of its first points.
         quarantine: the rules that a keyed hull begins with, which hold bad positions out; None for none.
             `set_quarantine` changes them; those of an existing hull are not compared.
+        shards: the number of shards among which the server divides the points, for a hull that is too much for one
+            process; None for one that is not divided. Some settings and questions are refused then.
         exist_ok: whether to return an existing hull of that name and kind, with its points. HullExistsError if it has
             other settings, or without `exist_ok`.
         timeout: seconds, instead of the client's.
@@ -166,6 +169,7 @@ def create_hull(
         raise ValueError("clock, max_skew and ahead are settings of a window: give max_age or max_points, too")
     if quarantine is not None:
         config.quarantine.CopyFrom(encode_quarantine(quarantine))
+    config.shards = _positive("shards", None if shards is None else whole("shards", shards, bits=32))
     create: Call[HullInfo] = Call(
         "CreateHull",
         pb.CreateHullRequest(name=name, config=config),
@@ -257,7 +261,7 @@ def encode_layer(layer: int) -> int:
 
 def _as_wanted(existing: HullInfo, wanted: HullInfo) -> HullInfo:
     """The existing hull; HullExistsError if it has other settings than the one to create."""
-    for setting in ("keyed", "window", "ordering", "geographic"):
+    for setting in ("keyed", "window", "ordering", "geographic", "shards"):
         has, wants = getattr(existing, setting), getattr(wanted, setting)
         if has != wants:
             message = f"the hull {existing.name!r} exists with other settings: its {setting} is {has!r}, not {wants!r}"

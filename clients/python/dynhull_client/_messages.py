@@ -69,6 +69,8 @@ class HullInfo:
         center: longitude and latitude of the centre of a geographic hull; None if it has none so far.
         quarantine: the rules of its quarantine; None for a hull that has never had any.
         held: the number of keys in quarantine.
+        shards: the number of shards that its points are divided among; None for a hull that is not divided. Of a keyed
+            hull over shards `distinct` is 0, because it is not known.
     """
 
     name: str
@@ -86,6 +88,7 @@ class HullInfo:
     center: tuple[float, float] | None = None
     quarantine: Quarantine | None = None
     held: int = 0
+    shards: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -520,6 +523,7 @@ def decode_info(message: hull_pb2.Hull) -> HullInfo:
         decode_center(message),
         decode_quarantine(message.quarantine) if message.HasField("quarantine") else None,
         message.held_count,
+        config.shards or None,
     )
 
 

@@ -1,11 +1,36 @@
 """What a root and its shards need of a log. A change is durable when the method returns."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from dynhull_server.state.hull_state import Cause
 from dynhull_server.state.records import Kept, Record
+
+from .messages import Effect
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """What the decisions so far have led to.
+
+    Attributes:
+        number: the number of the last step that happened and is in the log of a shard.
+        revision: the revision of the hull.
+        cause: what made it; None for revision 0, and where that is no longer known.
+        clock: the clock of the hull, None for a hull without a clock.
+        producers: the last number of each producer.
+        skipping: the producers whose numbers may be skipped.
+        steps: the last step in the log of each shard that has any.
+    """
+
+    number: int = 0
+    revision: int = 0
+    cause: Cause | None = None
+    clock: int | None = None
+    producers: Mapping[str, int] = field(default_factory=dict)
+    skipping: frozenset[str] = frozenset()
+    steps: Mapping[int, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +46,7 @@ class Decision:
         producer: the producer that numbered the batch; empty where it has no number.
         sequence: its number.
         may_skip: whether numbers of the producer may be skipped.
+        effects: what each shard has done.
     """
 
     number: int
@@ -31,6 +57,7 @@ class Decision:
     producer: str = ""
     sequence: int = 0
     may_skip: bool = False
+    effects: Mapping[int, Effect] = field(default_factory=dict)
 
 
 class FencedError(Exception):
@@ -40,8 +67,8 @@ class FencedError(Exception):
 class RootLog(Protocol):
     """The decisions of a hull."""
 
-    def begin(self, epoch: int | None) -> tuple[int, list[Decision]]:
-        """Begin an epoch that no root had before. Returns it with all decisions; no earlier epoch adds any more.
+    def begin(self, epoch: int | None) -> tuple[int, Decided]:
+        """Begin an epoch that no root had before. Returns it, and what is decided; no earlier epoch decides any more.
 
         A root that has an epoch names it. Raises FencedError where a later one has begun since.
         """
@@ -66,5 +93,5 @@ class ShardLog(Protocol):
     def drop(self, number: int) -> None:
         """Drop the steps from this number on."""
 
-    def read(self) -> Kept:
-        """All points."""
+    def read(self) -> tuple[Kept, int]:
+        """All points, and the number of the last step, 0 for none."""

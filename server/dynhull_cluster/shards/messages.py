@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dynhull.arrays import Points
+from dynhull.static.trace import Round
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import RefusedError
 from dynhull_server.state.records import Keys
@@ -99,7 +100,41 @@ class StaticHull:
     """The hull of the points, computed anew from all of them."""
 
 
-Question = SampleOf | CountOf | PositionsOf | StaticHull
+@dataclass(frozen=True, slots=True)
+class FoundOf:
+    """The positions and times of keys, as a Found of each shard."""
+
+    keys: Keys
+
+
+@dataclass(frozen=True, slots=True)
+class AllOf:
+    """All points, as the Contents of each shard."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recompute:
+    """The hull by Chan's algorithm on all points, as a Recomputed of each shard."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recomputed:
+    """The hull of a shard, computed anew.
+
+    Attributes:
+        points: the number of its points.
+        vertices: the vertices.
+        rounds: the rounds of the algorithm.
+        keys_equal: whether the positions of the keys are the points, each key once; True without keys.
+    """
+
+    points: int
+    vertices: Points
+    rounds: tuple[Round, ...]
+    keys_equal: bool
+
+
+Question = SampleOf | CountOf | PositionsOf | StaticHull | FoundOf | AllOf | Recompute
 
 
 # From a shard

@@ -34,6 +34,12 @@ class Write(Request):
     batch: WriteBatch
     now: float
 
+    @property
+    def abandoned(self) -> bool:
+        """Whether nobody waits for it, or its stream has stopped: then it is dropped unless it has begun."""
+        stream = self.batch.stream
+        return self.batch.abandoned or (stream is not None and stream.stopped)
+
 
 @dataclass(slots=True, eq=False)
 class Expire(Request):
@@ -44,6 +50,10 @@ class Expire(Request):
 
 @dataclass(slots=True, eq=False)
 class Read(Request):
-    """A question about all points. The result is the revision, and the answer; for StaticHull, whether it is equal."""
+    """A question about all points. The result is the revision, and the answer.
+
+    For StaticHull the answer is whether it is equal; for FoundOf, AllOf and Recompute it is the answers of all shards,
+    and the vertices of the hull.
+    """
 
     question: Question

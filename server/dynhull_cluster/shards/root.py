@@ -67,21 +67,17 @@ class Root:
         self._keyed = settings.identity != "multiset"
         self._most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self._log = log
-        self._epoch, decisions = log.begin(None)
-        last = {each.producer: each.sequence for each in decisions if each.producer}
-        skipping = {each.producer for each in decisions if each.may_skip}
-        self._producers = Producers(limits.max_producers, limits.max_producers_per_caller, last, skipping, now)
+        self._epoch, decided = log.begin(None)
+        most, most_of_one = limits.max_producers, limits.max_producers_per_caller
+        self._producers = Producers(most, most_of_one, decided.producers, decided.skipping, now)
         self._planner = Planner(settings, self._most_points, self._producers, shards)
-        self._number, self.revision = (decisions[-1].number, decisions[-1].revision) if decisions else (0, 0)
-        self.cause: Cause | None = decisions[-1].cause if decisions else None
-        self.clock: int | None = decisions[-1].clock if decisions else None
+        self._number, self.revision = decided.number, decided.revision
+        self.cause: Cause | None = decided.cause
+        self.clock: int | None = decided.clock
         self.hull: DynamicHull | None = None
         self._names: Names = {}  # the key of each shard that has this vertex
         self._totals = [Totals(0, 0, None)] * shards
-        self._numbers = [0] * shards  # the last step in the log of each
-        for decision in decisions:
-            for shard in decision.shards:
-                self._numbers[shard] = decision.number
+        self._numbers = [decided.steps.get(shard, 0) for shard in range(shards)]  # the last step in the log of each
         self._waiting: deque[Request] = deque()
         self._current: list[Request] = []
         self._ticket = 0
@@ -126,6 +122,32 @@ class Root:
         if len(self._replies) == len(self._sent):
             self._go_on(self._talk, self._replies)
 
+    @property
+    def waits(self) -> bool:
+        """Whether any request is not answered."""
+        return bool(self._current or self._waiting)
+
+    def give_up(self, error: Exception) -> None:
+        """Refuse all requests, and open the shards anew: nothing of them has happened.
+
+        Raises:
+            Exception: as `receive`.
+        """
+        begun, refused = bool(self._current), [*self._current, *self._waiting]
+        self._current = []
+        self._waiting.clear()
+        for request in refused:
+            request.answer(error=error)
+        if begun:  # otherwise they are being opened
+            self._begin_again()
+
+    def leave(self) -> tuple[list[Request], list[Request]]:
+        """The requests under way, and those that wait, for another root to serve: this one has failed."""
+        current, waiting = self._current, list(self._waiting)
+        self._current = []
+        self._waiting.clear()
+        return current, waiting
+
     def _begin_again(self) -> None:
         """Open all shards in a new epoch, and serve the current requests anew: nothing is decided about them."""
         self._waiting.extendleft(reversed(self._current))
@@ -150,6 +172,7 @@ class Root:
         self._talk = None
 
     def _next(self) -> Talk | None:
+        self._drop_abandoned()
         if not self._waiting:
             return None
         request = self._waiting.popleft()
@@ -162,6 +185,10 @@ class Root:
             case Read():
                 return self._read(request)
         raise AssertionError(f"not a request: {request}")
+
+    def _drop_abandoned(self) -> None:
+        while self._waiting and (first := self._waiting[0]) and isinstance(first, Write) and first.abandoned:
+            self._waiting.popleft()
 
     def _answer(self, request: Request, result: Any = None, error: Exception | None = None) -> None:
         self._current.remove(request)
@@ -185,6 +212,10 @@ class Root:
     def due(self) -> int | None:
         """The time by the server's clock before which no point leaves; None if that clock makes none leave."""
         return min((each.due for each in self._totals if each.due is not None), default=None)
+
+    def due_of_shards(self) -> dict[int, int | None]:
+        """Of each shard, the time by the server's clock before which none of its points leaves; None for any time."""
+        return {shard: totals.due for shard, totals in enumerate(self._totals)}
 
     def vertex_keys(self) -> list[Any]:
         """The key at each vertex of a keyed hull, the least one where several are. O(h)."""
@@ -210,6 +241,9 @@ class Root:
             case say.StaticHull():
                 assert self.hull is not None  # questions wait until it is open
                 return np.array_equal(convex_hull(np.concatenate(answers)), self.hull.vertices())
+            case say.FoundOf() | say.AllOf() | say.Recompute():
+                assert self.hull is not None  # likewise
+                return answers, self.hull.vertices()
         assert_never(question)
 
     # Changes
@@ -266,7 +300,10 @@ class Root:
 
     def _joining(self) -> Iterator[Plan]:
         """The plans of the batches behind the first one that make the round with it."""
-        while self._waiting and isinstance(self._waiting[0], Write):
+        while True:
+            self._drop_abandoned()
+            if not self._waiting or not isinstance(self._waiting[0], Write):
+                return
             plan = self._planner.join(self._waiting[0])
             if plan is None:
                 return
@@ -293,7 +330,7 @@ class Root:
             revision += 2 if any(effect.expired for effect in own.values()) else 1
             write = plan.request.batch
             numbered = write.producer, write.sequence, write.may_skip
-            decisions.append(Decision(plan.number, revision, "batch", plan.clock, _logged(own), *numbered))
+            decisions.append(Decision(plan.number, revision, "batch", plan.clock, _logged(own), *numbered, own))
         if decisions:
             self._log.decide(self._epoch, decisions)
         for plan, own, decision in zip(plans, effects, decisions, strict=False):
@@ -317,9 +354,11 @@ class Root:
         effects = {shard: replies[shard].effects[0] for shard in everywhere}
         expired = sum(effect.expired for effect in effects.values())
         if expired:
-            decision = Decision(number, self.revision + 1, "expiry", clock, _logged(effects))
+            decision = Decision(number, self.revision + 1, "expiry", clock, _logged(effects), effects=effects)
             self._log.decide(self._epoch, [decision])
             self._follow(decision, effects)
+        for shard, effect in effects.items():  # they may know better when points leave next
+            self._totals[shard] = effect.totals
         self._answer(request, expired)
 
     def _follow(self, decision: Decision, effects: Effects) -> bool:

@@ -8,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull import convex_hull
+from dynhull.static import chan
+from dynhull.static.trace import Round, Rounds
 from dynhull_server.state.batch import NO_POINTS
 from dynhull_server.state.contents import replayed
-from dynhull_server.state.contents.keyed import Keyed
+from dynhull_server.state.contents.keyed import Keyed, keys_match
 from dynhull_server.state.contents.live import LiveContents
 from dynhull_server.state.errors import RefusedError
 from dynhull_server.state.numbers import as_numbers
@@ -20,6 +22,7 @@ from dynhull_server.state.sample import sample
 from .inverse import Inverse, inverse_of
 from .logs import ShardLog
 from .messages import (
+    AllOf,
     Answered,
     Apply,
     Ask,
@@ -29,10 +32,13 @@ from .messages import (
     CountOf,
     Done,
     Effect,
+    FoundOf,
     Open,
     Opened,
     PositionsOf,
     Question,
+    Recompute,
+    Recomputed,
     Reply,
     Request,
     SampleOf,
@@ -99,6 +105,13 @@ class Shard:
         self._epoch, self._ticket, self._reply = message.epoch, message.ticket, reply
         return reply
 
+    def settled(self, message: Request) -> LiveContents | None:
+        """The contents, if a new message says that all of them are decided; ask before it is handled."""
+        known = self._contents is not None and message.epoch == self._epoch == self._log.epoch
+        if known and message.ticket > self._ticket and isinstance(message, Apply | Ask):
+            return self._contents
+        return None
+
     def _handle(self, message: Request) -> Reply:
         match message:
             case Open():
@@ -115,8 +128,8 @@ class Shard:
         self._log.begin(message.epoch, message.decided)
         contents = self._contents
         if contents is None or self._number > message.decided:
-            kept = self._log.read()
-            contents, self._number = replayed(kept, self._settings), kept.last_revision
+            kept, self._number = self._log.read()
+            contents = replayed(kept, self._settings)
         self._contents, self._uncertain = contents, []
         self._corners, self._corners_as_of = _corners(contents), contents.hull.changes
         return Opened(message.epoch, message.ticket, self._number, _totals(contents), self._corners)
@@ -190,12 +203,26 @@ class Shard:
                 return contents.find(keys).points
             case StaticHull():
                 return convex_hull(contents.hull.points())
+            case FoundOf(keys):
+                assert isinstance(contents, Keyed)  # likewise
+                return contents.find(keys)
+            case AllOf():
+                return contents.stored()
+            case Recompute():
+                return _recomputed(contents)
         assert_never(question)
 
     @property
     def _opened(self) -> LiveContents:
         assert self._contents is not None  # `receive` has seen to it
         return self._contents
+
+
+def _recomputed(contents: LiveContents) -> Recomputed:
+    points, trace = contents.hull.points(), Rounds()
+    vertices = chan(points, trace=trace)
+    whole = not isinstance(contents, Keyed) or keys_match(contents.stored(), points)
+    return Recomputed(len(points), vertices, tuple(each for each in trace if isinstance(each, Round)), whole)
 
 
 def _totals(contents: LiveContents) -> Totals:

@@ -3,12 +3,13 @@
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from functools import partial
-from typing import TYPE_CHECKING, Any, assert_never
+from typing import Any, assert_never
 
 from ..state.batch import Applied
 from ..state.core import Core
-from ..state.errors import StoppingError
+from ..state.errors import HullUnsuitableError, StoppingError
 from ..state.events import (
     Birth,
     Commit,
@@ -17,6 +18,7 @@ from ..state.events import (
     Computed,
     CreateHull,
     DeleteHull,
+    Divide,
     Effect,
     Event,
     Examine,
@@ -38,9 +40,12 @@ from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
 from ..state.records import DEFAULT, HullRow, HullSettings, Kept
-from ..state.trip import Trip
-from ..storage.port import Contents, Progress, Storage
+from ..state.root_state import state_of
+from ..state.trip import Trip, unsaved_of
+from ..storage.port import Contents, Progress, Storage, StorageError
 from .batch_stream import BatchStream
+from .divided_hull import DividedHull
+from .division import Divisions
 from .fence_keeping import FenceKeeping
 from .fences import Fences
 from .group_commit import GroupCommit
@@ -52,9 +57,6 @@ from .server_time import ServerTime
 from .supervisor import Supervisor
 from .threads import Machine, Pool
 from .waiter import Waiter
-
-if TYPE_CHECKING:
-    from concurrent.futures import Future
 
 # The number of threads for trips, for large reads outside of trips, and for the disk.
 TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
@@ -97,13 +99,21 @@ class Engine:
         storage: keeps the hulls.
         supervisor: receives all failures in the background.
         machine: time, threads and random names.
+        divisions: runs hulls over shards; None for a server that has none.
 
     Attributes:
         fences: the fences.
         copies: limits the copies of hulls that large reads make.
     """
 
-    def __init__(self, limits: Limits, storage: Storage, supervisor: Supervisor, machine: Machine) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        storage: Storage,
+        supervisor: Supervisor,
+        machine: Machine,
+        divisions: Divisions | None = None,
+    ) -> None:
         self._limits = limits
         self._storage = storage
         self._supervisor = supervisor
@@ -111,6 +121,7 @@ class Engine:
         self._core = Core(limits)
         self.fences = Fences(self, storage)
         self.copies = asyncio.Semaphore(COPIES)
+        self.divisions = divisions
         self._live: dict[Hull, LiveHull] = {}
         self._events: deque[Event] = deque()
         self._calls: deque[Callable[[], None]] = deque()
@@ -143,12 +154,14 @@ class Engine:
             immediate=self._storage.immediate,
             keeps=self._storage.keeps,
         )
-        progress(0, len(contents.hulls))
-        left = self._stored_hulls(contents.hulls)
+        shards = [row for row in contents.hulls if row.settings.shard is not None]
+        whole = [row for row in contents.hulls if row.settings.shard is None]
+        progress(0, len(whole))
+        left = self._stored_hulls(whole)
         while loaded := await self.run(self.disk, partial(self._load_some, left)):
             for restored in loaded:
                 self._core.restore(*restored)
-            progress(len(self._core.hulls), len(contents.hulls))
+            progress(len(self._core.hulls), len(whole))
         await self.run(self._turns, partial(self._restore_fences, contents))
         self._time = ServerTime(clock, self._core.latest_time)
         self._commits = GroupCommit(
@@ -164,6 +177,11 @@ class Engine:
         self._supervisor.every(WATCH_SECONDS, "commit watch", self._watch_commits)
         keeping = FenceKeeping(self, self._storage, clock, self._limits.fences)
         self._supervisor.every(keeping.SECONDS, "fences", keeping.round)
+        if self.divisions is not None:
+            roots = [hull for hull in self._core.hulls.values() if hull.divided]
+            await self.divisions.start(self, shards, roots)
+        elif shards or any(hull.divided for hull in self._core.hulls.values()):
+            raise StorageError("the storage has hulls over shards: start the server with `dynhull serve`")
         return contents.notes
 
     def _stored_hulls(self, rows: Sequence[HullRow]) -> Iterator[tuple[HullRow, Kept]]:
@@ -180,8 +198,8 @@ class Engine:
         until = clock.monotonic() + LOAD
         loaded = []
         for row, kept in stored:
-            state = HullState(self._limits, row.settings, kept, now=clock.monotonic())
-            loaded.append((row, state, sum(len(record.rows) for record in kept.records)))
+            state = state_of(self._limits, row.settings, kept, now=clock.monotonic())
+            loaded.append((row, state, sum(map(unsaved_of, kept.records))))
             if clock.monotonic() > until:
                 break
         return loaded
@@ -208,6 +226,8 @@ class Engine:
         """Complete the trips in progress, refuse the waiting requests, and close the storage."""
         if not self._started:
             return
+        if self.divisions is not None:
+            await self.divisions.close()
         self.dispatch(Stopping())
         self._idle = asyncio.Event()
         self._notice_idle()
@@ -256,6 +276,12 @@ class Engine:
 
     async def create(self, name: str, settings: HullSettings = DEFAULT) -> LiveHull:
         """Create an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""
+        if settings.divided:
+            no_shards = "config.shards", "cannot be divided: this server has no shards"
+            why_not = no_shards if self.divisions is None else self.divisions.why_not(settings)
+            if why_not is not None:
+                field, reason = why_not
+                raise HullUnsuitableError(name, reason, field=field)
         hull: Hull = await self.ask(CreateHull(Waiter(), name, self.birth(), settings))
         return self._live_hull(hull)
 
@@ -325,6 +351,21 @@ class Engine:
             self._stepping = False
 
     @property
+    def machine(self) -> Machine:
+        """Time, threads and random names."""
+        return self._machine
+
+    @property
+    def supervisor(self) -> Supervisor:
+        """Receives all failures in the background."""
+        return self._supervisor
+
+    @property
+    def limits(self) -> Limits:
+        """The limits on the state."""
+        return self._limits
+
+    @property
     def core(self) -> Core:
         """The core; only the engine's own parts look into it."""
         return self._core
@@ -371,6 +412,36 @@ class Engine:
         self._commits.submit(changes, lambda error, _: self._from_thread(partial(finish, error)))
         return done
 
+    def commit_from_thread(self, changes: list[Any]) -> None:
+        """Commit, from another thread, changes of shards; raises the error of a failure."""
+        done: Future[None] = Future()
+
+        def finish(error: Exception | None, _: bool) -> None:
+            if error is None:
+                done.set_result(None)
+            else:
+                done.set_exception(error)
+
+        self._commits.submit(changes, finish)
+        done.result()
+
+    def ask_from_thread(self, request: Request) -> Any:
+        """The result of a request, from another thread."""
+        return asyncio.run_coroutine_threadsafe(self.ask(request), self._loop).result()
+
+    def read_from_thread(self, number: int) -> Kept:
+        """A shard as it is stored, from another thread."""
+        return self._storage.read(number)
+
+    def cut_from_thread(self, number: int, last: int) -> Any:
+        """What drops the revisions of a shard after `last`, from another thread; None for nothing."""
+        return self._storage.cut(number, last)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the storage keeps batches."""
+        return self._storage.keeps
+
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Reply():
@@ -378,6 +449,9 @@ class Engine:
                     self._move(hull)
                 for request in effect.requests:
                     request.to.answer(request)
+            case Divide():
+                assert self.divisions is not None  # otherwise there is no such hull
+                self.divisions.carry_out(effect.hull, effect.requests)
             case Commit():
                 self._commit(effect.ticket, effect.changes)
             case Compute():
@@ -393,6 +467,11 @@ class Engine:
                 assert_never(effect)
 
     def _move(self, hull: Hull) -> None:
+        if hull.divided and self.divisions is not None:
+            if hull.ended:
+                self.divisions.end(hull)
+            else:
+                self.divisions.begin(hull)
         live = self._live.get(hull)
         if live is not None:
             live.moved()
@@ -500,7 +579,10 @@ class Engine:
     def _live_hull(self, hull: Hull) -> LiveHull:
         live = self._live.get(hull)
         if live is None:
-            live = LiveHull(self, hull, self._recalls)
+            if hull.divided and self.divisions is not None:
+                live = DividedHull(self, hull, self._recalls, self.divisions.of(hull))
+            else:
+                live = LiveHull(self, hull, self._recalls)
             if not hull.ended:
                 self._live[hull] = live
         return live

@@ -16,12 +16,13 @@ from ..state.contents.deadlines import Key
 from ..state.contents.keyed import Found, Keyed
 from ..state.contents.live import layer_of
 from ..state.contents.quarantine import OFF, Quarantine
-from ..state.errors import HullEmptyError
+from ..state.errors import HullEmptyError, HullUnsuitableError
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.numbers import rows_of
 from ..state.outline import Outline
 from ..state.records import Contents, HeldRows, Keys
 from ..state.sample import sample_rows
+from .divided_hull import NO_LAYERS, DividedHull
 from .live_hull import LiveHull
 from .steps import BLOCK, Run, in_blocks
 
@@ -53,11 +54,18 @@ def _keyed(state: HullState) -> Keyed:
 
 async def positions(hull: LiveHull, keys: Keys, min_revision: int) -> tuple[Counts, Found]:
     """The positions of keys of a keyed hull."""
+    if isinstance(hull, DividedHull):
+        await hull.reached(min_revision)
+        counts, found, _ = await hull.division.find(keys)
+        return counts, found
     return await hull.read(lambda state: _keyed(state).find(keys), len(keys), min_revision)
 
 
 async def entities(hull: LiveHull, min_revision: int) -> tuple[Counts, Contents]:
     """All keys of a keyed hull in order, with their positions."""
+    if isinstance(hull, DividedHull):
+        await hull.reached(min_revision)
+        return await hull.division.contents()
     return await hull.read(lambda state: _keyed(state).stored(), hull.counts.points, min_revision)
 
 
@@ -83,6 +91,8 @@ async def ask_of_keys(
 ) -> KeyAnswers:
     """Ask a hull, or one of its convex layers, about the positions of keys that it has itself, or another one."""
     owner.require_frame_of(hull, "keys_of")
+    if isinstance(owner, DividedHull):
+        return await _ask_of_divided(hull, min_revision, owner, owner_min_revision, keys, question, layer)
 
     def ask(state: HullState, keyed: HullState) -> tuple[Found, npt.NDArray[Any] | None, Points]:
         found = _keyed(keyed).find(keys)
@@ -99,6 +109,28 @@ async def ask_of_keys(
         xy = _known(found)
         answers = await hull.ask_vertices(counts, vertices, lambda live, block: question(live, xy[block]), len(xy))
     return KeyAnswers(counts, answers, ~found.present, None if owner is hull else owner_counts)
+
+
+async def _ask_of_divided(
+    hull: LiveHull,
+    min_revision: int,
+    owner: DividedHull,
+    owner_min_revision: int,
+    keys: Keys,
+    question: Question,
+    layer: int,
+) -> KeyAnswers:
+    """Ask a hull over shards about the positions of its own keys."""
+    if owner is not hull:
+        reason = "is divided among shards, so its keys are compared with itself only"
+        raise HullUnsuitableError(owner.name, reason, field="keys_of")
+    if layer > 1:
+        raise HullUnsuitableError(owner.name, NO_LAYERS, field="layer")
+    await owner.reached(max(min_revision, owner_min_revision))
+    counts, found, vertices = await owner.division.find(keys)
+    xy = _known(found)
+    answers = await owner.ask_vertices(counts, vertices, lambda live, block: question(live, xy[block]), len(xy))
+    return KeyAnswers(counts, answers, ~found.present, None)
 
 
 def _known(found: Found) -> Checked:

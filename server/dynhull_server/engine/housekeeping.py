@@ -5,11 +5,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..state.errors import HullNotFoundError
-from ..state.hull_state import HullState
 from ..storage.port import Storage
 from .threads import Clock
 
 if TYPE_CHECKING:
+    from .division import StoredShard
     from .engine import Engine
     from .live_hull import LiveHull
 
@@ -50,7 +50,7 @@ class Housekeeping:
         """
         failure: Exception | None = None
         for hull in self._engine:
-            if hull.unsaved < max(least_points, hull.counts.points):
+            if hull.unsaved < max(least_points, hull.size):
                 continue
             try:
                 await self._snapshot(hull)
@@ -58,14 +58,28 @@ class Housekeeping:
                 continue
             except Exception as error:  # go on with the other hulls
                 failure = failure or error
+        for shard in () if self._engine.divisions is None else self._engine.divisions.shards():
+            if shard.unsaved < max(least_points, shard.points):
+                continue
+            try:
+                await self._snapshot_of_shard(shard)
+            except Exception as error:  # likewise
+                failure = failure or error
         if failure is not None:
             raise failure
 
     async def _snapshot(self, hull: "LiveHull") -> None:
         unsaved = hull.unsaved
-        _, kept = await hull.read(HullState.kept, rows=hull.counts.points)
+        _, kept = await hull.read(lambda state: state.kept(), rows=hull.counts.points)
         await self._carry_out(self._storage.snapshot(hull.number, kept))
         hull.saved(unsaved)
+
+    async def _snapshot_of_shard(self, shard: "StoredShard") -> None:
+        taken = shard.take()
+        if taken is not None:
+            kept, unsaved = taken
+            await self._carry_out(self._storage.snapshot(shard.number, kept))
+            shard.saved(unsaved)
 
     async def _carry_out(self, steps: Iterator[Any]) -> None:
         while True:

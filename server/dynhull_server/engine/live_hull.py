@@ -108,6 +108,11 @@ class LiveHull:
         return self._hull.vertex_count
 
     @property
+    def size(self) -> int:
+        """The number of points that a snapshot has."""
+        return self.counts.points
+
+    @property
     def unsaved(self) -> int:
         """The number of points in batches since the last snapshot."""
         return self._hull.unsaved

@@ -12,10 +12,10 @@ import numpy as np
 from dynhull import KERNEL
 from dynhull.arrays import Points
 from dynhull.globe import Gnomonic
-from dynhull.keys import PackedKeys
 from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
+from ..state.contents.keyed import keys_match
 from ..state.fences.faults import FenceFault
 from ..state.numbers import as_numbers
 from ..state.records import Center, Contents
@@ -94,17 +94,6 @@ def first_difference(live: Points, recomputed: Points) -> Difference | None:
     rows = np.flatnonzero((live[:shorter] != recomputed[:shorter]).any(axis=1))
     i = int(rows[0]) if rows.size else shorter
     return Difference(i, live[i : i + 1], recomputed[i : i + 1])
-
-
-def keys_match(contents: Contents, points: Points) -> bool:
-    """Whether the positions of the keys are these points in lexicographic order, and each key comes once."""
-    keys = contents.keys
-    assert keys is not None  # those of a keyed hull
-    different = len(set(keys)) if isinstance(keys, PackedKeys) else len(np.unique(keys))
-    if not different == len(keys) == len(contents.points):
-        return False
-    x, y = contents.points.T
-    return np.array_equal(contents.points[np.lexsort((y, x))], points)
 
 
 def _recompute(points: Points) -> tuple[Points, list[Round], float]:

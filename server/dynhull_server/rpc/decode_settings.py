@@ -32,6 +32,7 @@ FRAMES: dict[int, Frame] = {
 MICROSECONDS = 1_000_000
 NANOSECONDS = 1_000  # in a microsecond
 MOST_CONFIRMATIONS = 1000
+MOST_SHARDS = 1024
 
 
 def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
@@ -58,7 +59,11 @@ def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
         if identity == "multiset":
             raise InvalidFieldError("config.quarantine", "present", "only a keyed hull has a quarantine")
         quarantine = decode_quarantine(config.quarantine, "config.quarantine")
-    return HullSettings(identity, config.max_points, window, by_event_time, frame, center, quarantine)
+    if config.shards > MOST_SHARDS:
+        raise InvalidFieldError("config.shards", config.shards, f"must be at most {MOST_SHARDS}")
+    return HullSettings(
+        identity, config.max_points, window, by_event_time, frame, center, quarantine, shards=config.shards
+    )
 
 
 def decode_quarantine(message: hull_pb2.Quarantine, field: str) -> QuarantineRules:

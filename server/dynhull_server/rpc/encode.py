@@ -90,6 +90,7 @@ def encode_settings(settings: HullSettings) -> hull_pb2.HullConfig:
         frame=FRAMES[settings.frame],
         center=encode_center(settings.center),
         quarantine=encode_quarantine(settings.quarantine),
+        shards=settings.shards,
     )
     if settings.identity != "multiset":
         by_time = settings.by_event_time

@@ -34,6 +34,7 @@ from ..state.errors import (
     RevisionForgottenError,
     SequenceAheadError,
     SequenceGapError,
+    ShardAwayError,
     StoppingError,
 )
 from .access import PermissionDeniedError, UnauthenticatedError
@@ -255,7 +256,7 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
             return _status(code.UNAVAILABLE, str(error), "STORAGE_FAILED", where)
         case OutcomeUnknownError():
             return _status(code.UNKNOWN, str(error), "OUTCOME_UNKNOWN", where)
-        case StartingError():
+        case StartingError() | ShardAwayError():
             return _status(code.UNAVAILABLE, str(error), "STARTING", where)
         case RelayedError():
             return error.status

@@ -31,12 +31,14 @@ from .events import (
     Computed,
     CreateHull,
     DeleteHull,
+    Divide,
     Effect,
     Event,
     Examine,
     Examined,
     Expire,
     Failed,
+    Follow,
     Gone,
     NotExamined,
     ReadHull,
@@ -78,9 +80,10 @@ from .limits import Limits
 from .queues import Queue, Queues, names_of
 from .records import DEFAULT, Append, HullRow, Kept, Record
 from .registry import Registry
+from .root_state import state_of
 from .schedule import Schedule
 from .taking import take
-from .trip import Leg, Trip, write
+from .trip import Leg, Trip, refuse, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -96,6 +99,8 @@ SMALL_TRIP = 1024
 # Seconds before the storage is examined again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 READS = ReadHull | ReadTogether | ReadFence
+# What the shards of a divided hull carry out.
+DIVIDED = WriteBatch | Expire
 
 
 class Core:
@@ -135,6 +140,7 @@ class Core:
             CreateHull: self._asked,
             DeleteHull: self._asked,
             Recenter: self._asked,
+            Follow: self._asked,
             CreateFence: self._asked_of_fence,
             ReplaceFence: self._asked_of_fence,
             DeleteFence: self._asked_of_fence,
@@ -202,6 +208,10 @@ class Core:
         queue = self._queues.get(name)
         return None if queue is None else queue.line
 
+    def number_of_shard(self) -> int:
+        """A number for a shard that is created."""
+        return self._registry.number_of_shard()
+
     def idle(self, hull: Hull) -> bool:
         """Whether a small read of a hull needs no request, because nothing goes on in its queue."""
         queue = self._queues.get(hull.name)
@@ -242,10 +252,15 @@ class Core:
     # Requests
 
     def _asked(
-        self, request: CreateHull | DeleteHull | Expire | ReadHull | Recenter | WriteBatch, effects: list[Effect]
+        self,
+        request: CreateHull | DeleteHull | Expire | Follow | ReadHull | Recenter | WriteBatch,
+        effects: list[Effect],
     ) -> None:
         name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
         queue = self._queues.get(name) or self._queues.of(name)
+        if queue.hull is not None and queue.hull.divided and isinstance(request, DIVIDED):
+            self._divide(queue.hull, [request], effects)
+            return
         if queue.trip is None and not queue.waiting and not self._stopping and not request.abandoned:
             if request.rows <= SMALL and type(request) is ReadHull:
                 self._read(queue, request)
@@ -262,8 +277,24 @@ class Core:
 
     def _arrived(self, event: Arrived, effects: list[Effect]) -> None:
         queue = self._queues.of(event.batches[0].name)
+        if queue.hull is not None and queue.hull.divided:
+            self._divide(queue.hull, list(event.batches), effects)
+            return
         queue.waiting += event.batches
         self._go_on([queue], effects)
+
+    def _divide(self, hull: Hull, requests: "list[WriteBatch | Expire]", effects: list[Effect]) -> None:
+        """Leave requests to the shards of a hull."""
+        if not self._stopping:
+            effects.append(Divide(hull, requests))
+            return
+        refused: list[Request] = []
+        for request in requests:
+            stream = request.stream if type(request) is WriteBatch else None
+            if not (request.abandoned or (stream is not None and stream.stopped)):
+                refuse(request, StoppingError())
+                refused.append(request)
+        effects.append(Reply(refused))
 
     def _asked_together(self, request: Together, effects: list[Effect]) -> None:
         self._go_on(self._queues.put(request, [part.name for part in request.parts]), effects)
@@ -326,11 +357,22 @@ class Core:
                 together = self._queues.at(names_of(first)) if isinstance(first, SPANNING) else [queue]
                 if not all(each.trip is None and each.waiting and each.waiting[0] is first for each in together):
                     break  # the last of these queues that comes so far begins it
-                requests, rows = take(self._queues, together)
+                requests, rows = self._take(together, effects)
                 if requests:
                     trip = self._begin(together, requests, rows, effects)
                     left += [each for each in trip.queues if each is not queue]
             self._queues.rest(queue)
+
+    def _take(self, queues: list[Queue], effects: list[Effect]) -> tuple[list[Request], int]:
+        """The requests of the next trip, without those that are for shards: they have waited for their hull."""
+        requests, rows = take(self._queues, queues)
+        hull = queues[0].hull
+        if hull is None or not hull.divided:
+            return requests, rows
+        for_shards = [request for request in requests if isinstance(request, DIVIDED)]
+        if for_shards:
+            self._divide(hull, for_shards, effects)
+        return [request for request in requests if not isinstance(request, DIVIDED)], rows
 
     def _begin(self, queues: list[Queue], requests: list[Request], rows: int, effects: list[Effect]) -> Trip:
         trip = self._new_trip(queues, requests)
@@ -502,7 +544,7 @@ class Core:
         for leg in trip.legs:
             hull = leg.before or leg.after
             number, settings = (0, DEFAULT) if hull is None else (hull.row.number, hull.row.settings)
-            hulls.append((number, partial(HullState, self._registry.limits, settings, now=self._now)))
+            hulls.append((number, partial(state_of, self._registry.limits, settings, now=self._now)))
         if isinstance(trip, LineTrip):
             trip.examined, restored = recovery.reading(trip)
             effects.append(Examine(trip, hulls, trip.examined, restored))

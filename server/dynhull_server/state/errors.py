@@ -312,6 +312,18 @@ class DiskFullError(NotStoredError):
     """The disk is full; nothing of the change was applied."""
 
 
+class ShardAwayError(RefusedError):
+    """A shard of the hull does not answer, so nothing of the request was applied, and it may be sent again.
+
+    Attributes:
+        shard: its number.
+    """
+
+    def __init__(self, name: str, shard: int) -> None:
+        super().__init__(f"shard {shard} of hull {name!r} is away; nothing of the request was applied: try again later")
+        self.shard = shard
+
+
 class OutcomeUnknownError(Exception):
     """The storage failed in the middle of a change: it may have been applied or not.
 

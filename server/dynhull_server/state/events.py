@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from .changes import Change
-from .records import DEFAULT, Center, HullSettings, Kept
+from .records import DEFAULT, Center, HullSettings, Kept, Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -154,6 +154,26 @@ class ReadTogether(Request):
     parts: "list[Hull]"
     function: "Callable[[list[HullState]], Any]"
     order: int = field(default=0, init=False)
+
+
+@dataclass(slots=True, eq=False)
+class Follow(Request):
+    """Have the root of a hull over shards follow what was decided.
+
+    Attributes:
+        hull: the hull.
+        records: the revisions.
+        due: the time by the server's clock before which no point leaves; None if that clock makes none leave.
+    """
+
+    hull: "Hull"
+    records: "list[Record]"
+    due: int | None
+
+    @property
+    def name(self) -> str:
+        """The name of the hull."""
+        return self.hull.name
 
 
 # Requests that wait in the queues of several hulls. `order` is greater for those that come later; the core sets it.
@@ -359,4 +379,12 @@ class Stir:
     events: "EventBlock | None"
 
 
-Effect = Compute | Commit | Examine | Retry | Reply | Stir
+@dataclass(slots=True)
+class Divide:
+    """Have the shards of a hull carry out requests, in this order, and answer them."""
+
+    hull: "Hull"
+    requests: "list[WriteBatch | Expire]"
+
+
+Effect = Compute | Commit | Divide | Examine | Retry | Reply | Stir

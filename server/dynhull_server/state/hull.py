@@ -13,11 +13,12 @@ class Hull:
         counts: the counts at the latest committed revision.
         unsaved: points in batches since the last snapshot.
         timed: whether times matter: its points may leave by themselves.
+        divided: whether its points are divided among shards, and the state is that of their root.
         due: the time at which the core makes points leave, None where it has no such plan.
         ended: whether it has been deleted.
     """
 
-    __slots__ = ("counts", "due", "ended", "row", "state", "timed", "unsaved")
+    __slots__ = ("counts", "divided", "due", "ended", "row", "state", "timed", "unsaved")
 
     def __init__(self, row: HullRow, state: HullState, unsaved: int = 0) -> None:
         self.row = row
@@ -26,6 +27,7 @@ class Hull:
         self.unsaved = unsaved
         self.ended = False
         self.timed = row.settings.identity != "multiset" or row.settings.window is not None
+        self.divided = row.settings.divided
         self.due: int | None = None
 
     @property

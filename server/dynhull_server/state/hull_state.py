@@ -92,6 +92,16 @@ class HullState:
         self._outline: tuple[Points, Center | None, GlobeOutline] | None = None
 
     @property
+    def follows_server(self) -> bool:
+        """Whether the clock, if any, follows the server's, rather than event times."""
+        return self.contents.follows_server
+
+    @property
+    def next_due(self) -> int | None:
+        """The time by the server's clock before which no point leaves; None if that clock makes none leave."""
+        return self.contents.due
+
+    @property
     def center(self) -> Center | None:
         """The centre of a geographic hull; None for a plane, and for a hull without points that has none so far."""
         globe = self.contents.globe
@@ -351,6 +361,8 @@ def _last_cause(kept: Kept) -> Cause | None:
     if not kept.records:
         return None
     last = kept.records[-1]
+    if last.shares is not None:
+        return "expiry" if last.shares.expiry else "batch"
     if last.center is not None and not len(last.rows):
         return "recenter"
     return "expiry" if isinstance(last.rows, Expiry) else "batch"

@@ -96,6 +96,12 @@ class Producers:
             else:
                 self._counting.move_to_end(producer)
 
+    def forget_beyond(self, most: int) -> None:
+        """Drop the producers that have been idle for longest, as far as there are more than that."""
+        while self._counting and len(self._counting) + len(self._skipping) > most:
+            _, oldest = self._counting.popitem(last=False)
+            self._owned[oldest.owner] -= 1
+
     def _make_room(self, owner: str, now: float) -> None:
         """Drop idle producers where a limit leaves no room for another one."""
         if self._owned[owner] >= self._most_of_one:

@@ -66,6 +66,8 @@ class HullSettings:
         frame: what coordinates mean: a plane, or longitude and latitude in degrees ("geographic").
         center: the centre that a geographic hull begins with; None for its first points to choose.
         quarantine: the rules that a keyed hull begins with, or None.
+        shards: the number of shards that the points are divided among; 0 for a hull that is not divided.
+        shard: which of them these points belong to; None for a hull as a whole.
     """
 
     identity: Identity = "multiset"
@@ -75,11 +77,18 @@ class HullSettings:
     frame: Frame = "plane"
     center: Center | None = None
     quarantine: QuarantineRules | None = None
+    shards: int = 0
+    shard: int | None = None
 
     @property
     def geographic(self) -> bool:
         """Whether its points are places on the globe."""
         return self.frame == "geographic"
+
+    @property
+    def divided(self) -> bool:
+        """Whether these are the settings of the root of a hull over shards: it has the vertices of all shards."""
+        return self.shards > 0 and self.shard is None
 
 
 DEFAULT = HullSettings()
@@ -212,6 +221,34 @@ class Expiry:
 Rows = PointRows | KeyRows | Expiry
 
 
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """What the root of a hull over shards knows of a shard.
+
+    Attributes:
+        step: the last step in its log.
+        points: the number of its points.
+        distinct: the number of its different points.
+    """
+
+    step: int = 0
+    points: int = 0
+    distinct: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """What a revision of a hull over shards is for its root, which has the vertices of all shards in place of points.
+
+    Attributes:
+        tallies: the shards whose logs have it, after it.
+        expiry: whether points have left because of their age.
+    """
+
+    tallies: dict[int, Tally]
+    expiry: bool = False
+
+
 @dataclass(slots=True)
 class Record:
     """One revision of a hull.
@@ -224,6 +261,7 @@ class Record:
         clock: the hull's clock after it, in microseconds since 1970; None for a hull without a clock.
         center: the centre of a geographic hull, where this revision sets or moves it before its rows; otherwise None.
         may_skip: whether numbers of the producer may be skipped.
+        shares: for the root of a hull over shards, otherwise None.
     """
 
     revision: int
@@ -233,6 +271,7 @@ class Record:
     clock: int | None = None
     center: Center | None = None
     may_skip: bool = False
+    shares: Shares | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,6 +335,7 @@ class Kept:
         center: the centre of a geographic hull at that revision; None if it has none so far.
         skipping: the producers whose numbers may be skipped.
         rules: the rules of the quarantine at that revision; None for those of the settings.
+        tallies: what the root of a hull over shards knows of its shards at that revision.
     """
 
     revision: int = 0
@@ -306,6 +346,7 @@ class Kept:
     center: Center | None = None
     skipping: frozenset[str] = frozenset()
     rules: QuarantineRules | None = None
+    tallies: dict[int, Tally] = field(default_factory=dict)
 
     @property
     def last_revision(self) -> int:

@@ -60,7 +60,7 @@ class Registry:
     @property
     def latest_time(self) -> int | None:
         """The latest time of the server's clock that a hull or fence has recorded, None for none. O(both)."""
-        clocks = [hull.counts.clock for hull in self.hulls.values() if hull.state.contents.follows_server]
+        clocks = [hull.counts.clock for hull in self.hulls.values() if hull.state.follows_server]
         clocks += [fence.time for fence in self.fences.values() if fence.time != NO_TIME]
         return max((clock for clock in clocks if clock is not None), default=None)
 
@@ -95,6 +95,10 @@ class Registry:
         """A number for a fence that may be created, None if it is too many. Give it back once that is decided."""
         self._fencing += 1
         return self._new_number() if len(self.fences) + self._fencing <= self.limits.fences.max_fences else None
+
+    def number_of_shard(self) -> int:
+        """A number for a shard that is created."""
+        return self._new_number()
 
     def give_back(self, hulls: int, fences: int = 0) -> None:
         """Give back places that were reserved."""

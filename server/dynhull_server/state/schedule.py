@@ -27,7 +27,7 @@ class Schedule:
 
     def plan(self, hull: Hull) -> None:
         """Plan when points of a hull leave next. No trip of the hull is in progress."""
-        due = hull.state.contents.due
+        due = hull.state.next_due
         if due is not None and (hull.due is None or due < hull.due):
             hull.due = due
             heappush(self._due, (due, hull.row.number, hull.name))

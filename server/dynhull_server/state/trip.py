@@ -7,11 +7,23 @@ from typing import TYPE_CHECKING, Any
 from .batch import Applied, Batch, KeyedBatch
 from .changes import Change
 from .errors import HullExistsError, HullNotFoundError, HullUnsuitableError, MisfitError
-from .events import CreateHull, DeleteHull, Expire, ReadHull, ReadTogether, Recenter, Request, WriteBatch, WriteTogether
+from .events import (
+    CreateHull,
+    DeleteHull,
+    Expire,
+    Follow,
+    ReadHull,
+    ReadTogether,
+    Recenter,
+    Request,
+    WriteBatch,
+    WriteTogether,
+)
 from .hull import Hull
 from .hull_state import Counts, HullState
 from .limits import Limits
 from .records import DEFAULT, Append, Create, Delete, HullRow, HullSettings, Kept, Record
+from .root_state import RootState, state_of
 from .together import apply_together
 
 if TYPE_CHECKING:
@@ -157,6 +169,8 @@ class Trip:
                 return leg.after
             case Expire():
                 return self._expire(request, leg)
+            case Follow():
+                return self._follow(request, leg)
             case Recenter():
                 return self._recenter(request, leg)
             case DeleteHull():
@@ -178,6 +192,8 @@ class Trip:
             if request.birth is None or (stream is not None and stream.hull is not None):
                 raise HullNotFoundError(leg.name)
             hull = self._new_hull(request, leg)
+        elif hull.divided:  # it is created by the same trip, so the batch came before the hull
+            raise HullNotFoundError(leg.name)
         applied = self._apply(request, hull, leg)
         self.torn = hull.state.torn
         if applied is None:
@@ -197,6 +213,9 @@ class Trip:
             if leg.after is None:
                 request.refused = index
                 raise HullNotFoundError(leg.name)
+            if leg.after.divided:
+                request.refused = index
+                raise HullUnsuitableError(leg.name, "is divided among shards, so no batch is over it and other hulls")
             hulls.append(leg.after)
         try:
             journals = [self._journal(leg) for leg in ordered]
@@ -237,6 +256,21 @@ class Trip:
         leg.unsaved += expired
         return expired
 
+    def _follow(self, request: Follow, leg: Leg) -> Counts:
+        hull = leg.after
+        if hull is None or hull is not request.hull:
+            raise HullNotFoundError(leg.name)
+        state = hull.state
+        assert isinstance(state, RootState)  # only they are followed
+        try:
+            state.follow(request.records, self._now, leg.records)
+        finally:
+            self.torn = state.torn
+        state.due = request.due
+        self.applied |= bool(request.records)
+        leg.unsaved += sum(map(unsaved_of, request.records))
+        return state.counts
+
     def _recenter(self, request: Recenter, leg: Leg) -> tuple[Counts, bool]:
         hull = leg.after
         if hull is None:
@@ -256,7 +290,7 @@ class Trip:
         assert birth is not None  # otherwise the request was refused
         settings = request.settings if isinstance(request, CreateHull) else settings_for(request.make())
         row = HullRow(place.number, leg.name, birth.uid, birth.created, settings)
-        return Hull(row, HullState(place.limits, settings, Kept(), self._now))
+        return Hull(row, state_of(place.limits, settings, Kept(), self._now))
 
 
 def settings_for(batch: Batch | KeyedBatch) -> HullSettings:
@@ -293,6 +327,11 @@ def write(
     if stream is not None:
         stream.hull = hull
     return applied
+
+
+def unsaved_of(record: Record) -> int:
+    """The points in a revision, or 1 if it is a root's: then others than vertices may have come and gone."""
+    return len(record.rows) or int(record.shares is not None)
 
 
 def refuse(request: Request, error: Exception) -> None:

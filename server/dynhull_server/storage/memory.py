@@ -34,6 +34,14 @@ class _Snapshot:
 
 
 @dataclass(slots=True)
+class _Cut:
+    """A step: a shard ends at revision `last`."""
+
+    number: int
+    last: int
+
+
+@dataclass(slots=True)
 class _WhoIsInside:
     """A step: all who are inside of a fence."""
 
@@ -126,6 +134,10 @@ class MemoryStorage:
         if self.keeps:
             yield _Snapshot(number, kept)
 
+    def cut(self, number: int, last: int) -> Step | None:
+        """One step."""
+        return _Cut(number, last) if self._hulls[number].last > last else None
+
     def sweep(self) -> Iterator[Step]:
         """No steps: deletes leave nothing behind."""
         return iter(())
@@ -183,6 +195,9 @@ class MemoryStorage:
                 if self._last(change.row.number, last) is not None:
                     raise NotCommittedError(f"hull {change.row.number} already exists")
                 last[change.row.number] = 0
+            elif isinstance(change, _Cut):
+                if self._last(change.number, last) is not None:
+                    last[change.number] = change.last
             elif isinstance(change, Append | Delete):
                 before = self._last(change.number, last)
                 if before is None:
@@ -253,6 +268,10 @@ class MemoryStorage:
                 del self._hulls[change.number]
             case _Snapshot():
                 self._take(change)
+            case _Cut():
+                if (hull := self._hulls.get(change.number)) is not None:  # otherwise deleted meanwhile
+                    hull.records = [record for record in hull.records if record.revision <= change.last]
+                    hull.last = change.last
             case _WhoIsInside():
                 if change.number in self._fences:  # otherwise deleted meanwhile
                     self._fences[change.number].inside = change.inside

@@ -161,6 +161,17 @@ class Storage(Protocol):
         of it. Snapshots of several hulls may be written at the same time.
         """
 
+    def cut(self, number: int, last: int) -> "Step | None":
+        """Drop the revisions of a shard after `last`, which is not before its last snapshot; None for none.
+
+        Commit the step at once; it may be followed by batches in the same commit. Each commit before it has added the
+        batches of `last` and those after it apart.
+
+        Raises:
+            KeyError: no hull has that number.
+            DamagedError: the data is damaged.
+        """
+
     def sweep(self) -> Iterator["Step"]:
         """Drop what nobody needs of deleted hulls and fences, unfinished snapshots and dropped events, in the same way.
 

@@ -637,3 +637,14 @@ def _of_kind(keys: list[Any], kind: Keys) -> Keys:
 
 def _key(keys: Keys, row: int) -> Key:
     return keys[row] if isinstance(keys, PackedKeys) else int(keys[row])
+
+
+def keys_match(contents: Contents, points: Points) -> bool:
+    """Whether the positions of the keys are these points in lexicographic order, and each key comes once."""
+    keys = contents.keys
+    assert keys is not None  # those of a keyed hull
+    different = len(set(keys)) if isinstance(keys, PackedKeys) else len(np.unique(keys))
+    if not different == len(keys) == len(contents.points):
+        return False
+    x, y = contents.points.T
+    return np.array_equal(contents.points[np.lexsort((y, x))], points)

@@ -258,6 +258,7 @@ class FenceWork(FencedTrip):
         hull = self._by_name[name].after
         if hull is None:
             raise HullNotFoundError(name)
+        _require_whole(hull)
         return hull
 
     def _subjects(self, config: FenceConfig) -> list[Subjects]:
@@ -272,6 +273,9 @@ class FenceWork(FencedTrip):
             return [known.get(hull.name) or Subjects(hull)]
         hulls = [leg.after for _, leg in sorted(self._by_name.items()) if config.compares(leg.name)]
         keyed = [hull for hull in hulls if hull is not None and hull.row.settings.identity != "multiset"]
+        for each in hulls:
+            if each is not None:
+                _require_whole(each)
         for hull in keyed:
             require_frames(config, hull, None)
         if not keyed and config.kind == "prefix":
@@ -332,3 +336,8 @@ class FenceWork(FencedTrip):
 
 def _waits(config: FenceConfig, sequence: int, time: int) -> Waits:
     return Waits(sequence, time) if config.dwell else NO_WAITS
+
+
+def _require_whole(hull: Hull) -> None:
+    if hull.divided:
+        raise HullUnsuitableError(hull.name, "is divided among shards, which no fence compares")

@@ -12,6 +12,7 @@ from dynhull.keys import key_list, take_keys
 
 from ..batch import Applied
 from ..contents.keyed import Keyed
+from ..errors import HullUnsuitableError
 from ..events import CreateHull, Expire, ReadHull, Request, WriteBatch, WriteTogether
 from ..hull import Hull
 from ..limits import FenceLimits
@@ -110,6 +111,9 @@ class FencedTrip(Trip):
         return applied
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
+        if isinstance(request, CreateHull) and request.settings.divided:
+            reason = "begins with the prefix of a fence, which does not compare a hull that is divided among shards"
+            raise HullUnsuitableError(leg.name, reason, field="config.shards")
         self.place = self._ground.places.get(leg.name)
         try:
             hull = super()._new_hull(request, leg)

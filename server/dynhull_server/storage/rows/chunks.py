@@ -3,14 +3,14 @@
 import json
 import struct
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynhull.keys import PackedKeys
 
-from ...state.records import Contents, Kept, Keys, QuarantineRules, Times
+from ...state.records import Contents, Kept, Keys, QuarantineRules, Tally, Times
 from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
 from .held_rows import held_bytes, held_starts, joined_held, take_held
 
@@ -85,6 +85,8 @@ def state(kept: Kept) -> bytes:
     }
     if kept.rules is not None:
         found["rules"] = asdict(kept.rules)
+    if kept.tallies:
+        found["tallies"] = {str(shard): astuple(tally) for shard, tally in kept.tallies.items()}
     return json.dumps(found).encode()
 
 
@@ -99,6 +101,7 @@ def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
     kept.skipping = frozenset(found.get("skipping", ()))
     if "rules" in found:
         kept.rules = QuarantineRules(**found["rules"])
+    kept.tallies = {int(shard): Tally(*numbers) for shard, numbers in found.get("tallies", {}).items()}
     return kept, _decoded
 
 

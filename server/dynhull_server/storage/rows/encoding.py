@@ -1,8 +1,9 @@
 """Records as bytes, and the checksums of rows.
 
-A payload is a sequence of records: a header, the name of the producer, the hull's clock, its centre, and the columns of
-the rows. What is optional has a flag in the header. Records of the formats 1 and 2 have no flags but LENIENT. Before
-format 5 the further flags were the upper byte of the length of the name, which was always 0.
+A payload is a sequence of records: a header, the name of the producer, the hull's clock, its centre, the columns of
+the rows, and what the root of a hull over shards knows of these. What is optional has a flag in the header. Records of
+the formats 1 and 2 have no flags but LENIENT. Before format 5 the further flags were the upper byte of the
+length of the name, which was always 0.
 """
 
 import struct
@@ -11,7 +12,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ...state.records import Condition, Expiry, KeyRows, PointRows, Record, Rows
+from ...state.records import Condition, Expiry, KeyRows, PointRows, Record, Rows, Shares, Tally
 from .columns import Cursor, key_bytes, point_bytes, time_bytes
 from .held_rows import change_bytes, take_change
 
@@ -20,10 +21,16 @@ from .held_rows import change_bytes, take_change
 HEADER = struct.Struct("<IIQBBB")
 TIME = struct.Struct("<q")
 CENTER = struct.Struct("<dd")
+# Whether points have left because of their age, and the number of shards; of each shard its number and its tally.
+SHARES = struct.Struct("<?H")
+TALLY = struct.Struct("<HQQQ")
 MOST_NUMBERS = 7  # in the key of a row
 NUMBERS = [struct.Struct(f"<{count}q") for count in range(MOST_NUMBERS + 1)]
 
-HAS_CENTER, MAY_SKIP, HAS_HELD = 1, 2, 4  # further flags, the last one since format 8
+HAS_CENTER, MAY_SKIP = 1, 2  # further flags
+HAS_HELD = 4  # since format 8
+HAS_SHARES = 8  # since format 9
+FURTHER = HAS_CENTER | MAY_SKIP | HAS_HELD | HAS_SHARES
 LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8
 KINDS = 48  # the flags with the kind of the rows
 POINTS, STRINGS, INTEGERS, EXPIRY = 0, 16, 32, 48
@@ -45,6 +52,9 @@ def encode(records: Iterable[Record]) -> bytes:
         if isinstance(record.rows, KeyRows) and record.rows.held is not None:
             further |= HAS_HELD
             columns.append(change_bytes(record.rows.held))
+        if record.shares is not None:
+            further |= HAS_SHARES
+            columns.append(_share_bytes(record.shares))
         if record.clock is not None:
             flags |= HAS_CLOCK
             columns.insert(0, TIME.pack(record.clock))
@@ -57,7 +67,7 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
     cursor = Cursor(payload)
     while not cursor.at_end:
         added, removed, sequence, name, further, flags = HEADER.unpack(cursor.take(HEADER.size))
-        if further > HAS_CENTER | MAY_SKIP | HAS_HELD:
+        if further > FURTHER:
             raise ValueError(f"a record has the unknown further flags {further:#x}")
         producer = str(cursor.take(name), "utf-8")
         clock = _time(cursor) if flags & HAS_CLOCK else None
@@ -67,7 +77,8 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
             if not isinstance(rows, KeyRows):
                 raise ValueError("points without keys are in quarantine")
             rows.held = take_change(cursor, strings=flags & KINDS == STRINGS)
-        yield Record(revision, rows, producer, sequence, clock, center, bool(further & MAY_SKIP))
+        shares = _shares(cursor) if further & HAS_SHARES else None
+        yield Record(revision, rows, producer, sequence, clock, center, bool(further & MAY_SKIP), shares)
         revision += 1
 
 
@@ -128,6 +139,17 @@ def _decoded(cursor: Cursor, added: int, removed: int, flags: int) -> Rows:
     if flags & CONDITION_FLAGS not in CONDITION_OF:
         raise ValueError(f"a record has the unknown flags {flags:#x}")
     return KeyRows(keys, points, removes, times, deadlines, CONDITION_OF[flags & CONDITION_FLAGS])
+
+
+def _share_bytes(shares: Shares) -> bytes:
+    tallies = [TALLY.pack(shard, each.step, each.points, each.distinct) for shard, each in shares.tallies.items()]
+    return SHARES.pack(shares.expiry, len(tallies)) + b"".join(tallies)
+
+
+def _shares(cursor: Cursor) -> Shares:
+    expiry, count = SHARES.unpack(cursor.take(SHARES.size))
+    tallies = (TALLY.unpack(cursor.take(TALLY.size)) for _ in range(count))
+    return Shares({shard: Tally(*numbers) for shard, *numbers in tallies}, expiry)
 
 
 def _time(cursor: Cursor) -> int:

@@ -71,7 +71,7 @@ class _Check:
     def __init__(self, reader: Reader, ledger: Ledger) -> None:
         self._reader = reader
         self._ledger = ledger
-        self._hulls = {hull.row.name: hull for hull in ledger.hulls.values()}
+        self._hulls = {hull.row.name: hull for hull in ledger.hulls.values() if not hull.row.settings.shards}
         self._names = sorted(self._hulls)
         self._outlines: dict[tuple[str, int], tuple[Points, Center | None]] = {}
 

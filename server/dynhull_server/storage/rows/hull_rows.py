@@ -97,6 +97,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     6: ("id, name, uid, created, settings, checksum", _of_format_3),
     7: ("id, name, uid, created, settings, checksum", _of_format_3),
     8: ("id, name, uid, created, settings, checksum", _of_format_3),
+    9: ("id, name, uid, created, settings, checksum", _of_format_3),
 }
 
 

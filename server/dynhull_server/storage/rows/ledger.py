@@ -100,6 +100,16 @@ class HullRows:
         del self.firsts[:rows], self.ids[:rows]
         self.sum -= weights
 
+    def drop_newest(self, rows: int, weights: int, last: int) -> None:
+        """Remove the newest rows of batches."""
+        del self.firsts[-rows:], self.ids[-rows:]
+        self.sum -= weights
+        self.last = last
+
+    def after(self, last: int) -> "array[int]":
+        """The rows whose revisions are all after `last`."""
+        return self.ids[bisect_right(self.firsts, last) :]
+
 
 @dataclass(slots=True)
 class Ledger:
@@ -189,6 +199,16 @@ class Cut:
 
 
 @dataclass(frozen=True, slots=True)
+class DropNewest:
+    """Step: deletes the newest rows of batches of a shard, which did not happen; it ends at revision `last`."""
+
+    number: int
+    last: int
+    ids: "array[int]"
+    weights: int
+
+
+@dataclass(frozen=True, slots=True)
 class DropDead:
     """Step: deletes the first dead rows of a table."""
 
@@ -196,7 +216,7 @@ class DropDead:
     ids: "array[int]"
 
 
-AnyStep = Chunk | Finish | DropSnapshot | DropBatches | Cut | DropDead | FenceStep
+AnyStep = Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | FenceStep
 
 
 class Group:
@@ -250,6 +270,8 @@ class Group:
                 self._drop_snapshot(change)
             case DropBatches():
                 self._drop_batches(change)
+            case DropNewest():
+                self._drop_newest(change)
             case Cut():
                 self._cut(change)
             case DropDead():
@@ -343,6 +365,18 @@ class Group:
         self.totals = self.totals.plus(0, -count, -step.weights)
         self.statements.append(Remove("batches", step.ids))
         self._effects.append(lambda: now.rows.drop(count, step.weights))
+
+    def _drop_newest(self, step: DropNewest) -> None:
+        now = self._hull(step.number)
+        count = len(step.ids)
+        if now is None:  # deleted meanwhile
+            return
+        if now.rows.ids[-count:] != step.ids:
+            raise NotCommittedError(f"hull {step.number} has other batches at its end")
+        now.batches, now.sum, now.last = now.batches - count, now.sum - step.weights, step.last
+        self.totals = self.totals.plus(0, -count, -step.weights)
+        self.statements.append(Remove("batches", step.ids))
+        self._effects.append(lambda: now.rows.drop_newest(count, step.weights, step.last))
 
     def _cut(self, step: Cut) -> None:
         rows = self._ledger.hulls[step.number]

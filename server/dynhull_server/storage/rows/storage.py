@@ -17,7 +17,19 @@ from .encoding import weight
 from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
-from .ledger import DROPPED, KEPT, Chunk, DropBatches, DropDead, DropSnapshot, Finish, Group, Ledger, Snapshot
+from .ledger import (
+    DROPPED,
+    KEPT,
+    Chunk,
+    DropBatches,
+    DropDead,
+    DropNewest,
+    DropSnapshot,
+    Finish,
+    Group,
+    Ledger,
+    Snapshot,
+)
 from .reading import read_each, read_hull
 from .staging import staging
 from .tables import Reader
@@ -174,6 +186,19 @@ class RowStorage(ABC):
                 raise DamagedError(f"{self._place}: a row of batches of hull {number} is missing")
             weights = sum(weight(stored, number, first, last) for _, first, last, stored in rows)
             yield DropBatches(number, ids[: len(rows)], weights)
+
+    def cut(self, number: int, last: int) -> Step | None:
+        """The step that drops the revisions after `last`."""
+        with self._visible:
+            ids = self._settled().hulls[number].after(last)
+        if not ids:
+            return None
+        with self._lend() as reader:
+            rows = list(reader.some("batches", "batches.rowid, first, last, checksum", ids))
+        if [row[0] for row in rows] != list(ids) or rows[0][1] != last + 1:
+            raise DamagedError(f"{self._place}: a row of batches of hull {number} is missing")
+        weights = sum(weight(stored, number, first, end) for _, first, end, stored in rows)
+        return DropNewest(number, last, ids, weights)
 
     def sweep(self) -> Iterator[Step]:
         """Drop the rows of deleted hulls and unfinished snapshots."""

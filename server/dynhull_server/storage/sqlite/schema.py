@@ -145,6 +145,7 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     5: FORMAT_5,
     6: FORMAT_6,
     7: TABLES,  # it wrote the events of a row in more bytes
+    8: TABLES,  # it had no hulls over shards
     FORMAT: TABLES,
 }
 

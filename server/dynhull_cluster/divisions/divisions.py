@@ -1,0 +1,229 @@
+"""All hulls over shards whose roots or shards are in this process."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from dynhull_server.engine.division import Division, StoredShard
+from dynhull_server.engine.engine import Engine
+from dynhull_server.settings import Settings
+from dynhull_server.state.errors import HullNotFoundError
+from dynhull_server.state.events import Expire, WriteBatch
+from dynhull_server.state.hull import Hull
+from dynhull_server.state.records import Create, Delete, HullRow, HullSettings
+
+from ..placement import worker_of
+from ..shards import messages as say
+from .letters import Answer, Greeted, Greeting, IsWanted, Letter, Wanted
+from .local_shard import LocalShard
+from .peers import PeerAwayError, Peers
+from .served_root import ServedRoot
+from .wire import pack, unpack
+
+# Seconds between looks at what waits, and between looks whether the hulls of shards are still there.
+LOOK_SECONDS, WANTED_SECONDS = 0.25, 5.0
+
+
+# The name of the work that other processes ask for.
+SHARDS = "shards"
+# Between the name of a hull and the number of a shard, in the names of rows: no name of a hull has it.
+MARK = "#"
+
+
+def name_of_shard(name: str, shard: int) -> str:
+    """The name of a shard in the storage."""
+    return f"{name}{MARK}{shard}"
+
+
+def hull_of_shard(name: str) -> str:
+    """The name of the hull of a shard with this name in the storage."""
+    return name.rpartition(MARK)[0]
+
+
+class ServedDivisions:
+    """The hulls over shards of a process.
+
+    Args:
+        settings: the settings of the server.
+        worker: the number of this process among the workers.
+        peers: the way to the other workers; None in a server of one process.
+    """
+
+    def __init__(self, settings: Settings, worker: int = 0, peers: Peers | None = None) -> None:
+        self._in_memory = settings.in_memory
+        self._workers = settings.workers or 1
+        self._worker = worker
+        self._peers = peers
+        self._engine: Engine | None = None
+        self._roots: dict[str, ServedRoot] = {}
+        self._shards: dict[tuple[str, int], LocalShard] = {}
+        self._creating = asyncio.Lock()
+        self._ending: set[asyncio.Task[None]] = set()
+
+    # What the engine asks
+
+    def why_not(self, settings: HullSettings) -> tuple[str, str] | None:
+        """The field for which no hull with these settings can be divided, and the reason; None if it can be."""
+        if settings.geographic:
+            return "config.frame", "is geographic, so it cannot be divided: all of its points share one centre"
+        if settings.window is not None and settings.window.max_points:
+            reason = "has a window by number, so it cannot be divided: no shard knows the oldest points of all"
+            return "config.window.max_points", reason
+        if settings.quarantine is not None:
+            reason = "has a quarantine, so it cannot be divided: its rules compare with the whole hull"
+            return "config.quarantine", reason
+        if self._in_memory and self._workers > 1:
+            reason = "cannot be divided: workers that keep their data in memory would lose a shard alone"
+            return "config.shards", reason
+        return None
+
+    async def start(self, engine: Engine, shards: Sequence[HullRow], roots: Sequence[Hull]) -> None:
+        """Begin, with the shards and the roots that the storage has."""
+        self._engine = engine
+        for row in shards:
+            assert row.settings.shard is not None  # they are shards
+            self._shards[row.uid, row.settings.shard] = LocalShard(engine, row)
+        for hull in roots:
+            self.begin(hull)
+        engine.supervisor.every(LOOK_SECONDS, "waiting for shards", self._look)
+        engine.supervisor.every(WANTED_SECONDS, "shards of deleted hulls", self._drop_unwanted)
+
+    def begin(self, hull: Hull) -> None:
+        """Begin with the root of a hull, unless it has begun."""
+        if hull.uid not in self._roots:
+            greet, deliver = partial(self._greet, hull), partial(self._deliver, hull)
+            self._roots[hull.uid] = ServedRoot(self._started, hull, greet, deliver)
+
+    def end(self, hull: Hull) -> None:
+        """The hull is deleted: end its root. Its shards notice."""
+        root = self._roots.pop(hull.uid, None)
+        if root is not None:
+            root.end()
+            task = asyncio.create_task(self._end(root))
+            self._ending.add(task)
+            task.add_done_callback(self._ending.discard)
+
+    def carry_out(self, hull: Hull, requests: Sequence[WriteBatch | Expire]) -> None:
+        """Carry out requests in this order, and answer them."""
+        self._roots[hull.uid].carry_out(requests)
+
+    def of(self, hull: Hull) -> Division:
+        """The shards of a hull."""
+        root = self._roots.get(hull.uid)
+        if root is None:
+            raise HullNotFoundError(hull.name)
+        return root
+
+    def shards(self) -> Sequence[StoredShard]:
+        """The shards in this process."""
+        return list(self._shards.values())
+
+    async def close(self) -> None:
+        """Refuse what waits, and stop."""
+        roots, self._roots = self._roots, {}
+        await asyncio.gather(*(root.close() for root in roots.values()), *self._ending)
+        await asyncio.gather(*(shard.close() for shard in self._shards.values()))
+        if self._peers is not None:
+            self._peers.close()
+
+    # What other processes ask
+
+    async def receive(self, data: bytes) -> bytes:
+        """The answer to a letter of another process."""
+        try:
+            answer = pack(await self._answer(unpack(data)))
+            self._started.supervisor.succeeded(SHARDS)
+            return answer
+        except Exception as error:
+            if self._engine is not None and not isinstance(error, PeerAwayError):
+                self._engine.supervisor.failed(SHARDS, error)
+            raise
+
+    async def _answer(self, letter: Any) -> Any:
+        if self._engine is None:
+            raise PeerAwayError("this worker is starting")
+        match letter:
+            case Greeting():
+                shard = await self._found(letter)
+                return Greeted(await shard.epoch())
+            case Letter():
+                known = self._shards.get((letter.uid, letter.shard))
+                if known is None:
+                    raise PeerAwayError("there is no such shard")
+                return Answer(await known.receive(letter.message))
+            case Wanted():
+                return IsWanted(self._has(letter))
+        raise TypeError(f"not a letter: {letter}")
+
+    async def _found(self, greeting: Greeting) -> LocalShard:
+        """The shard of a root, a new one if there is none."""
+        settings = greeting.settings
+        assert settings.shard is not None  # it is one of a shard
+        key = greeting.uid, settings.shard
+        async with self._creating:
+            if key not in self._shards:
+                engine = self._started
+                name = name_of_shard(greeting.name, settings.shard)
+                row = HullRow(engine.core.number_of_shard(), name, greeting.uid, greeting.created, settings)
+                if engine.keeps:
+                    await engine.commit([Create(row)])
+                self._shards[key] = LocalShard(engine, row)
+        return self._shards[key]
+
+    # What roots and shards ask of each other
+
+    @property
+    def _started(self) -> Engine:
+        assert self._engine is not None  # nothing begins before
+        return self._engine
+
+    async def _greet(self, hull: Hull, shard: int) -> int:
+        row = hull.row
+        greeting = Greeting(row.name, row.uid, row.created, replace(row.settings, shard=shard))
+        greeted = await self._send(self._place(row.name, shard), greeting)
+        epoch: int = greeted.epoch
+        return epoch
+
+    async def _deliver(self, hull: Hull, shard: int, message: say.Request) -> say.Reply | None:
+        answer = await self._send(self._place(hull.name, shard), Letter(hull.uid, shard, message))
+        reply: say.Reply | None = answer.reply
+        return reply
+
+    def _place(self, name: str, shard: int) -> int:
+        """The worker that has a shard. Part of the format of data folders: it must not change."""
+        return (worker_of(name, self._workers) + shard) % self._workers
+
+    async def _send(self, worker: int, letter: Any) -> Any:
+        """The answer to a letter. Raises PeerAwayError if the worker is away."""
+        if self._peers is None or worker == self._worker:
+            return await self._answer(letter)
+        return unpack(await self._peers.ask(worker, pack(letter)))
+
+    def _has(self, letter: Wanted) -> bool:
+        hull = self._started.core.hulls.get(letter.name)
+        return hull is not None and hull.uid == letter.uid
+
+    # Background work
+
+    async def _look(self) -> None:
+        for root in list(self._roots.values()):
+            root.look()
+
+    async def _drop_unwanted(self) -> None:
+        """Delete the shards of hulls that are deleted."""
+        for key, shard in list(self._shards.items()):
+            row, name = shard.row, hull_of_shard(shard.row.name)
+            try:
+                found = await self._send(worker_of(name, self._workers), Wanted(name, row.uid))
+            except PeerAwayError:
+                continue
+            if not found.wanted:
+                del self._shards[key]
+                await shard.close()
+                if self._started.keeps:
+                    await self._started.commit([Delete(row.number)])
+
+    async def _end(self, root: ServedRoot) -> None:
+        await root.close()

@@ -1,0 +1,91 @@
+"""A shard in this process, with a thread of its own."""
+
+import asyncio
+from functools import partial
+from typing import Any
+
+from dynhull_server.engine.engine import Engine
+from dynhull_server.state.contents.live import LiveContents
+from dynhull_server.state.records import HullRow, Kept
+
+from ..shards.shard import Shard
+from .logs import StoredShardLog
+
+
+class LocalShard:
+    """A shard, from its first message until `close`.
+
+    Args:
+        engine: has the storage.
+        row: the row of the shard.
+
+    Attributes:
+        row: the row of the shard.
+        number: its number in the storage.
+        points: the number of its points.
+        unsaved: the number of points in steps since the last snapshot.
+    """
+
+    def __init__(self, engine: Engine, row: HullRow) -> None:
+        self.row = row
+        self.number = row.number
+        self.points = self.unsaved = 0
+        self._engine = engine
+        self._pool = engine.machine.threads.pool("shard", 1)
+        self._log: StoredShardLog | None = None
+        self._shard: Shard | None = None
+        self._saved = 0
+        self._snapshot_wanted = False
+        self._taken: tuple[Kept, int] | None = None
+
+    async def epoch(self) -> int:
+        """The last epoch that was begun."""
+        epoch: int = await self._run(lambda: self._loaded()[0].epoch)
+        return epoch
+
+    async def receive(self, message: Any) -> Any:
+        """The reply to a message of the root; None where it comes too late."""
+        return await self._run(partial(self._receive, message))
+
+    def take(self) -> tuple[Kept, int] | None:
+        """What is decided, for a snapshot; None if it is not at hand so far."""
+        taken, self._taken = self._taken, None
+        self._snapshot_wanted = taken is None
+        return taken
+
+    def saved(self, points: int) -> None:
+        """Record a snapshot."""
+        self._saved += points
+        self.unsaved -= points
+
+    async def close(self) -> None:
+        """Complete the message in progress."""
+        await asyncio.to_thread(self._pool.shutdown)
+
+    async def _run(self, function: Any) -> Any:
+        return await asyncio.shield(asyncio.wrap_future(self._pool.submit(function)))
+
+    def _loaded(self) -> tuple[StoredShardLog, Shard]:
+        if self._log is None or self._shard is None:
+            self._log = StoredShardLog(self._engine, self.row)
+            self._shard = Shard(self.row.settings, self._log)
+        return self._log, self._shard
+
+    def _receive(self, message: Any) -> Any:
+        log, shard = self._loaded()
+        settled = shard.settled(message)
+        if settled is not None:
+            self._look_at(log, settled)
+        try:
+            return shard.receive(message)
+        except BaseException:  # memory may be ahead of the log or behind it
+            self._log = self._shard = None
+            self._saved = 0
+            raise
+
+    def _look_at(self, log: StoredShardLog, settled: LiveContents) -> None:
+        """Take what a snapshot needs, in a moment in which everything is decided."""
+        self.points, self.unsaved = len(settled.hull), log.added - self._saved
+        if self._snapshot_wanted:
+            self._snapshot_wanted = False
+            self._taken = log.kept(settled), self.unsaved

@@ -1,0 +1,103 @@
+"""The root of a hull over shards as its readers see it: the vertices of all shards, and the counts of all points.
+
+It follows what its shards have done, and decides nothing.
+"""
+
+from collections.abc import Sequence
+
+from .hull_state import Cause, Counts, HullState
+from .limits import Limits
+from .records import HullSettings, Kept, Record, Tally
+
+
+class RootState(HullState):
+    """The vertices of all shards in place of the points of a hull. Questions about all points are for the shards.
+
+    Attributes:
+        tallies: what is known of each shard.
+        due: the time by the server's clock before which no point leaves; None if that clock makes none leave, and
+            before the shards have said so.
+    """
+
+    def __init__(self, limits: Limits, settings: HullSettings, kept: Kept, now: float) -> None:
+        assert settings.divided
+        self.tallies = [Tally()] * settings.shards
+        self.due: int | None = None
+        self._keyed_shards = settings.identity != "multiset"
+        self._by_data = settings.window is not None and settings.window.clock == "data"
+        self._clock = kept.clock
+        for shard, tally in kept.tallies.items():
+            self.tallies[shard] = tally
+        for record in kept.records:
+            self._count(record)
+        super().__init__(limits, settings, kept, now)
+        self._max_producers = limits.max_producers
+
+    @property
+    def follows_server(self) -> bool:
+        """Whether the clock, if any, follows the server's, rather than event times."""
+        return not self._by_data
+
+    @property
+    def next_due(self) -> int | None:
+        """The time by the server's clock before which no point leaves; None if that clock makes none leave."""
+        return self.due
+
+    @property
+    def clock(self) -> int | None:
+        """The clock of the hull, None for a hull without a clock so far."""
+        return self._clock
+
+    @property
+    def producers(self) -> dict[str, int]:
+        """The last sequence number of each producer."""
+        return {} if self._producers is None else self._producers.state()
+
+    @property
+    def skipping(self) -> frozenset[str]:
+        """The producers whose numbers may be skipped."""
+        return frozenset() if self._producers is None else self._producers.skipping()
+
+    def follow(self, decided: Sequence[Record], now: float, records: list[Record] | None) -> None:
+        """Apply revisions, which the shards have, and append them to `records` unless that is None."""
+        self.torn = True
+        for record in decided:
+            assert record.revision == self.counts.revision + 1  # the root has numbered them
+            assert record.shares is not None
+            changes = self.hull.changes
+            self.contents.replay([record])
+            self._count(record)
+            if record.producer:
+                if self._producers is None:
+                    self._producers = self._new_producers({}, frozenset(), now)
+                self._producers.applied(record.producer, record.sequence, "", now, may_skip=record.may_skip)
+                self._producers.forget_beyond(self._max_producers)
+            cause: Cause = "expiry" if record.shares.expiry else "batch"
+            self._applied(0, cause, hull_changed=self.hull.changes != changes)
+            if records is not None:
+                records.append(record)
+        self.torn = False
+
+    def kept(self) -> Kept:
+        """The root at this revision, for a snapshot. O(number of vertices of all shards)."""
+        kept = super().kept()
+        kept.clock = self._clock
+        kept.tallies = dict(enumerate(self.tallies))
+        return kept
+
+    def _count(self, record: Record) -> None:
+        assert record.shares is not None  # it is a revision of a root
+        self._clock = record.clock
+        for shard, tally in record.shares.tallies.items():
+            self.tallies[shard] = tally
+
+    def _counted(self, revision: int, _: int, cause: Cause | None, outlined: int) -> Counts:
+        """The counts of all points. Keys of two shards may be at one place: how many places there are is not known."""
+        points = sum(each.points for each in self.tallies)
+        distinct = 0 if self._keyed_shards else sum(each.distinct for each in self.tallies)
+        return Counts(revision, points, distinct, self._clock, cause, outlined=outlined)
+
+
+def state_of(limits: Limits, settings: HullSettings, kept: Kept, now: float) -> HullState:
+    """A hull with these settings as stored."""
+    return (RootState if settings.divided else HullState)(limits, settings, kept, now)

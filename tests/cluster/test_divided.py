@@ -1,0 +1,339 @@
+"""A hull over shards, in real processes: the answers of one hull, whichever worker is killed."""
+
+import fcntl
+import os
+import signal
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cluster import processes
+from patience import PATIENCE, wait_until
+from server_process import Server, server_process
+
+from dynhull_client import (
+    Batch,
+    DynhullError,
+    HullClient,
+    HullCopy,
+    HullUnsuitableError,
+    KeyMissingError,
+    Quarantine,
+    UnavailableError,
+)
+
+WORKERS = ("--workers", "2", "--gateways", "1")
+SHAPES = {"process": (), "workers": WORKERS}
+KINDS: dict[str, dict[str, Any]] = {
+    "points": {},
+    "strings": {"keyed": "str"},
+    "integers by event time": {"keyed": "int", "ordering": "event_time"},
+    "window by event time": {"max_age": 30, "clock": "data"},
+    "keyed window": {"keyed": "str", "max_age": 30, "clock": "data"},
+}
+SHARDS = 3
+START = 1_700_000_000
+
+
+@pytest.fixture(scope="module", params=SHAPES)
+def server(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with server_process(*SHAPES[request.param], "--data", str(tmp_path_factory.mktemp("data"))) as server:
+        yield server
+
+
+@pytest.fixture
+def client(server: Server) -> Iterator[HullClient]:
+    with HullClient(server.address) as client:
+        yield client
+
+
+# One hull
+
+
+class Batches:
+    """Random batches, some of which are refused."""
+
+    def __init__(self, settings: dict[str, Any], seed: int) -> None:
+        self._draw = np.random.default_rng(seed)
+        self._settings = settings
+        self._time = START
+
+    def apply(self, client: HullClient, name: str, batch: dict[str, Any]) -> Any:
+        try:
+            return client.put(name, **batch) if "keys" in batch else client.apply(name, **batch)
+        except DynhullError as error:
+            return type(error), str(error)
+
+    def next(self) -> dict[str, Any]:
+        draw = self._draw
+        self._time += int(draw.choice([0, 1, 10]))
+        count = int(draw.integers(1, 12))
+        points = draw.integers(-5, 6, (count, 2)).astype(float)
+        batch: dict[str, Any] = {}
+        if "max_age" in self._settings or "ordering" in self._settings:
+            batch["times"] = (self._time + draw.integers(-40, 5, count)) * 1_000_000
+        if "keyed" in self._settings:
+            keys = draw.choice(60, count, replace=False)
+            batch["keys"] = [f"k{key}" for key in keys] if self._settings["keyed"] == "str" else keys.astype(np.uint64)
+            batch["points"] = points
+        else:
+            batch["insert"] = points
+            if draw.random() < 0.5:
+                batch["delete"] = draw.integers(-5, 6, (int(draw.integers(1, 3)), 2)).astype(float)
+                batch["missing"] = str(draw.choice(["raise", "count"]))
+        return batch
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hull_over_shards_is_one_hull(client: HullClient, name: str, kind: str) -> None:
+    settings = KINDS[kind]
+    one, many = f"{name}-one", f"{name}-many"
+    client.create_hull(one, **settings)
+    assert client.create_hull(many, shards=SHARDS, **settings).shards == SHARDS
+    batches = Batches(settings, seed=len(kind))
+    refused = 0
+    for _ in range(40):
+        batch = batches.next()
+        expected, found = (batches.apply(client, each, batch) for each in (one, many))
+        if isinstance(expected, tuple):
+            refused += 1
+            assert found == expected
+        else:
+            assert told(found) == told(expected)
+    assert refused or "keyed" in settings
+    hull, other = client.get_hull(one), client.get_hull(many)
+    np.testing.assert_array_equal(other.vertices, hull.vertices)
+    assert other.vertex_keys == hull.vertex_keys
+    for attribute in ("revision", "points", "clock", "keyed", "window"):
+        assert getattr(other.info, attribute) == getattr(hull.info, attribute)
+    assert other.info.distinct == (0 if hull.info.keyed else hull.info.distinct)
+    check_reads(client, one, many, hull.info.keyed)
+
+
+def told(applied: Any) -> Any:
+    """What a batch has done, but whether the hull has changed: of keys, only their names at vertices may have."""
+    return [getattr(applied, each) for each in ("revision", "inserted", "deleted", "missing", "points", "moved")], [
+        getattr(applied, each) for each in ("stale", "late", "skipped", "clamped", "clock", "duplicate")
+    ]
+
+
+def check_reads(client: HullClient, one: str, many: str, keyed: str | None) -> None:
+    places = np.array([(x, y) for x in range(-6, 7) for y in range(-6, 7)], float)
+
+    def same(ask: Any, *fields: str) -> None:
+        expected, found = ask(one), ask(many)
+        for field in ("revision", *fields):
+            np.testing.assert_array_equal(getattr(found, field), getattr(expected, field))
+
+    same(lambda name: client.count(name, places), "counts")
+    same(lambda name: client.locate(name, places), "sides")
+    same(lambda name: client.distance(name, places), "distances")
+    same(lambda name: client.sample_points(name, 5), "points")
+    same(lambda name: client.sample_points(name, 1000), "points")
+    same(lambda name: client.support(name, places[:20]), "vertices")
+    same(lambda name: client.get_measures(name), "area")
+    verification = client.verify(many)
+    assert verification.equal
+    assert verification.points == client.get_hull(many).info.points
+    if keyed is None:
+        return
+    keys = [f"k{key}" for key in range(60)] if keyed == "str" else np.arange(60, dtype=np.uint64)
+    same(lambda name: client.positions(name, keys), "positions", "present", "times")
+    same(lambda name: client.locate(name, keys=keys), "sides")
+    same(lambda name: client.entities(name), "points", "times")
+    assert list(client.entities(many).keys) == list(client.entities(one).keys)
+    same(lambda name: client.sample_points(name, 5, keys=True), "points")
+
+
+def test_points_leave_by_the_clock_of_the_server(client: HullClient, name: str) -> None:
+    client.create_hull(name, shards=SHARDS, max_age=0.3)
+    client.apply(name, insert=np.eye(2) * 7)
+    watch = client.watch(name)
+    wait_until(lambda: client.get_hull(name).info.points == 0)
+    assert client.get_hull(name).revision == 2
+    assert next(iter(watch)).revision <= 2
+    watch.close()
+
+
+def test_watches_see_what_happens_and_go_on_after_a_revision(client: HullClient, name: str) -> None:
+    client.create_hull(name, shards=SHARDS)
+    client.apply(name, insert=[[0, 0], [9, 0], [0, 9]])
+    copy = HullCopy()
+    with client.watch(name, copy=copy) as watch:
+        events = iter(watch)
+        assert len(next(events).vertices) == 3
+        client.apply(name, insert=[[9, 9]])
+        change = next(events)
+        assert (change.revision, change.added.tolist()) == (2, [[9, 9]])
+    client.apply(name, insert=[[20, 20]])
+    assert copy.revision == 2
+    with client.watch(name, copy=copy) as watch:
+        assert (next(iter(watch)).revision, len(copy.vertices)) == (3, 4)
+
+
+def test_numbered_batches_are_applied_once_and_a_refused_one_stops_its_stream(client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str", shards=SHARDS)
+    for _ in range(2):
+        applied = client.put(name, ["a"], [[1, 2]], producer="ship", sequence=1)
+    assert (applied.duplicate, client.last_sequence(name, "ship")) == (True, 1)
+    written: list[Any] = []
+    with pytest.raises(KeyMissingError, match=r"removes\[0\] is nobody"):
+        put_and_remove_nobody(client, name, written)
+    assert [each.exception(PATIENCE) for each in written] == [None] * 20
+    assert client.get_hull(name).revision == 21
+
+
+def put_and_remove_nobody(client: HullClient, name: str, written: list[Any]) -> None:
+    with client.writer(name, batch_points=1, missing="raise", stop_on_error=True) as writer:
+        written += [writer.put(keys=[f"k{i}"], points=[[i, i * i]]) for i in range(20)]
+        written[-1].result(PATIENCE)
+        writer.remove(["nobody"])
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"geographic": True}, "is geographic, so it cannot be divided"),
+        ({"max_points": 5}, "has a window by number, so it cannot be divided"),
+        ({"keyed": "str", "quarantine": Quarantine(max_growth=2.0)}, "has a quarantine, so it cannot be divided"),
+    ],
+)
+def test_what_cannot_be_divided_is_refused(client: HullClient, name: str, settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(HullUnsuitableError, match=words):
+        client.create_hull(name, shards=2, **settings)
+    assert list(client.list_hulls(name)) == []
+
+
+def test_questions_that_no_shard_can_answer_are_refused(client: HullClient, name: str) -> None:
+    whole, divided = f"{name}/whole", f"{name}/divided"
+    client.create_hull(whole, keyed="str")
+    client.create_hull(divided, keyed="str", shards=2)
+    client.put(divided, ["a"], [[0, 0]])
+    batch = Batch(keys=["b"], points=[[0, 0]])
+    refused = {
+        "only its outermost layer": lambda: client.layers(divided, 2),
+        "what lies below a vertex": lambda: client.influence(divided),
+        "so it has no quarantine": lambda: client.set_quarantine(divided, Quarantine(max_speed=1.0)),
+        "which no fence compares": lambda: client.create_fence(f"{name}/fence", [[0, 0], [1, 0], [0, 1]], divided),
+        "compared with itself only": lambda: client.locate(whole, keys=["a"], keys_of=divided),
+        "no batch is over it and other hulls": lambda: client.transfer({divided: batch, whole: batch}),
+    }
+    for words, ask in refused.items():
+        with pytest.raises(HullUnsuitableError, match=words):
+            ask()
+    assert client.get_hull(divided).revision == 1
+
+
+# Faults
+
+
+def rows_of(data: Path, sql: str) -> list[Any]:
+    """What a statement finds in the databases of all workers."""
+    found: list[Any] = []
+    for database in sorted(data.glob("**/dynhull.db")):
+        with closing(sqlite3.connect(database)) as connection:
+            found += connection.execute(sql).fetchall()
+    return found
+
+
+def test_killed_workers_lose_and_double_nothing(tmp_path: Path) -> None:
+    options = (*WORKERS, "--data", str(tmp_path), "--snapshot-points", "100")
+    with (
+        server_process(*options, complaints="is started again") as server,
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("fleet", shards=SHARDS)
+        points = np.random.default_rng(3).normal(size=(600, 2))
+        with client.writer("fleet", batch_points=1) as writer:
+            written: list[Any] = []
+            for i, point in enumerate(points):
+                written.append(writer.put(point[np.newaxis]))
+                if i in (150, 300, 450):
+                    written[i - 50].result(PATIENCE)
+                    os.kill(processes(server.process.pid)[f"worker-{i // 150 % 2}"], signal.SIGKILL)
+        info = client.get_hull("fleet").info
+        assert info.points == info.revision == 600
+        assert client.verify("fleet").equal
+        assert client.count("fleet", points).counts.tolist() == [1] * 600
+    with server_process(*options) as server, HullClient(server.address) as client:
+        assert client.get_hull("fleet").info == info
+        np.testing.assert_array_equal(client.sample_points("fleet", 1000).points, points[np.lexsort(points.T[::-1])])
+        client.apply("fleet", insert=[[9, 9]])
+        assert client.verify("fleet").equal
+
+
+def test_logs_of_shards_do_not_grow_for_ever(tmp_path: Path) -> None:
+    with (
+        server_process("--data", str(tmp_path), "--snapshot-points", "20") as server,
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("fleet", keyed="int", shards=2)
+
+        def few() -> bool:
+            for _ in range(20):
+                client.put("fleet", np.arange(10, dtype=np.uint64), np.random.default_rng(0).normal(size=(10, 2)))
+            (batches,), (snapshots,) = rows_of(
+                tmp_path, "SELECT count(*) FROM batches UNION ALL SELECT count(*) FROM snapshots"
+            )
+            return snapshots >= 4 and batches < client.get_hull("fleet").revision
+
+        wait_until(few)
+        revision = client.get_hull("fleet").revision
+    with server_process("--data", str(tmp_path)) as server, HullClient(server.address) as client:
+        assert client.get_hull("fleet").revision == revision
+        assert client.verify("fleet").equal
+
+
+def test_a_shard_that_is_away_is_named_and_all_goes_on_when_it_is_back(tmp_path: Path) -> None:
+    """Worker 1 cannot start while somebody else holds the lock of its folder."""
+    with (
+        server_process(*WORKERS, "--data", str(tmp_path), complaints="is started again") as server,
+        HullClient(server.address, retries=0) as client,
+    ):
+        client.create_hull("north/a", shards=2)  # of worker 0
+        client.apply("north/a", insert=np.random.default_rng(1).normal(size=(50, 2)))
+        before = client.get_hull("north/a")
+        with (tmp_path / "worker-1" / "dynhull.lock").open("a") as lock:
+            os.kill(processes(server.process.pid)["worker-1"], signal.SIGKILL)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            for ask in (
+                lambda: client.apply("north/a", insert=[[7, 7]]),
+                lambda: client.count("north/a", [[7, 7]]),
+            ):
+                with pytest.raises(UnavailableError, match="shard 1 of hull 'north/a' is away"):
+                    ask()
+            np.testing.assert_array_equal(client.get_hull("north/a").vertices, before.vertices)
+            assert client.locate("north/a", [[99, 99]]).sides.tolist() == [-1]
+        wait_until(lambda: applied(client))
+        info = client.get_hull("north/a").info
+        assert (info.points, info.revision) == (51, 2)
+        assert client.verify("north/a").equal
+
+
+def applied(client: HullClient) -> bool:
+    try:
+        client.apply("north/a", insert=[[7, 7]], producer="ship", sequence=1)
+    except UnavailableError:
+        return False
+    return True
+
+
+def test_the_shards_of_a_deleted_hull_are_deleted_and_a_new_one_is_empty(tmp_path: Path) -> None:
+    with server_process(*WORKERS, "--data", str(tmp_path)) as server, HullClient(server.address) as client:
+        client.create_hull("fleet", shards=2)
+        client.apply("fleet", insert=np.eye(2))
+        assert len(rows_of(tmp_path, "SELECT name FROM hulls")) == 3
+        client.delete_hull("fleet")
+        client.create_hull("fleet", shards=2)
+        assert client.get_hull("fleet").info.points == 0
+        client.apply("fleet", insert=[[3, 4]])
+        wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 3)
+        assert client.sample_points("fleet", 9).points.tolist() == [[3, 4]]
+        assert client.verify("fleet").equal

@@ -1,0 +1,80 @@
+"""What roots and shards send each other, as bytes: it comes back as it was, and damage is noticed."""
+
+import numpy as np
+import pytest
+
+from dynhull.keys import PackedKeys
+from dynhull_cluster.divisions.letters import Answer, Greeted, Greeting, IsWanted, Letter, Wanted
+from dynhull_cluster.divisions.wire import VERSION, WireError, pack, unpack
+from dynhull_cluster.shards import messages as say
+from dynhull_server.state.batch import NO_POINTS, Applied, Batch
+from dynhull_server.state.contents import keyed, windowed
+from dynhull_server.state.errors import KeyMissingError, PointMissingError
+from dynhull_server.state.records import Contents, HullSettings, KeyRows, Window
+
+POINTS = np.array([[1.5, -0.0], [np.nan, 2.0**-1074]])
+STRINGS = PackedKeys.pack(["a", "ä" * 100])
+NUMBERS = np.array([0, 2**64 - 1], np.uint64)
+TIMES = np.array([-(2**63), 2**63 - 1])
+TOTALS = say.Totals(3, 2, None)
+ROWS = KeyRows(STRINGS, POINTS, PackedKeys(b"", b""), TIMES, None, "absent")
+CHANGE = say.Change(say.Corners(NO_POINTS, ()), say.Corners(POINTS, ("a", 2**64 - 1)))
+MESSAGES = [
+    Greeting("fleet/a", "0a", 1.5, HullSettings("str", window=Window(7, clock="data"), shards=3, shard=2)),
+    Greeted(2**40),
+    Wanted("fleet", "0a"),
+    IsWanted(wanted=True),
+    Letter("0a", 2, say.Open(1, 1, 9)),
+    Letter("0a", 0, say.Undo(1, 2, 9)),
+    Letter("0a", 0, say.Apply(1, 2, (say.Step(1, Batch(POINTS, NO_POINTS, 0, count_missing=True), None, True),))),
+    say.Step(2, windowed.Admitted(Batch(POINTS, NO_POINTS, 0, count_missing=False), TIMES, 5, 0, 0), 5, False),
+    say.Step(3, keyed.Admitted(ROWS, None, 1, 0, refuse_missing=True), None, False),
+    say.Ask(1, 3, say.FoundOf(NUMBERS)),
+    say.Ask(1, 3, say.CountOf(POINTS)),
+    Answer(None),
+    Answer(say.Opened(1, 1, 0, TOTALS, say.Corners(POINTS, None))),
+    Answer(say.Done(1, 2, (say.Effect(1, TOTALS, 1, CHANGE, Applied(1, 2, 0, 0, True, 3, held=[1]), None),))),
+    Answer(say.Answered(1, 3, keyed.Found(POINTS, np.array([True, False]), TIMES))),
+    Answer(say.Answered(1, 3, Contents(POINTS, STRINGS, TIMES, None))),
+    Answer(say.Closed(1, 3)),
+]
+
+
+def plain(value: object) -> object:
+    """A value as something that compares: arrays by their bytes, lists as tuples, objects by their attributes."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, list | tuple):
+        return tuple(map(plain, value))
+    names = getattr(type(value), "__dataclass_fields__", None)
+    if names is None:
+        return value
+    return type(value), *(plain(getattr(value, name)) for name in names)
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=range(len(MESSAGES)))
+def test_a_message_comes_back_as_it_was(message: object) -> None:
+    data = pack(message)
+    assert data[0] == VERSION
+    assert plain(unpack(data)) == plain(message)
+    for end in range(0, len(data), max(1, len(data) // 50)):
+        with pytest.raises(WireError):
+            unpack(data[:end])
+    with pytest.raises(WireError, match="goes on after its end"):
+        unpack(data + b"\0")
+
+
+@pytest.mark.parametrize("error", [KeyMissingError(3, "a"), PointMissingError("origins", 1, (0.5, -1.0))])
+def test_a_refusal_comes_back_with_its_row(error: Exception) -> None:
+    again = unpack(pack(error))
+    assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))
+
+
+def test_a_message_of_another_version_is_refused() -> None:
+    with pytest.raises(WireError, match=f"has version {VERSION + 1}, not {VERSION}"):
+        unpack(bytes([VERSION + 1]) + pack(None)[1:])
+
+
+def test_what_no_message_has_is_refused() -> None:
+    with pytest.raises(TypeError, match="no message between shards has a dict"):
+        pack({})
