@@ -23,7 +23,7 @@ PACKAGES = {
     "dynhull.envelope": {"Decomposition", "Frontier", "PhaseDiagram", "energy_above_hull_nd"},
     "dynhull.globe": {
         *("REACH", "Gnomonic", "area", "as_center", "as_lonlat", "boundary"),
-        *("diameter", "distance", "geojson", "perimeter"),
+        *("diameter", "distance", "geojson", "perimeter", "sketch"),
     },
     "dynhull.gjk": {"Contact", "contact", "distance_many", "intersect", "intersect_many"},
     "dynhull.measure": {
