@@ -93,6 +93,7 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.citation-file-format CITATION.cff
 	$(BIN)/zizmor --quiet --offline .github
 	$(BIN)/check-jsonschema --quiet --builtin-schema vendor.compose-spec deploy/compose.yaml
+	$(BIN)/kubernetes-validate --quiet --strict deploy/kubernetes/*.yaml
 
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
@@ -145,8 +146,9 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	PYTHONPATH=tests $(BIN)/python -m shards.mutants
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100 --workers
+	$(BIN)/python tests/robustness/cluster/machines_torture.py --faults 100
 
-ray: .venv/.test  ## all tests of Ray Datasets; `make test` runs the cheap ones
+ray: .venv/.test  ## all tests of Ray: Datasets, and as a launcher of servers; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray
 
 SEED ?= 1

@@ -1,6 +1,7 @@
 """Who calls: what a gateway, which has authenticated a caller, says of it to a worker.
 
-Only the gateways can reach a worker, because its sockets are in a folder of the server's own user. The worker reads the
+Only the gateways can reach a worker: its sockets are in a folder of the server's own user, or callers must know the
+secret of a cluster. The worker reads the
 token file itself, so permissions that change apply there as in a server of one process.
 """
 
@@ -11,6 +12,8 @@ from dynhull_server.rpc.access import EVERYTHING, Caller, TokenFile
 from dynhull_server.rpc.calls import Call, Context
 
 OWNER, KEY = "dynhull-owner", "dynhull-token-hash"
+# What proves to a worker that others could reach, too, that a gateway calls.
+PROOF = "dynhull-gateway-proof"
 # In place of a hash: the caller is the gateway itself, which passes on to callers what they may read.
 ITSELF = "gateway"
 

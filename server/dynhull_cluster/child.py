@@ -10,17 +10,14 @@ from pathlib import Path
 from prometheus_client import generate_latest
 
 from dynhull_server import event_loop, logs
-from dynhull_server.app import Server
 from dynhull_server.failure import code_of, fail, text_of
 from dynhull_server.malloc import return_large_blocks
 from dynhull_server.process import allow_connections, share_processors, stop_signal
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import StorageError
 
-from .gateway import Gateway
 from .line import Line
-from .sockets import Sockets
-from .worker import worker_server
+from .serving import Serving, serving
 
 
 def main(end: socket.socket) -> None:
@@ -43,9 +40,7 @@ async def _run(end: socket.socket) -> None:
     return_large_blocks()
     share_processors(settings)
     allow_connections(settings.max_connections)
-    role, _, number = begin["process"].partition("-")
-    sockets = Sockets(Path(begin["sockets"]))
-    server = Gateway(settings, sockets) if role == "gateway" else worker_server(settings, int(number), sockets)
+    server = await serving(settings, begin)
     with stop_signal() as stop:
         listening = asyncio.create_task(_listen(line, server))
         try:
@@ -65,7 +60,7 @@ def _name_process(name: str) -> None:
         Path("/proc/self/comm").write_text(name, "utf-8")
 
 
-async def _listen(line: Line, server: Server | Gateway) -> None:
+async def _listen(line: Line, server: Serving) -> None:
     """Answer the supervisor, and end with it: all acknowledged batches are stored."""
     while (asked := await line.receive()) is not None:
         page = await asyncio.to_thread(generate_latest, server.registry)

@@ -5,6 +5,9 @@ busy worker finds more of them, and so has less to do for each.
 """
 
 import asyncio
+import hmac
+import socket
+import ssl
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from itertools import islice, takewhile
@@ -26,22 +29,30 @@ ENDED = Status(code=code_pb2.UNAVAILABLE, message="the call ended without an ans
 
 
 class FrameServer:
-    """Listens on a Unix socket from `listen` until `close`.
+    """Listens from `listen` or `listen_on` until `close`.
 
     Args:
         handlers: the handlers of all methods.
         runs: those of runs of calls, by the paths of their methods.
+        greeting: what a connection has to begin with; empty where only gateways can connect.
     """
 
-    def __init__(self, handlers: Sequence[grpc.GenericRpcHandler], runs: Mapping[str, RunHandler]) -> None:
+    def __init__(
+        self, handlers: Sequence[grpc.GenericRpcHandler], runs: Mapping[str, RunHandler], greeting: bytes = b""
+    ) -> None:
         self._handlers = handlers
+        self._greeting = greeting
         self._runs = {path.encode(): handler for path, handler in runs.items()}
         self._handler = cache(self._find)
         self._open: set[_Connection] = set()
 
     async def listen(self, path: Path) -> None:
-        """Listen, and serve in the background."""
+        """Listen on a Unix socket, and serve in the background."""
         self._server = await asyncio.get_running_loop().create_unix_server(self._connect, path)
+
+    async def listen_on(self, bound: socket.socket, tls: ssl.SSLContext | None) -> None:
+        """Listen on a socket that is bound, and serve in the background."""
+        self._server = await asyncio.get_running_loop().create_server(self._connect, sock=bound, ssl=tls)
 
     async def close(self) -> None:
         """Close the connections, after the answers that are ready."""
@@ -50,7 +61,7 @@ class FrameServer:
             each.close()
 
     def _connect(self) -> "_Connection":
-        return _Connection(self._handler, self._runs, self._open)
+        return _Connection(self._handler, self._runs, self._open, self._greeting)
 
     def _find(self, method: bytes) -> Any:
         details = _Details(method.decode(), ())
@@ -72,8 +83,11 @@ class _Request(NamedTuple):
 
 
 class _Connection(Frames):
-    def __init__(self, handler: Any, runs: Mapping[bytes, RunHandler], among: "set[_Connection]") -> None:
+    def __init__(
+        self, handler: Any, runs: Mapping[bytes, RunHandler], among: "set[_Connection]", greeting: bytes
+    ) -> None:
         super().__init__()
+        self._greeting = greeting
         self._handler = handler
         self._runs = runs
         self._among = among
@@ -102,7 +116,13 @@ class _Connection(Frames):
             self._transport.resume_reading()
 
     def received(self, number: int, kind: Kind, rest: bytes) -> None:
-        if kind is Kind.REQUEST:
+        if self._greeting:
+            if kind is not Kind.GREETING or not hmac.compare_digest(rest, self._greeting):
+                self.abort()
+                return
+            self._greeting = b""
+            self.send(number, Kind.ANSWER)
+        elif kind is Kind.REQUEST:
             self._arrived.append(_Request(number, *unpack_request(rest)))
         elif number in self._running:
             self._running[number].cancel()

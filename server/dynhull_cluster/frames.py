@@ -1,4 +1,4 @@
-"""Frames: the calls between a gateway and a worker that have one request and one response, over one Unix socket.
+"""Frames: the calls between a gateway and a worker that have one request and one response, over one connection.
 
 gRPC costs both of its sides some 100 µs a message. A frame costs a tenth, because all frames of one turn of the event
 loop are one write. Calls that stream, and large messages, use gRPC between the two processes as well, for its flow
@@ -6,7 +6,7 @@ control.
 
 A frame is a header, which has the length of the rest, the number of the call and a kind, and the rest: of a request the
 method, the caller and the message, each but the last one with its length; of an answer the message, or a
-google.rpc.Status.
+google.rpc.Status. Where others than gateways could connect, the first frame is a greeting: it proves to come from one.
 """
 
 import asyncio
@@ -28,6 +28,7 @@ class Kind(IntEnum):
     CANCEL = 1
     ANSWER = 2
     REFUSAL = 3
+    GREETING = 4
 
 
 class Frames(asyncio.Protocol):
@@ -57,6 +58,11 @@ class Frames(asyncio.Protocol):
         self._flush()
         if self._transport is not None:
             self._transport.close()
+
+    def abort(self) -> None:
+        """Close the connection at once."""
+        if self._transport is not None:
+            self._transport.abort()
 
     def send(self, number: int, kind: Kind, *parts: bytes) -> None:
         """Send a frame with the others of this turn of the event loop."""

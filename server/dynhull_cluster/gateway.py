@@ -34,7 +34,7 @@ from .composed import Composed
 from .relay import Relay, Route, within
 from .shared_fences import WATCH_FENCE, SharedFences
 from .shared_watches import WATCH, SharedWatches
-from .sockets import Sockets
+from .ways import Ways
 from .worker_link import WorkerLink
 
 # The health of one worker is that of the service with this name and its number.
@@ -56,15 +56,15 @@ class Gateway:
 
     Args:
         settings: the settings; the port is one that gateways share.
-        sockets: where the workers listen.
+        workers: the number of the workers.
+        ways: where they are.
 
     Attributes:
         address: the host:port it listens on, once started.
         registry: its metrics.
     """
 
-    def __init__(self, settings: Settings, sockets: Sockets) -> None:
-        assert settings.workers is not None
+    def __init__(self, settings: Settings, workers: int, ways: Ways) -> None:
         self._settings = settings
         self._clock = Clock()
         self._supervisor = Supervisor(self._clock, lambda _: self._update_health(), end_process)
@@ -78,8 +78,8 @@ class Gateway:
             Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
         )
         watched = (WHOLE, SCRUB)
-        self._links = [WorkerLink(i, sockets, watched, self._update_health) for i in range(settings.workers)]
-        self._away_since: dict[int, float | None] = dict.fromkeys(range(settings.workers))
+        self._links = [WorkerLink(i, ways, watched, self._update_health) for i in range(workers)]
+        self._away_since: dict[int, float | None] = dict.fromkeys(range(workers))
         self._relay = Relay(self._links, settings.max_watch_lag)
         self._composed = Composed(self._relay, settings.max_fence_corners)
         self._watches = SharedWatches(self._relay, metrics)

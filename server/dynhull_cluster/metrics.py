@@ -54,7 +54,7 @@ class _Collector(Collector):
         for each in self._processes:
             serving.add_metric([each.name], each.serving.is_set())
             starts.add_metric([each.name], each.starts)
-        yield from (serving, starts, *_merged({**found, SUPERVISOR: own}))
+        yield from (serving, starts, *merged({**found, SUPERVISOR: own}, LABEL))
 
     async def _ask(self) -> tuple[dict[str, str], list[Metric]]:
         pages = await asyncio.gather(*(each.metrics() for each in self._processes))
@@ -62,11 +62,12 @@ class _Collector(Collector):
         return found, self._calls.families()
 
 
-def _merged(found: dict[str, Iterable[Metric]]) -> list[Metric]:
+def merged(found: dict[str, Iterable[Metric]], label: str) -> list[Metric]:
+    """The metrics of several registries as those of one, with a label that tells them apart."""
     families: dict[str, Metric] = {}
     for process, own in found.items():
         for family in own:
-            merged = families.setdefault(family.name, Metric(family.name, family.documentation, family.type))
+            one = families.setdefault(family.name, Metric(family.name, family.documentation, family.type))
             for sample in family.samples:
-                merged.samples.append(sample._replace(labels={**sample.labels, LABEL: process}))
+                one.samples.append(sample._replace(labels={**sample.labels, label: process}))
     return list(families.values())

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import os
 import shutil
 import socket
 import time
@@ -65,7 +66,8 @@ async def _serve(settings: Settings) -> None:
         sockets = socket_folder(settings.data if in_folder else None)
         opened.callback(shutil.rmtree, sockets, ignore_errors=True)
         own = settings.model_copy(update={"port": port})
-        begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets)}
+        site = f"{socket.gethostname()}-{os.getpid()}"  # what the processes of this server have in common
+        begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets), "site": site}
         processes = Processes(
             [ChildProcess(f"worker-{i}", begin, settings.grace) for i in range(workers)],
             [ChildProcess(f"gateway-{i}", begin, settings.grace) for i in range(gateways)],

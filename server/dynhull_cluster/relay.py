@@ -74,6 +74,8 @@ class Relay:
         sending: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
         """Pass on the responses of a worker to a request, until the last; `sending` is around the sending of each."""
+        with call.cutoff():
+            await link.arrive()
         async with one_request(link.stream(method, metadata_of(call)), message, call.cutoff()) as upstream:
             while True:
                 with call.cutoff():
@@ -94,6 +96,8 @@ class Relay:
                 first = await call.read()
             # Without any request, every worker refuses the call with the same words.
             link = self.links[0] if first is None else self.route(first, call)
+            with call.cutoff():
+                await link.arrive()
             upstream = link.stream(method, metadata_of(call))
             feeding = asyncio.create_task(self._feed(call, first, upstream))
             try:

@@ -16,9 +16,11 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     With --workers, several processes share the hulls by the first part of their names, up to the first "/". SIGHUP then
     restarts them, one at a time.
 
+    With --cluster, servers on any machines share the hulls of a PostgreSQL database: start each with the same command.
+
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
-    if settings.workers is None:
+    if settings.workers is None and not settings.cluster:
         from dynhull_server.process import run as run_one
 
         from .divisions.divisions import ServedDivisions

@@ -52,6 +52,8 @@ class SharedFences:
             request = pb.WatchFenceRequest.FromString(message)
             call.access.require_read(decode_fence_name(request.name))
             link = self._relay.link(request.name)
+            with call.cutoff():
+                await link.arrive()
             sending = partial(self._metrics.sending, watcher, "fence")
             if request.HasField("consumer") or request.conflate or request.max_responses_per_second:
                 await self._relay.read_from(link, WATCH_FENCE, call, message, sending)

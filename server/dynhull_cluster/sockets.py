@@ -1,17 +1,29 @@
 """Where the workers listen: Unix sockets in a folder that only the user of the server can open."""
 
+import asyncio
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import grpc
+
+from .callers import Metadata
+from .ways import OPTIONS, F
 
 # The name of a Unix socket has at most 107 bytes.
 LONGEST_FOLDER = 80
 
 
 class Sockets:
-    """The names of the sockets in a folder."""
+    """The sockets in a folder, as ways to the workers."""
+
+    # Whoever else could answer is not there: a call to a worker that is away is refused.
+    patience = 0.0
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._channels: dict[int, Any] = {}
 
     def frames(self, worker: int) -> Path:
         """The socket for frames."""
@@ -20,6 +32,29 @@ class Sockets:
     def grpc(self, worker: int) -> Path:
         """The socket for gRPC."""
         return self.folder / f"{worker}.grpc"
+
+    async def connect(self, worker: int, make: Callable[[], F]) -> F:
+        """Connect to the socket for frames. Raises OSError."""
+        _, frames = await asyncio.get_running_loop().create_unix_connection(make, str(self.frames(worker)))
+        return frames
+
+    def channel(self, worker: int) -> Any:
+        """A channel to the socket for gRPC, which connects by itself."""
+        if worker not in self._channels:
+            self._channels[worker] = grpc.aio.insecure_channel(f"unix:{self.grpc(worker)}", options=OPTIONS)
+        return self._channels[worker]
+
+    def proof(self, _: int) -> Metadata:
+        """Nothing: only gateways can reach the sockets."""
+        return ()
+
+    def when_moved(self, _: int, __: Callable[[], None]) -> None:
+        """Workers have their sockets for good."""
+
+    async def close(self, worker: int) -> None:
+        """Close the channel."""
+        if worker in self._channels:
+            await self._channels.pop(worker).close()
 
 
 def socket_folder(data: Path | None) -> Path:

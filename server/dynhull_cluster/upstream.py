@@ -1,8 +1,8 @@
 """A call of a worker with any number of requests and responses."""
 
 import asyncio
-from collections.abc import Coroutine
-from contextlib import suppress
+from collections.abc import Coroutine, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 import grpc
@@ -32,26 +32,32 @@ class Upstream:
 
     def __init__(self, call: "grpc.aio.StreamStreamCall[bytes, bytes]") -> None:
         self._call = call
+        self._severed = False
+        self._waiting: set[asyncio.Task[Any]] = set()
+        self._interrupted: set[asyncio.Task[Any]] = set()
         self._responses = aiter(call)
         self._said: asyncio.Future[Status] = asyncio.get_running_loop().create_future()
         call.add_done_callback(self._note)
 
     async def write(self, message: bytes) -> bool:
         """Send a request. Returns False if the call has ended: `read` says why."""
-        with ENDED:
+        with ENDED, self._unless_severed():
             await self._call.write(message)
             return True
         return False
 
     async def done_writing(self) -> None:
         """Say that there are no more requests."""
-        with ENDED:
+        with ENDED, self._unless_severed():
             await self._call.done_writing()
 
     async def read(self) -> bytes | None:
         """The next response; None after the last. Raises RelayedError."""
         try:
-            return await anext(self._responses, None)
+            if not self._severed:
+                with self._unless_severed():
+                    return await anext(self._responses, None)
+            raise RelayedError(lost_status())
         except grpc.aio.AioRpcError as error:
             if not self._said.done() and error.code() in BROKEN:
                 await asyncio.wait([self._said], timeout=LATE_SECONDS)
@@ -59,6 +65,31 @@ class Upstream:
             if status.code == grpc.StatusCode.OK.value[0]:
                 return None
             raise RelayedError(status) from None
+
+    def sever(self) -> None:
+        """End the call as if the connection were lost: whoever would answer it is not to be heard any more."""
+        self._severed = True
+        for task in self._waiting:  # gRPC leaves who writes to a connection that is never made waiting for ever
+            self._interrupted.add(task)
+            task.cancel()
+        self._call.cancel()
+
+    @contextmanager
+    def _unless_severed(self) -> Iterator[None]:
+        """End the block without an error when the call is severed."""
+        task = asyncio.current_task()
+        assert task is not None  # the event loop runs nothing else that waits
+        self._waiting.add(task)
+        try:
+            yield
+        except asyncio.CancelledError:
+            if task in self._interrupted:
+                self._interrupted.discard(task)
+                task.uncancel()
+            if not self._severed or task.cancelling():
+                raise
+        finally:
+            self._waiting.discard(task)
 
     def cancel(self) -> None:
         """End the call."""

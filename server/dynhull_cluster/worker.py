@@ -24,9 +24,16 @@ HEALTH_CALLS = 1024
 
 def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
     """The server of a worker."""
-    own = settings.model_copy(
+    own = own_settings(settings).model_copy(update={"data": worker_folder(settings.data, number)})
+    divisions = ServedDivisions(settings, number, Peers(sockets))
+    letters = peer_handler(divisions.receive)
+    return Server(own, PrivateEntrance(number, sockets, letters), storage_of(settings, number), divisions)
+
+
+def own_settings(settings: Settings) -> Settings:
+    """The settings of a server that only gateways reach."""
+    return settings.model_copy(
         update={
-            "data": worker_folder(settings.data, number),
             "tls_cert": None,
             "tls_key": None,
             "tls_client_ca": None,
@@ -35,9 +42,6 @@ def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
             "max_health_calls_per_caller": HEALTH_CALLS,
         }
     )
-    divisions = ServedDivisions(settings, number, Peers(sockets))
-    letters = peer_handler(divisions.receive)
-    return Server(own, PrivateEntrance(number, sockets, letters), storage_of(settings, number), divisions)
 
 
 class PrivateEntrance:

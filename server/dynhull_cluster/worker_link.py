@@ -3,8 +3,9 @@
 import asyncio
 import logging
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
+from weakref import WeakSet
 
 import grpc
 from google.rpc.status_pb2 import Status
@@ -13,23 +14,14 @@ from grpc_health.v1 import health_pb2
 from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 
+from .again import may_repeat
 from .callers import Metadata, metadata_of
 from .frames import MOST_BYTES, Frames, Kind, pack_request
-from .sockets import Sockets
 from .upstream import Upstream, lost_status, status_of
+from .ways import Ways
 
 # Seconds until a worker that is away is looked for again.
 LOOK_SECONDS = 0.05
-OPTIONS = [
-    ("grpc.max_receive_message_length", -1),
-    ("grpc.max_send_message_length", -1),
-    ("grpc.initial_reconnect_backoff_ms", 50),
-    ("grpc.min_reconnect_backoff_ms", 50),
-    ("grpc.max_reconnect_backoff_ms", 500),
-    ("grpc.http2.lookahead_bytes", 2**20),
-    ("grpc.http2.bdp_probe", 0),
-    ("grpc.use_local_subchannel_pool", 1),
-]
 HEALTH_WATCH = "/grpc.health.v1.Health/Watch"
 UNKNOWN = health_pb2.HealthCheckResponse.UNKNOWN
 
@@ -41,7 +33,7 @@ class WorkerLink:
 
     Args:
         number: the number of the worker.
-        sockets: where it listens.
+        ways: where it is.
         watched: the health services to watch.
         changed: called when the health or the presence of the worker changes.
 
@@ -50,12 +42,15 @@ class WorkerLink:
         health: the last known status of each health service; UNKNOWN while the worker is away.
     """
 
-    def __init__(self, number: int, sockets: Sockets, watched: tuple[str, ...], changed: Callable[[], None]) -> None:
+    def __init__(self, number: int, ways: Ways, watched: tuple[str, ...], changed: Callable[[], None]) -> None:
         self.number = number
         self.health = dict.fromkeys(watched, UNKNOWN)
-        self._sockets = sockets
+        self._ways = ways
         self._changed = changed
         self._frames: AskingFrames | None = None
+        self._upstreams: WeakSet[Upstream] = WeakSet()
+        self._arrived = asyncio.Event()
+        ways.when_moved(number, self._sever)
 
     @property
     def present(self) -> bool:
@@ -68,9 +63,7 @@ class WorkerLink:
         while True:
             lost: asyncio.Future[None] = loop.create_future()
             try:
-                _, frames = await loop.create_unix_connection(
-                    partial(AskingFrames, lost), str(self._sockets.frames(self.number))
-                )
+                frames = await self._ways.connect(self.number, partial(AskingFrames, lost))
             except OSError:
                 await asyncio.sleep(LOOK_SECONDS)
                 continue
@@ -78,38 +71,75 @@ class WorkerLink:
                 async with asyncio.TaskGroup() as tasks:
                     watches = [tasks.create_task(self._watch(service)) for service in self.health]
                     self._frames = frames
+                    self._arrived.set()
                     self._changed()
                     await lost
                     for each in watches:
                         each.cancel()
             finally:
                 self._frames = None
+                self._arrived.clear()
                 self.health = dict.fromkeys(self.health, UNKNOWN)
                 frames.close()
+                if self._ways.patience:  # the machine may be gone, which gRPC would not notice
+                    self._sever()
                 self._changed()
 
     async def close(self) -> None:
         """Close the channel, after `run`."""
-        await self._channel.close()
+        await self._ways.close(self.number)
+
+    async def arrive(self) -> None:
+        """Wait for a worker that is away, for as long as the ways to it say; `stream` says if that was in vain."""
+        if self._frames is None and self._ways.patience:
+            try:
+                async with asyncio.timeout(self._ways.patience):
+                    await self._arrived.wait()
+            except TimeoutError:
+                return
 
     async def ask(self, method: str, call: Call, message: bytes) -> bytes:
         """The response of the worker to a request.
+
+        A worker that may be replaced is waited for, and asked again where no request can take effect twice by that.
 
         Raises:
             WorkerAwayError: the worker is away; it has not seen the request.
             RelayedError: the worker refuses it, or has ended meanwhile.
         """
+        if not self._ways.patience:
+            return await self._ask(method, call, message)
+        loop = asyncio.get_running_loop()
+        until = loop.time() + self._ways.patience
+        while True:
+            try:
+                await self.arrive()
+                return await self._ask(method, call, message)
+            except WorkerAwayError:
+                raise
+            except RelayedError as error:
+                if loop.time() > until or not may_repeat(method, message, error.status):
+                    raise
+            await asyncio.sleep(LOOK_SECONDS)
+
+    async def _ask(self, method: str, call: Call, message: bytes) -> bytes:
         frames = self._present()
         if len(message) <= MOST_BYTES:
             while not frames.writable.is_set():  # what a worker that does not read has not got is its caller's alone
                 await frames.writable.wait()
                 frames = self._present()
             return await frames.ask(method, f"{call.owner} {call.caller.key}".encode(), message)
-        asked = self._channel.unary_unary(method)(message, metadata=metadata_of(call), wait_for_ready=True)
+        metadata = (*metadata_of(call), *self._ways.proof(self.number))
+        asked = self._channel.unary_unary(method)(message, metadata=metadata, wait_for_ready=True)
         try:
             response: bytes = await asked
         except grpc.aio.AioRpcError as error:
             raise RelayedError(status_of(error)) from None
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            if task is None or task.cancelling():
+                raise
+            raise RelayedError(lost_status()) from None  # its channel was closed
         finally:
             asked.cancel()
         return response
@@ -122,16 +152,26 @@ class WorkerLink:
             caller: the metadata that name the caller.
         """
         self._present()
-        return Upstream(self._channel.stream_stream(method)(metadata=caller, wait_for_ready=True))
+        metadata = (*caller, *self._ways.proof(self.number))
+        upstream = Upstream(self._channel.stream_stream(method)(metadata=metadata, wait_for_ready=True))
+        self._upstreams.add(upstream)
+        return upstream
 
     def _present(self) -> "AskingFrames":
         if self._frames is None or not self._frames.connected:
             raise WorkerAwayError(self.number)
         return self._frames
 
-    @cached_property
+    @property
     def _channel(self) -> Any:
-        return grpc.aio.insecure_channel(f"unix:{self._sockets.grpc(self.number)}", options=OPTIONS)
+        return self._ways.channel(self.number)
+
+    def _sever(self) -> None:
+        """Hear nothing more from where the worker was."""
+        if self._frames is not None:
+            self._frames.abort()
+        for each in list(self._upstreams):
+            each.sever()
 
     async def _watch(self, service: str) -> None:
         """Follow one health service of the worker."""
@@ -169,6 +209,15 @@ class AskingFrames(Frames):
         self._lost = lost
         self._last = 0
         self._waiting: dict[int, asyncio.Future[bytes]] = {}
+
+    async def greet(self, greeting: bytes) -> None:
+        """Prove to be a gateway. Raises RelayedError if the other end does not accept that."""
+        answer = self._waiting[0] = self._loop.create_future()
+        self.send(0, Kind.GREETING, greeting)
+        try:
+            await answer
+        finally:
+            del self._waiting[0]
 
     async def ask(self, method: str, caller: bytes, message: bytes) -> bytes:
         """The answer to a request. Raises RelayedError if it is refused, or the connection is lost."""

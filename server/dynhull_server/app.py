@@ -184,15 +184,19 @@ class Server:
             self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
         log.info("serving", extra={"address": self.address})
 
-    async def drain(self) -> None:
-        """Refuse new calls, end waiting ones, and give the others the configured grace period to finish."""
+    async def drain(self, last_statuses: float = LAST_STATUSES) -> None:
+        """Refuse new calls, end waiting ones, and give the others the configured grace period to finish.
+
+        Args:
+            last_statuses: the seconds that callers get to receive what their calls have ended with.
+        """
         served, self._serving = self._serving, False
         if served:  # one that could not start has its error to say, and nothing else
             log.info("draining")
         self._health.stop()
         await self._supervisor.stop()
         await self._calls.drain(self._settings.grace)
-        await self._server.stop(LAST_STATUSES)
+        await self._server.stop(last_statuses)
         await self._entrance.close()
         self._stop_metrics()
         await self._engine.close()

@@ -3,6 +3,7 @@
 import math
 import ssl
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Protocol
 
 import grpc
@@ -117,11 +118,14 @@ def _server_credentials(settings: Settings) -> grpc.ServerCredentials | None:
     """The certificates of the settings; None without TLS."""
     if settings.tls_cert is None or settings.tls_key is None:
         return None
-    client_ca = None if settings.tls_client_ca is None else settings.tls_client_ca.read_bytes()
+    return grpc_credentials(settings.tls_cert, settings.tls_key, settings.tls_client_ca)
+
+
+def grpc_credentials(certificate: Path, key: Path, client_ca: Path | None) -> grpc.ServerCredentials:
+    """Certificates as gRPC takes them."""
+    authority = None if client_ca is None else client_ca.read_bytes()
     return grpc.ssl_server_credentials(
-        [(settings.tls_key.read_bytes(), settings.tls_cert.read_bytes())],
-        client_ca,
-        require_client_auth=client_ca is not None,
+        [(key.read_bytes(), certificate.read_bytes())], authority, require_client_auth=authority is not None
     )
 
 

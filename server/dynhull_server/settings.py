@@ -36,10 +36,29 @@ class Settings(BaseModel):
         ge=1,
         le=1024,
         description="Number of processes that hold the hulls, each a part of them; without it, one process does "
-        "everything. Limits apply to each process.",
+        "everything, or one of each kind with --cluster. Limits apply to each process.",
     )
     gateways: int | None = Field(
         None, ge=1, le=256, description="Number of processes that take the calls for the workers; by default 1."
+    )
+    cluster: bool = Field(
+        False,
+        description="Share the hulls of the database of --journal with all other servers that do so, on any machines: "
+        "workers come, go and replace each other, and each server takes all calls.",
+    )
+    partitions: int = Field(
+        16,
+        ge=1,
+        le=1024,
+        description="Number of parts of a new database of a cluster, which workers share; it cannot be changed later.",
+    )
+    cluster_host: str = Field(
+        "127.0.0.1", description="Address of this machine at which the other servers of the cluster reach its workers."
+    )
+    cluster_ca: Path | None = Field(
+        None,
+        description="PEM file: servers of the cluster connect with TLS, to workers whose --tls-cert is signed by this "
+        "certificate.",
     )
     threads: int | None = Field(
         None,
@@ -125,8 +144,17 @@ class Settings(BaseModel):
             raise ValueError("--tls-cert and --tls-key must be given together")
         if self.tls_client_ca and not self.tls_cert:
             raise ValueError("--tls-client-ca needs --tls-cert and --tls-key")
-        if self.gateways is not None and self.workers is None:
-            raise ValueError("--gateways needs --workers")
+        if self.gateways is not None and self.workers is None and not self.cluster:
+            raise ValueError("--gateways needs --workers or --cluster")
+        if self.cluster and self.journal is None:
+            raise ValueError("--cluster needs --journal: the servers share a database")
+        if self.cluster_ca and not self.tls_cert:
+            raise ValueError("--cluster-ca needs --tls-cert and --tls-key")
+        if self.cluster and not is_loopback(self.cluster_host) and self.cluster_ca is None and not self.insecure:
+            raise ValueError(
+                f"--cluster-host {self.cluster_host} can be reached by other machines: give --cluster-ca, or "
+                "--insecure to connect servers without TLS"
+            )
         protected = self.tls_cert and self.tokens
         for host in (self.host, *([] if self.metrics_port is None else [self.metrics_host])):
             if not is_loopback(host) and not protected and not self.insecure:

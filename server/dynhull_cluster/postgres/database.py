@@ -87,6 +87,15 @@ class Database:
             raise
         return connection
 
+    async def connect_async(self, name: str) -> "psycopg.AsyncConnection[tuple[Any, ...]]":
+        """The same for the event loop, of a database that `connect` has reached before. Raises StorageError."""
+        try:
+            return await psycopg.AsyncConnection.connect(
+                self._address, autocommit=True, application_name=name, client_encoding="utf8"
+            )
+        except psycopg.Error as error:
+            raise StorageError(f"cannot connect to {self}: {_words(error)}", for_callers=FOR_CALLERS) from error
+
 
 @contextmanager
 def as_storage_errors() -> Iterator[None]:

@@ -32,6 +32,8 @@ from .database import Connection, Database, as_storage_errors
 LEASE, RENEWAL, MARGIN = 5.0, 1.0, 0.5
 # Seconds between looks whether the lease of another server is renewed.
 LOOK = 0.25
+# Where it is said that a partition has changed hands.
+CHANNEL = "dynhull"
 # Seconds that an owner which was stopped inside of a transaction may hold up the next one.
 LOCK_SECONDS = 1
 
@@ -103,16 +105,20 @@ class Ownership:
         partition: the partition.
         address: where callers reach the owner, for other servers.
         lost: called in the thread with the reason, when another server owns the partition or the thread has failed.
+        worker: the name of the owner.
 
     Attributes:
         epoch: the epoch; 0 before `take`.
     """
 
-    def __init__(self, database: Database, partition: int, address: str, lost: Callable[[str], None]) -> None:
+    def __init__(
+        self, database: Database, partition: int, address: str, lost: Callable[[str], None], worker: str = ""
+    ) -> None:
         self._database = database
         self._partition = partition
         self._address = address
         self._lost = lost
+        self._worker = worker or this_worker()
         self._until = 0.0
         self._turn = threading.Lock()  # of the connection
         self._connection: Connection | None = None
@@ -124,8 +130,11 @@ class Ownership:
         """Whether the lease has not ended."""
         return _now() < self._until
 
-    def take(self) -> None:
+    def take(self, lapsed: str | None = None) -> None:
         """Own the partition: at once if nobody does, or a process that has ended; else when the lease has ended.
+
+        Args:
+            lapsed: a lease that this process has seen for as long as it lasts, without a renewal.
 
         Raises:
             LockedError: another server renews its lease.
@@ -133,7 +142,7 @@ class Ownership:
         """
         seen: str | None = None
         since = _now()
-        while owner := self._try_to_take(seen if _now() > since + LEASE else None):
+        while owner := self._try_to_take(seen if _now() > since + LEASE else lapsed):
             if seen is None:
                 seen, since = owner.until, _now()
             elif owner.until != seen:
@@ -143,6 +152,22 @@ class Ownership:
             time.sleep(LOOK)
         self._thread = threading.Thread(target=self._keep, name="lease", daemon=True)
         self._thread.start()
+
+    def announce(self, address: str) -> None:
+        """Say where callers reach the owner from now on.
+
+        Raises:
+            TakenOverError: another server owns the partition.
+            StorageError: the database cannot be reached.
+        """
+        with self._turn, self._working() as connection:
+            said = connection.execute(
+                "UPDATE owners SET address = %s WHERE partition = %s AND epoch = %s",
+                [address, self._partition, self.epoch],
+            )
+            if said.rowcount != 1:
+                raise taken_over(self._database, self._partition)
+            connection.execute(f"NOTIFY {CHANNEL}".encode())
 
     def renew(self) -> None:
         """Renew the lease, and make all earlier commits durable.
@@ -178,6 +203,7 @@ class Ownership:
                         "UPDATE owners SET until = '-infinity', process = '' WHERE partition = %s AND epoch = %s",
                         [self._partition, self.epoch],
                     )
+                    connection.execute(f"NOTIFY {CHANNEL}".encode())
         except StorageError as error:
             log.warning("the lease was not returned", extra={"reason": words(error)})
         finally:
@@ -220,7 +246,7 @@ class Ownership:
 
     def _succeed(self, connection: Connection, owner: _Owner | None) -> int | None:
         """Follow an owner, or nobody. The new epoch; None if another server was faster."""
-        own = this_worker(), this_process(), self._address, LEASE
+        own = self._worker, this_process(), self._address, LEASE
         values = "%s, %s, %s, clock_timestamp() + make_interval(secs => %s)"
         if owner is None:
             sql = f"INSERT INTO owners VALUES (%s, 1, {values}) ON CONFLICT DO NOTHING"  # noqa: S608  (ours)

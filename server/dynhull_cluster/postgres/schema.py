@@ -208,7 +208,7 @@ def _servers(partitions: int) -> str:
 def _remedy(partitions: int) -> str:
     if partitions == 1:
         return "start the server without --workers"
-    return f"start the server with --workers {partitions}"
+    return f"start the server with --workers {partitions}, or with --cluster"
 
 
 def _has_tables(connection: Connection) -> bool:

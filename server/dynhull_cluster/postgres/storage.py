@@ -65,6 +65,8 @@ class PostgresStorage(RowStorage):
         partition: the partition.
         partitions: the number of partitions of the database.
         address: where callers reach this server, for others to see.
+        worker: what others call this server.
+        lapsed: the lease of an owner before, which this process has seen to end.
     """
 
     def __init__(
@@ -76,13 +78,16 @@ class PostgresStorage(RowStorage):
         partition: int = 0,
         partitions: int = 1,
         address: str = "",
+        worker: str = "",
+        lapsed: str | None = None,
     ) -> None:
         super().__init__()
         self._database = database
         self._durability = durability
         self._partition = partition
         self._partitions = partitions
-        self._owner = Ownership(database, partition, address, lost)
+        self._owner = Ownership(database, partition, address, lost, worker)
+        self._lapsed = lapsed
         self._writer: Connection | None = None
         self._not_durable = False
         self._size = 0
@@ -92,6 +97,10 @@ class PostgresStorage(RowStorage):
     def entitled(self) -> bool:
         """Whether this server may answer reads: no other one owns the partition."""
         return self._owner.holds()
+
+    def announce(self, address: str) -> None:
+        """Say where callers reach this server. Raises TakenOverError, or StorageError."""
+        self._owner.announce(address)
 
     # Opening and closing
 
@@ -104,7 +113,7 @@ class PostgresStorage(RowStorage):
                 prepare(connection, self._database, self._partitions)
                 connection.execute("COMMIT")
                 stack.callback(self._owner.release)
-                self._owner.take()
+                self._owner.take(self._lapsed)
                 connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
                 findings = examined(connection, self._partition, progress)
             if findings.fatal:

@@ -1,0 +1,51 @@
+"""Which requests may be sent again to the next owner of a hull, if the one before has not answered them."""
+
+from typing import Any
+
+import grpc
+from google.rpc.error_details_pb2 import ErrorInfo
+from google.rpc.status_pb2 import Status
+
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_server.rpc.methods import DESCRIPTOR, FENCES, FINISHED
+
+# Refusals of a server that has not begun to do what was asked.
+NOT_BEGUN = {"STARTING", "DRAINING"}
+LISTS = {"ListHulls", "ListFences"}
+READS = {
+    f"/{service.full_name}/{method.name}"
+    for service in (DESCRIPTOR, FENCES)
+    for method in service.methods
+    if method.name not in FINISHED - LISTS and not method.client_streaming
+}
+
+
+def may_repeat(method: str, message: bytes, status: Status) -> bool:
+    """Whether a request may be repeated after this status: it has not begun, or a second time has no effect."""
+    if status.code != grpc.StatusCode.UNAVAILABLE.value[0]:
+        return False
+    reason = _reason(status)
+    if reason in NOT_BEGUN:
+        return True
+    if reason:  # it is known what has become of it
+        return False
+    return method in READS or (method in NUMBERED and _is_numbered(NUMBERED[method].FromString(message)))
+
+
+def _is_numbered(request: Any) -> bool:
+    """Whether a batch has a number, by which a server knows that it has applied it."""
+    return bool(request.producer and request.sequence)
+
+
+def _reason(status: Status) -> str:
+    for detail in status.details:
+        info = ErrorInfo()
+        if detail.Unpack(info):
+            return str(info.reason)
+    return ""
+
+
+NUMBERED: dict[str, Any] = {
+    f"/{DESCRIPTOR.full_name}/Apply": pb.ApplyRequest,
+    f"/{DESCRIPTOR.full_name}/ApplyTogether": pb.ApplyTogetherRequest,
+}

@@ -1,0 +1,136 @@
+"""How a gateway reaches the owners of partitions: at the addresses that they have written into the tables."""
+
+import asyncio
+import socket
+import ssl
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+import grpc
+
+from dynhull_server.rpc.status import RelayedError
+
+from ..callers import PROOF, Metadata
+from ..ways import OPTIONS, F
+from .board import Tables
+from .entrance import proof_of
+
+# Seconds that a call waits for a partition that nobody serves: somewhat longer than a lease lasts.
+PATIENCE = 10.0
+# Seconds to connect to an owner.
+CONNECT_SECONDS = 2.0
+
+
+SOCKET_OPTIONS = [
+    (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
+    *(
+        (socket.IPPROTO_TCP, getattr(socket, name), value)
+        for name, value in {
+            "TCP_KEEPIDLE": 5,
+            "TCP_KEEPINTVL": 2,
+            "TCP_KEEPCNT": 3,
+            "TCP_USER_TIMEOUT": 10_000,
+        }.items()
+        if hasattr(socket, name)
+    ),
+]
+
+
+class _Greets(Protocol):
+    async def greet(self, greeting: bytes) -> None: ...
+
+
+class Addresses:
+    """The ways to all partitions.
+
+    Args:
+        secret: what processes of the cluster know each other by.
+        ca: the certificate that has signed those of the workers; None where they have none.
+    """
+
+    patience = PATIENCE
+
+    def __init__(self, secret: str, ca: Path | None) -> None:
+        self._secret = secret
+        self._tls = None if ca is None else ssl.create_default_context(cafile=str(ca))
+        self._credentials = None if ca is None else grpc.ssl_channel_credentials(ca.read_bytes())
+        self._known: dict[int, tuple[int, str]] = {}
+        self._moved: dict[int, Callable[[], None]] = {}
+        self._channels: dict[int, Any] = {}
+        self._closing: set[asyncio.Task[None]] = set()
+
+    def learn(self, tables: Tables) -> None:
+        """Follow the owners; one that is away for the moment keeps its address, until another one has the partition."""
+        for partition, owner in tables.owners.items():
+            now = owner.epoch, owner.address
+            if owner.free or not owner.address or self._known.get(partition) == now:
+                continue
+            self._known[partition] = now
+            if (channel := self._channels.pop(partition, None)) is not None:
+                closing = asyncio.get_running_loop().create_task(channel.close())
+                self._closing.add(closing)
+                closing.add_done_callback(self._closing.discard)
+            if partition in self._moved:
+                self._moved[partition]()
+
+    async def connect(self, worker: int, make: Callable[[], F]) -> F:
+        """Connect to the owner of a partition, and prove to be a gateway. Raises OSError."""
+        host, _, frames_port = self._at(worker)
+        name = host if self._tls is not None else None
+        async with asyncio.timeout(CONNECT_SECONDS):
+            transport, frames = await asyncio.get_running_loop().create_connection(
+                make, host, frames_port, ssl=self._tls, server_hostname=name
+            )
+            _keep_alive(transport.get_extra_info("socket"))
+            try:
+                await cast("_Greets", frames).greet(proof_of(worker, self._secret).encode())
+            except BaseException as error:
+                transport.abort()
+                if isinstance(error, RelayedError):
+                    raise OSError("another partition listens there now") from None
+                raise
+        return frames
+
+    def channel(self, worker: int) -> Any:
+        """A channel to the owner of a partition, which connects by itself."""
+        if worker not in self._channels:
+            host, port, _ = self._at(worker)
+            address = f"{bracketed(host)}:{port}"
+            self._channels[worker] = (
+                grpc.aio.insecure_channel(address, options=OPTIONS)
+                if self._credentials is None
+                else grpc.aio.secure_channel(address, self._credentials, options=OPTIONS)
+            )
+        return self._channels[worker]
+
+    def proof(self, worker: int) -> Metadata:
+        """What proves to the owner of a partition that this is a gateway."""
+        return ((PROOF, proof_of(worker, self._secret)),)
+
+    def when_moved(self, worker: int, moved: Callable[[], None]) -> None:
+        """Have a function called when a partition has another owner, or its owner another address."""
+        self._moved[worker] = moved
+
+    async def close(self, worker: int) -> None:
+        """Close the channel to a partition."""
+        if worker in self._channels:
+            await self._channels.pop(worker).close()
+
+    def _at(self, partition: int) -> tuple[str, int, int]:
+        """The host, the port for gRPC and that for frames. Raises OSError."""
+        if partition not in self._known:
+            raise OSError(f"nobody serves partition {partition}")
+        host, port, frames_port = self._known[partition][1].rsplit(" ", 2)
+        return host, int(port), int(frames_port)
+
+
+def _keep_alive(connected: socket.socket) -> None:
+    """Notice a machine that does not answer any more within some seconds."""
+    for level, option, value in SOCKET_OPTIONS:
+        connected.setsockopt(level, option, value)
+
+
+def bracketed(host: str) -> str:
+    """A host as it stands before a colon and a port."""
+    return f"[{host}]" if ":" in host and not host.startswith("[") else host

@@ -1,0 +1,140 @@
+"""The commands `dynhull cluster ...`: they write into the tables what is wished, and the workers do it."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dynhull_cli.groups import group
+
+if TYPE_CHECKING:
+    from ..postgres.database import Connection
+
+JOURNAL = Annotated[
+    str,
+    typer.Option(
+        envvar="DYNHULL_JOURNAL", help="Address of the database of the cluster: postgresql://user@host/database."
+    ),
+]
+WORKER = Annotated[str, typer.Argument(help="The name of a worker, as `dynhull cluster status` shows it.")]
+ANYWHERE = "anywhere"
+
+
+def status(journal: JOURNAL) -> None:
+    """Show the workers, and who serves which partitions."""
+    from .board import read
+
+    with _connected(journal) as (connection, count):
+        tables = read(connection)
+    served = Counter(owner.worker for owner in tables.owners.values() if not owner.free)
+    typer.echo(f"{count} partitions")
+    for worker in sorted({*tables.workers, *served}):
+        state = {None: "away", False: "serves", True: "gives up its partitions"}[tables.workers.get(worker)]
+        own = [str(each) for each, owner in sorted(tables.owners.items()) if owner.worker == worker and not owner.free]
+        typer.echo(f"{worker}  {state}  {len(own)}: {', '.join(own) or '-'}")
+    free = [str(each) for each in range(count) if (owner := tables.owners.get(each)) is None or owner.free]
+    if free:
+        typer.echo(f"nobody serves {', '.join(free)}")
+    for partition, worker in sorted(tables.wishes.items()):
+        typer.echo(f"partition {partition} is to be on {worker}")
+
+
+def drain(worker: WORKER, journal: JOURNAL) -> None:
+    """Have a worker give up its partitions to the others, and take none until it is started again."""
+    with _connected(journal) as (connection, _):
+        _require_worker(connection, worker)
+        connection.execute("UPDATE workers SET draining = true WHERE worker = %s", [worker])
+
+
+def move(
+    partition: Annotated[int, typer.Argument(min=0, help="The number of a partition.")],
+    worker: Annotated[str, typer.Argument(help=f"The worker to move it to, or `{ANYWHERE}` to let it be moved again.")],
+    journal: JOURNAL,
+) -> None:
+    """Move a partition to a worker, where it stays as long as that worker is there."""
+    from dynhull_server.failure import fail
+
+    with _connected(journal) as (connection, count):
+        if partition >= count:
+            fail(f"PARTITION is {partition}: there are {count}, from 0 to {count - 1}")
+        connection.execute("DELETE FROM wishes WHERE partition = %s", [partition])
+        if worker != ANYWHERE:
+            _require_worker(connection, worker)
+            connection.execute("INSERT INTO wishes VALUES (%s, %s)", [partition, worker])
+
+
+def scale(
+    servers: Annotated[int, typer.Argument(min=0, help="How many servers Ray is to run, each with its own processes.")],
+    journal: JOURNAL,
+    options: Annotated[
+        list[str] | None, typer.Argument(help="Options of `dynhull serve` for them, after `--`; --port 0 by default.")
+    ] = None,
+) -> None:
+    """Have Ray run so many servers of the cluster, and restart those that die, on other nodes if need be.
+
+    With RAY_ADDRESS, the servers go on after this command, on the nodes of that Ray. Without it, this command starts
+    Ray itself, and all ends with it.
+
+        dynhull cluster scale 3 --journal postgresql://dynhull@db/hulls -- --host 0.0.0.0 --insecure
+    """
+    import signal
+
+    from dynhull_server.failure import fail
+
+    try:
+        from . import launcher
+
+        own = launcher.start_ray()
+    except ImportError as error:
+        fail(f"dynhull cluster scale needs {error.name}: pip install 'dynhull[cluster]'")
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        fail(f"Ray cannot be used: {error}")
+    environment, host = {"DYNHULL_JOURNAL": journal}, "127.0.0.1" if own else ""
+    found = launcher.scale(servers, ["--port", "0", *(options or [])], environment, host)
+    for number, said in sorted(found.items()):
+        typer.echo(f"server {number}: {said or 'it does not serve, see the log of Ray'}")
+    if own and found:
+        signal.sigwait({signal.SIGTERM, signal.SIGINT})
+        launcher.scale(0, [], {}, "")
+
+
+@group(status=status, drain=drain, move=move, scale=scale)
+def cluster() -> None:
+    """See which servers of a cluster serve what, and have them serve something else.
+
+    A cluster is what `dynhull serve --cluster` makes of the servers of a PostgreSQL database.
+    """
+
+
+def _require_worker(connection: "Connection", worker: str) -> None:
+    from dynhull_server.failure import fail
+
+    from .board import read
+
+    present = list(read(connection).workers)
+    if worker not in present:
+        fail(f"WORKER is {worker!r}: no worker of the cluster has this name; there are {', '.join(present) or 'none'}")
+
+
+@contextmanager
+def _connected(journal: str) -> Iterator[tuple["Connection", int]]:
+    """A transaction on the tables of a cluster, and the number of partitions; others hear of what has changed."""
+    from dynhull_server.failure import code_of, fail, text_of
+    from dynhull_server.storage.port import StorageError
+
+    from ..postgres.database import Database, as_storage_errors
+    from ..postgres.ownership import CHANNEL
+    from ..postgres.schema import partitions_of
+
+    try:
+        database = Database(journal)
+        with closing(database.connect("dynhull cluster")) as connection, as_storage_errors(), connection.transaction():
+            there = connection.execute("SELECT to_regclass('cluster') IS NOT NULL").fetchone()
+            if there != (True,):
+                raise StorageError(f"{database} is that of no cluster: start one with `dynhull serve --cluster`")
+            yield connection, partitions_of(connection, database) or 0
+            connection.execute(f"NOTIFY {CHANNEL}".encode())
+    except (StorageError, OSError, ValueError) as error:
+        fail(text_of(error), code_of(error))

@@ -1,0 +1,85 @@
+"""How gateways of other processes and machines reach the owner of a partition."""
+
+import hmac
+import socket
+from collections.abc import Callable, Mapping, Sequence
+
+import grpc
+
+from dynhull_server.certificates import server_context
+from dynhull_server.entrance import grpc_credentials
+from dynhull_server.listening import why_not
+from dynhull_server.rpc.access import Caller, TokenFile
+from dynhull_server.rpc.calls import Context
+from dynhull_server.rpc.methods import RunHandler
+from dynhull_server.rpc.status import StartingError
+from dynhull_server.settings import Settings
+
+from ..callers import PROOF, authenticator
+from ..frame_server import FrameContext, FrameServer
+
+
+def proof_of(partition: int, secret: str) -> str:
+    """What a gateway shows: that it knows the secret, and which partition it means, as ports are used again."""
+    return f"{partition}/{secret}"
+
+
+class PartitionEntrance:
+    """The ports of a partition, for as long as this process owns it.
+
+    Args:
+        settings: the settings.
+        partition: the partition.
+        secret: what processes of the cluster know each other by.
+
+    Attributes:
+        address: the host, the port for gRPC and that for frames, once it listens.
+    """
+
+    def __init__(self, settings: Settings, partition: int, secret: str) -> None:
+        self._settings = settings
+        self._proof = proof_of(partition, secret)
+        self._frames: FrameServer | None = None
+        self.address = ""
+
+    def authenticator(self, tokens: TokenFile | None) -> Callable[[Context], Caller]:
+        """Callers are who a gateway says they are, if it proves to be one."""
+        authenticate = authenticator(tokens)
+
+        def proven(context: Context) -> Caller:
+            if not isinstance(context, FrameContext):  # frames have begun with a greeting
+                shown = str(dict(context.invocation_metadata() or ()).get(PROOF, ""))
+                if not hmac.compare_digest(shown.encode(), self._proof.encode()):
+                    raise StartingError("this worker does not own the partition")
+            return authenticate(context)
+
+        return proven
+
+    async def listen(
+        self, server: grpc.aio.Server, handlers: Sequence[grpc.GenericRpcHandler], runs: Mapping[str, RunHandler]
+    ) -> str:
+        """Listen on two free ports of the address for the cluster."""
+        settings = self._settings
+        host = settings.cluster_host
+        if reason := why_not(host, 0):
+            raise OSError(f"cannot listen on --cluster-host {host}: {reason}")
+        credentials, tls = None, None
+        if settings.cluster_ca is not None:
+            assert settings.tls_cert is not None  # the settings require both
+            assert settings.tls_key is not None
+            credentials = grpc_credentials(settings.tls_cert, settings.tls_key, None)
+            tls = server_context(settings.tls_cert, settings.tls_key, None)
+        place = f"[{host}]:0" if ":" in host else f"{host}:0"
+        port = server.add_insecure_port(place) if credentials is None else server.add_secure_port(place, credentials)
+        family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        bound = socket.socket(family, kind, protocol)
+        bound.bind(address)
+        self._frames = FrameServer(handlers, runs, self._proof.encode())
+        await self._frames.listen_on(bound, tls)
+        self.address = f"{host} {port} {bound.getsockname()[1]}"
+        return self.address
+
+    async def close(self) -> None:
+        """Close the port for frames."""
+        if self._frames is not None:
+            await self._frames.close()

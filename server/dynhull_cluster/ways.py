@@ -1,0 +1,45 @@
+"""How a gateway reaches a worker: through a socket on its machine, or through the network."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+from .callers import Metadata
+
+OPTIONS = [
+    ("grpc.max_receive_message_length", -1),
+    ("grpc.max_send_message_length", -1),
+    ("grpc.initial_reconnect_backoff_ms", 50),
+    ("grpc.min_reconnect_backoff_ms", 50),
+    ("grpc.max_reconnect_backoff_ms", 500),
+    ("grpc.http2.lookahead_bytes", 2**20),
+    ("grpc.http2.bdp_probe", 0),
+    ("grpc.use_local_subchannel_pool", 1),
+]
+
+F = TypeVar("F", bound=asyncio.Protocol)
+
+
+class Ways(Protocol):
+    """The ways to all workers, by number.
+
+    Attributes:
+        patience: the seconds that a call waits for a worker that is away.
+    """
+
+    patience: float
+
+    async def connect(self, worker: int, make: Callable[[], F]) -> F:
+        """Connect for frames. Raises OSError."""
+
+    def channel(self, worker: int) -> Any:
+        """The channel for gRPC, where `connect` has led."""
+
+    def proof(self, worker: int) -> Metadata:
+        """The metadata that let the worker believe what a gateway says of its callers."""
+
+    def when_moved(self, worker: int, moved: Callable[[], None]) -> None:
+        """Have a function called whenever the worker is elsewhere: what has not been answered will not be."""
+
+    async def close(self, worker: int) -> None:
+        """Close the channel."""

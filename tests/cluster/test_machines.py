@@ -1,0 +1,180 @@
+"""`dynhull serve --cluster`: servers that share a database serve all of its hulls together, and replace each other."""
+
+import os
+import signal
+import socket
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack
+from struct import pack
+from typing import Any
+
+import grpc
+import pytest
+from cluster import processes
+from command_line import dynhull
+from patience import PATIENCE, wait_until
+from postgresql import PostgreSQL, query
+from server_process import Server, server_process
+
+from dynhull_client import Batch, HullClient, HullUnsuitableError
+from dynhull_cluster.placement import worker_of
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+NAMES = [f"{first}/hull" for first in "abcdefgh"]
+QUIET = ("--scrub-cpu", "0", "--log-level", "error", "--create-on-write")
+
+
+@pytest.fixture
+def url(postgres: PostgreSQL) -> str:
+    return postgres.new_database()
+
+
+def machine(url: str, **expected: Any) -> AbstractContextManager[Server]:
+    """One of the servers."""
+    return server_process("--cluster", "--partitions", "4", "--journal", url, *QUIET, **expected)
+
+
+def apply_all(client: HullClient, sequence: int) -> list[int]:
+    """A numbered batch to each hull; their revisions."""
+    points = [[sequence, 1], [1, sequence]]
+    return [client.apply(name, insert=points, producer="p", sequence=sequence).revision for name in NAMES]
+
+
+def served(url: str) -> dict[str, int]:
+    """How many partitions each worker serves."""
+    rows = query(url, "SELECT worker, count(*) FROM owners WHERE until > '-infinity' AND address <> '' GROUP BY worker")
+    return dict(rows)
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_machines_come_and_go_and_callers_notice_only_that_some_calls_take_longer(url: str) -> None:
+    with ExitStack() as stack:
+        first = stack.enter_context(machine(url))
+        client = stack.enter_context(HullClient(first.address, retries=0))
+        assert apply_all(client, 1) == [1] * len(NAMES)
+        assert sorted(served(url).values()) == [4]
+        second = stack.enter_context(machine(url))
+        other = stack.enter_context(HullClient(second.address, retries=0))
+        assert apply_all(other, 2) == [2] * len(NAMES)
+        wait_until(lambda: sorted(served(url).values()) == [2, 2])
+        assert apply_all(client, 3) == [3] * len(NAMES)
+        assert [info.name for info in other.list_hulls()] == NAMES
+        with other.watch(NAMES[0]) as watch:
+            assert next(watch).revision == 3
+        before = {worker for worker, count in served(url).items() if count}
+        first.process.terminate()
+        sequence = 4
+        while first.process.poll() is None:  # each batch is applied once, though its hull moves
+            assert apply_all(other, sequence) == [sequence] * len(NAMES)
+            sequence += 1
+        assert apply_all(other, sequence) == [sequence] * len(NAMES)
+        (left,) = served(url)
+        assert left in before
+        assert all(other.verify(name).equal for name in NAMES)
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_killed_machine_and_a_stopped_one_are_replaced(url: str) -> None:
+    """A machine that was stopped ends when it goes on: it can commit nothing, and its processes are started again."""
+    with ExitStack() as stack:
+        first = stack.enter_context(machine(url, killed=True, complaints=""))
+        second = stack.enter_context(machine(url, complaints="taken over"))
+        wait_until(lambda: sorted(served(url).values()) == [2, 2])
+        client = stack.enter_context(HullClient(first.address, retries=0))
+        assert apply_all(client, 1) == [1] * len(NAMES)
+        frozen = processes(second.process.pid)["worker-0"]
+        os.kill(frozen, signal.SIGSTOP)
+        try:
+            assert apply_all(client, 2) == [2] * len(NAMES)
+            assert len(served(url)) == 1
+        finally:
+            os.kill(frozen, signal.SIGCONT)
+        wait_until(lambda: sorted(served(url).values()) == [2, 2])  # it was started again, and has its share
+        other = stack.enter_context(HullClient(second.address, retries=100))
+        first.process.kill()
+        assert apply_all(other, 3) == [3] * len(NAMES)
+        assert all(other.verify(name).equal for name in NAMES)
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_operators_see_who_serves_what_and_move_it(url: str) -> None:
+    with machine(url) as first, machine(url) as second, HullClient(first.address, retries=0) as client:
+        wait_until(lambda: sorted(served(url).values()) == [2, 2])
+        one, other = sorted(served(url))
+        shown = dynhull("cluster", "status", "--journal", url).stdout
+        assert shown.startswith("4 partitions\n")
+        assert f"{one}  serves  2: " in shown
+        assert dynhull("cluster", "move", "0", one, "--journal", url).exit_code == 0
+        assert dynhull("cluster", "move", "1", one, "--journal", url).exit_code == 0
+        owner = "SELECT DISTINCT worker FROM owners WHERE partition < 2 AND until > '-infinity' AND address <> ''"
+        wait_until(lambda: query(url, owner) == [(one,)])
+        assert f"partition 0 is to be on {one}" in dynhull("cluster", "status", "--journal", url).stdout
+        assert dynhull("cluster", "move", "0", "anywhere", "--journal", url).exit_code == 0
+        assert dynhull("cluster", "drain", one, "--journal", url).exit_code == 0
+        wait_until(lambda: served(url) == {other: 4})
+        assert f"{one}  gives up its partitions  0: -" in dynhull("cluster", "status", "--journal", url).stdout
+        assert apply_all(client, 1) == [1] * len(NAMES)
+        refused = dynhull("cluster", "drain", "nobody", "--journal", url)
+        assert refused.exit_code == 2
+        assert f"no worker of the cluster has this name; there are {one}, {other}" in refused.stderr
+        refused = dynhull("cluster", "move", "4", one, "--journal", url)
+        assert "PARTITION is 4: there are 4, from 0 to 3" in refused.stderr
+        assert second.process.poll() is None
+
+
+@pytest.fixture(scope="module")
+def alone(postgres: PostgreSQL) -> Iterator[tuple[str, str]]:
+    """The address of a cluster of one machine, and its database."""
+    url = postgres.new_database()
+    with machine(url) as server:
+        yield server.address, url
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_names_apart_are_refused_wherever_they_are(alone: tuple[str, str]) -> None:
+    """By their partitions, not by who serves them: otherwise a request would succeed today and fail tomorrow."""
+    address, url = alone
+    with HullClient(address) as client:
+        apply_all(client, 1)
+        assert len(served(url)) == 1
+        apart = next(name for name in NAMES if worker_of(name, 4) != worker_of(NAMES[0], 4))
+        with pytest.raises(HullUnsuitableError) as refused:
+            client.transfer({NAMES[0]: Batch(insert=[[5, 5]]), apart: Batch(delete=[[1, 1]])})
+        assert refused.value.reason == "HULLS_APART"
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_only_gateways_may_call_workers(alone: tuple[str, str]) -> None:
+    host, port, frames = query(alone[1], "SELECT address FROM owners WHERE partition = 0")[0][0].split()
+    said = (("dynhull-owner", "me"), ("dynhull-token-hash", "gateway"))
+    with grpc.insecure_channel(f"{host}:{port}") as channel:
+        for proof in ((), (("dynhull-gateway-proof", "0/guess"),)):
+            with pytest.raises(grpc.RpcError) as refused:
+                HullServiceStub(channel).ListHulls(pb.ListHullsRequest(), metadata=said + proof, timeout=PATIENCE)
+            assert refused.value.code() == grpc.StatusCode.UNAVAILABLE
+            assert "this worker does not own the partition" in refused.value.details()
+    wrong = b"0/guess"
+    with socket.create_connection((host, int(frames))) as connection:
+        connection.sendall(pack("<IIB", len(wrong), 0, 4) + wrong)
+        assert connection.recv(1) == b"", "the connection is closed"
+
+
+REFUSED = {
+    "without a database": (("--cluster",), "--cluster needs --journal: the servers share a database"),
+    "for other machines without TLS": (
+        ("--cluster", "--journal", "postgresql://x/y", "--cluster-host", "10.0.0.1"),
+        "--cluster-host 10.0.0.1 can be reached by other machines: give --cluster-ca, or --insecure",
+    ),
+    "with a certificate of nobody": (
+        ("--cluster", "--journal", "postgresql://x/y", "--cluster-ca", "ca.pem"),
+        "--cluster-ca needs --tls-cert and --tls-key",
+    ),
+}
+
+
+@pytest.mark.parametrize(("options", "words"), REFUSED.values(), ids=REFUSED)
+def test_what_makes_no_cluster_is_refused(options: tuple[str, ...], words: str) -> None:
+    refused = dynhull("config", *options)
+    assert refused.exit_code == 2
+    assert words in refused.stderr

@@ -1,0 +1,170 @@
+"""Torture of a cluster: two real servers that share a real PostgreSQL; each of them, and what is between them, fails.
+
+    python tests/robustness/cluster/machines_torture.py --faults 100
+
+Clients, models and promises are those of tests/robustness/server/torture.py, the faults of PostgreSQL and of the
+network to it those of postgres_torture.py. The other faults:
+
+* a worker is killed, or stopped until its partitions are taken over, and then goes on
+* a gateway is killed
+* a machine with its worker and its gateway is killed, or stopped as an operator does it, and started again
+* partitions are moved by hand
+"""
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[1] / "server"))
+sys.path.append(str(Path(__file__).parents[2] / "support"))
+sys.path.append(str(Path(__file__).parent))
+import postgres_torture
+import torture
+from cluster import processes
+from patience import PATIENCE, wait_until
+from postgresql import query
+from promises import require
+from server_process import run as run_command
+
+PARTITIONS = 4
+OPTIONS = ("--cluster", "--partitions", str(PARTITIONS), "--grace", "10")
+SERVED = "SELECT worker FROM owners WHERE until > '-infinity' AND address <> ''"
+
+
+class Torture(postgres_torture.Torture):
+    """Two servers; the clients use one of them, by turns."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self._other: torture.Server | None = None
+        super().__init__(folder, seed, OPTIONS)
+        self._other = torture.Server(folder, OPTIONS, self._journal)
+        self._other.start()
+        self._balanced()
+
+    def _machines(self) -> list[torture.Server]:
+        return [self.server] if self._other is None else [self.server, self._other]
+
+    def _balanced(self) -> None:
+        """Wait until both machines serve half of the partitions."""
+
+        def is_balanced() -> bool:
+            workers = [worker for (worker,) in query(self._url, SERVED)]
+            return len(workers) == PARTITIONS and {workers.count(each) for each in workers} == {PARTITIONS // 2}
+
+        wait_until(is_balanced)
+
+    def round(self, fault: str) -> None:
+        super().round(fault)
+        if self._random.random() < 0.5:
+            self._turn()
+
+    def _turn(self) -> None:
+        """Clients go to the other machine."""
+        self.server, self._other = self._other, self.server
+        self._proxy.server = self.server.address
+        self._proxy.cut()
+
+    def _one_of(self, kind: str) -> int:
+        found = [each for machine in self._machines() for each in sorted(processes(machine.process.pid).items())]
+        return self._random.choice([number for name, number in found if name.startswith(kind)])
+
+    def _zombie(self) -> None:
+        """A worker that is stopped until it has lost its partitions, and goes on while the others serve them."""
+        self._balanced()
+        worker = self._one_of("worker")
+        os.kill(worker, signal.SIGSTOP)
+        try:
+            wait_until(lambda: len({each for (each,) in query(self._url, SERVED)}) == 1)
+            time.sleep(self._random.uniform(0.1, 1.0))
+        finally:
+            os.kill(worker, signal.SIGCONT)
+        wait_until(lambda: worker not in self._workers())
+        require("taken over partition" in self.server.said(), self.server.said())
+
+    def _workers(self) -> set[int]:
+        return {
+            number
+            for machine in self._machines()
+            for name, number in processes(machine.process.pid).items()
+            if name.startswith("worker")
+        }
+
+    def _kill_machine(self) -> None:
+        """The machine of the clients, or the other one, and its start later on."""
+        if self._random.random() < 0.5:
+            self._turn()
+        self._other.kill()
+        time.sleep(self._random.uniform(0.0, 6.0))
+        self._other.start()
+
+    def _stop_machine(self) -> None:
+        """As systemd does it: its partitions move first."""
+        self._other.process.terminate()
+        require(self._other.process.wait(PATIENCE) == 0, self._other.said())
+        self._other.start()
+
+    def _move(self) -> None:
+        """Every partition to one worker, and then anywhere."""
+        worker = self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0]
+        for partition in range(PARTITIONS):
+            self._command("cluster", "move", str(partition), worker, "--journal", self._url)
+        time.sleep(self._random.uniform(0.2, 2.0))
+        for partition in range(PARTITIONS):
+            self._command("cluster", "move", str(partition), "anywhere", "--journal", self._url)
+
+    def _command(self, *words: str) -> None:
+        done = run_command(*words)
+        named = "no worker of the cluster has this name" in done.stderr  # it has ended meanwhile
+        require(done.returncode == 0 or named, f"dynhull {' '.join(words)}: {done.stderr}")
+
+    def finish(self) -> None:
+        self.shared.over.set()
+        self.shared.gate.set()
+        self._channel.close()
+        self._proxy.close()
+        for machine in self._machines():
+            machine.kill()
+        self._wire.close()
+        self._database.stop()
+
+
+KINDS = [
+    "zombie",
+    "kill_machine",
+    "crash",
+    "kill_worker",
+    "move",
+    "terminate",
+    "stop_machine",
+    "cut",
+    "kill_gateway",
+    "zombie",
+    "hold",
+    "kill_worker",
+    "freeze",
+    "kill_machine",
+    "full_disk",
+]
+
+
+def run(folder: Path, faults: int, seed: int) -> str:
+    """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
+    tortured = Torture(folder, seed)
+    tortured.rounds(KINDS, faults)
+    return tortured.counts()
+
+
+def main() -> None:
+    options = torture.arguments("Kill, stop and cut off the machines of a cluster while a model watches.").parse_args()
+    torture.on_small_disk(
+        __file__,
+        postgres_torture.DISK,
+        lambda folder: run(folder, options.faults, options.seed),
+        mounted=options.mounted,
+    )
+
+
+if __name__ == "__main__":
+    main()
