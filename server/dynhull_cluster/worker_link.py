@@ -116,7 +116,8 @@ class WorkerLink:
                 await self.arrive()
                 return await self._ask(method, call, message)
             except WorkerAwayError:
-                raise
+                if loop.time() > until:
+                    raise
             except RelayedError as error:
                 if loop.time() > until or not may_repeat(method, message, error.status):
                     raise
