@@ -55,11 +55,11 @@ def test_servers_are_started_and_started_again_and_end_with_their_ray(postgres: 
             wait_until(lambda: len(query(url, served)) == 2)
             with HullClient(said[0].split()[-1], retries=0) as client:
                 assert client.apply("a", insert=[[1, 2]], producer="p", sequence=1).revision == 1
-            first = servers(launcher.pid)
+            first, before = servers(launcher.pid), set(query(url, served))
             assert len(first) == 2
             os.kill(first[1], signal.SIGKILL)  # its actor ends with it, and Ray makes another
             wait_until(lambda: len(after := servers(launcher.pid)) == 2 and first[1] not in after)
-            wait_until(lambda: len(query(url, served)) == 2)
+            wait_until(lambda: len(now := set(query(url, served))) == 2 and now != before)
             assert all(processes(each) for each in servers(launcher.pid))
         finally:
             launcher.terminate()

@@ -37,7 +37,7 @@ PANELS = {
     ),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Fences": ("fences", "relay"),
-    "Server": ("serve", "config", "token", "gateway", "dashboard", "bench"),
+    "Server": ("serve", "cluster", "config", "token", "gateway", "dashboard", "bench"),
     "Data folders": ("backup", "restore", "check", "export", "move"),
     "Getting to know dynhull": ("demo", "explain"),
 }
