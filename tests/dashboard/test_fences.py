@@ -189,6 +189,7 @@ def test_fences_are_picked_and_let_go_and_watched_once_for_all(
             pick(page, yard)
             wait_for_inside(page, yard, {"in": [1, 2]})
             expect(page.get_by_role("heading", name="Events")).to_be_visible()
+            expect(page.get_by_role("button", name=f"Remove {fleet}", exact=True)).to_be_visible()
         # One of the fence, and one of the hull that came with it.
         wait_until(lambda: scrape(server[1])["dynhull_watchers"] == 2)
         for page in (one, two):
