@@ -33,6 +33,7 @@ class Upstream:
     def __init__(self, call: "grpc.aio.StreamStreamCall[bytes, bytes]") -> None:
         self._call = call
         self._severed = False
+        self._sending = 0
         self._waiting: set[asyncio.Task[Any]] = set()
         self._interrupted: set[asyncio.Task[Any]] = set()
         self._responses = aiter(call)
@@ -41,14 +42,14 @@ class Upstream:
 
     async def write(self, message: bytes) -> bool:
         """Send a request. Returns False if the call has ended: `read` says why."""
-        with ENDED, self._unless_severed():
+        with ENDED, self._sends():
             await self._call.write(message)
             return True
         return False
 
     async def done_writing(self) -> None:
         """Say that there are no more requests."""
-        with ENDED, self._unless_severed():
+        with ENDED, self._sends():
             await self._call.done_writing()
 
     async def read(self) -> bytes | None:
@@ -66,6 +67,11 @@ class Upstream:
                 return None
             raise RelayedError(status) from None
 
+    @property
+    def sending(self) -> bool:
+        """Whether a request has not been sent yet."""
+        return self._sending > 0
+
     def sever(self) -> None:
         """End the call as if the connection were lost: whoever would answer it is not to be heard any more."""
         self._severed = True
@@ -73,6 +79,15 @@ class Upstream:
             self._interrupted.add(task)
             task.cancel()
         self._call.cancel()
+
+    @contextmanager
+    def _sends(self) -> Iterator[None]:
+        self._sending += 1
+        try:
+            with self._unless_severed():
+                yield
+        finally:
+            self._sending -= 1
 
     @contextmanager
     def _unless_severed(self) -> Iterator[None]:

@@ -67,6 +67,10 @@ class WorkerLink:
             except OSError:
                 await asyncio.sleep(LOOK_SECONDS)
                 continue
+            # The worker that these were being sent to has ended. gRPC may not notice, and have them wait for ever.
+            for upstream in list(self._upstreams):
+                if upstream.sending:
+                    upstream.sever()
             try:
                 async with asyncio.TaskGroup() as tasks:
                     watches = [tasks.create_task(self._watch(service)) for service in self.health]
