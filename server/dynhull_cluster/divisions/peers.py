@@ -46,11 +46,9 @@ class Peers:
         return await asyncio.shield(connecting)
 
     async def _connect(self, worker: int) -> AskingFrames:
-        loop = asyncio.get_running_loop()
-        lost: asyncio.Future[None] = loop.create_future()
+        lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         lost.add_done_callback(lambda _: self._forget(worker))
-        _, frames = await loop.create_unix_connection(partial(AskingFrames, lost), str(self._sockets.frames(worker)))
-        return frames
+        return await self._sockets.connect(worker, partial(AskingFrames, lost))
 
     def _forget(self, worker: int, which: Any = None) -> None:
         if which is None or self._connections.get(worker) is which:

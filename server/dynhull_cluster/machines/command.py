@@ -72,7 +72,7 @@ def scale(
         list[str] | None, typer.Argument(help="Options of `dynhull serve` for them, after `--`; --port 0 by default.")
     ] = None,
 ) -> None:
-    """Have Ray run so many servers of the cluster, and restart those that die, on other nodes if need be.
+    """Have Ray run that number of servers of the cluster, and restart those that die, on other nodes if need be.
 
     With RAY_ADDRESS, the servers go on after this command, on the nodes of that Ray. Without it, this command starts
     Ray itself, and all ends with it.
