@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 from weakref import WeakSet
@@ -50,7 +51,9 @@ class WorkerLink:
         self._frames: AskingFrames | None = None
         self._upstreams: WeakSet[Upstream] = WeakSet()
         self._arrived = asyncio.Event()
-        ways.when_moved(number, self._sever)
+        self._elsewhere = asyncio.Event()
+        self._again = asyncio.Event()
+        ways.when_moved(number, self._follow)
 
     @property
     def present(self) -> bool:
@@ -62,10 +65,11 @@ class WorkerLink:
         loop = asyncio.get_running_loop()
         while True:
             lost: asyncio.Future[None] = loop.create_future()
+            self._elsewhere.clear()
             try:
                 frames = await self._ways.connect(self.number, partial(AskingFrames, lost))
             except OSError:
-                await asyncio.sleep(LOOK_SECONDS)
+                await _until(self._elsewhere)
                 continue
             # The worker that these were being sent to has ended. gRPC may not notice, and have them wait for ever.
             for upstream in list(self._upstreams):
@@ -76,6 +80,8 @@ class WorkerLink:
                     watches = [tasks.create_task(self._watch(service)) for service in self.health]
                     self._frames = frames
                     self._arrived.set()
+                    self._again.set()
+                    self._again = asyncio.Event()
                     self._changed()
                     await lost
                     for each in watches:
@@ -125,7 +131,7 @@ class WorkerLink:
             except RelayedError as error:
                 if loop.time() > until or not may_repeat(method, message, error.status):
                     raise
-            await asyncio.sleep(LOOK_SECONDS)
+            await _until(self._again)
 
     async def _ask(self, method: str, call: Call, message: bytes) -> bytes:
         frames = self._present()
@@ -171,6 +177,11 @@ class WorkerLink:
     def _channel(self) -> Any:
         return self._ways.channel(self.number)
 
+    def _follow(self) -> None:
+        """The worker is elsewhere."""
+        self._elsewhere.set()
+        self._sever()
+
     def _sever(self) -> None:
         """Hear nothing more from where the worker was."""
         if self._frames is not None:
@@ -195,6 +206,13 @@ class WorkerLink:
             finally:
                 responses.cancel()
             await asyncio.sleep(LOOK_SECONDS)
+
+
+async def _until(event: asyncio.Event) -> None:
+    """Wait for an event, but not for long."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(LOOK_SECONDS):
+            await event.wait()
 
 
 class AskingFrames(Frames):

@@ -45,7 +45,7 @@ from .state.fences.faults import FenceFault
 from .state.limits import FenceLimits, Limits
 from .storage.durability import Durability
 from .storage.memory import MemoryStorage
-from .storage.port import Storage, StorageError
+from .storage.port import FollowedStorage, Progress, Storage, StorageError
 from .storage.sqlite.storage import SQLiteStorage
 from .storage.worker_folders import require_one_process
 
@@ -130,7 +130,21 @@ class Server:
         self.address = ""
         self.metrics_url = ""
 
-    async def start(self, progress: Callable[[int, int], None] = _unseen) -> None:
+    async def read_ahead(self, storage: FollowedStorage, progress: Progress = _unseen) -> None:
+        """Load the hulls while another server owns them; again to load what has come since. `start` is then short.
+
+        Args:
+            storage: the storage of this server.
+            progress: called with the amount read so far and the total; what it raises ends this.
+
+        Raises:
+            RuntimeError, OSError: the address is in use, or does not belong to this machine.
+            StorageError: the stored data cannot be used.
+        """
+        await self._listen()
+        await self._engine.read_ahead(storage, progress)
+
+    async def start(self, progress: Progress = _unseen) -> None:
         """Listen, load the stored hulls, then serve. Until then calls get UNAVAILABLE, and health is NOT_SERVING.
 
         Args:
@@ -140,6 +154,30 @@ class Server:
             RuntimeError: the address is in use, or does not belong to this machine.
             StorageError: the stored data cannot be used.
         """
+        await self._listen()
+        for note in await self._engine.start(progress):
+            log.warning("lost", extra={"what": note})
+        self._calls.ready()
+        self._health.set(SERVING, SCRUB)
+        self._serving = True
+        self._set_health(self._supervisor.reason)
+        if self._tokens is not None:
+            self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
+            self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
+        if not self._settings.in_memory:
+            interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
+            self._engine.keep_house(self._settings.snapshot_points, interval)
+        if self._settings.journal is not None:
+            self._supervisor.every(ENTITLED_SECONDS, "lease", self._look_at_lease)
+        if self._settings.scrub_cpu:
+            scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared, self._followed)
+            self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
+        log.info("serving", extra={"address": self.address})
+
+    async def _listen(self) -> None:
+        """Listen, if that has not been done."""
+        if self.address:
+            return
         service = HullService(
             self._engine,
             self._metrics,
@@ -165,24 +203,6 @@ class Server:
         self._serve_metrics()
         self._health.set(NOT_SERVING, "", *SERVICES)
         await self._server.start()
-        for note in await self._engine.start(progress):
-            log.warning("lost", extra={"what": note})
-        self._calls.ready()
-        self._health.set(SERVING, SCRUB)
-        self._serving = True
-        self._set_health(self._supervisor.reason)
-        if self._tokens is not None:
-            self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
-            self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
-        if not self._settings.in_memory:
-            interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
-            self._engine.keep_house(self._settings.snapshot_points, interval)
-        if self._settings.journal is not None:
-            self._supervisor.every(ENTITLED_SECONDS, "lease", self._look_at_lease)
-        if self._settings.scrub_cpu:
-            scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared, self._followed)
-            self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
-        log.info("serving", extra={"address": self.address})
 
     async def drain(self, last_statuses: float = LAST_STATUSES) -> None:
         """Refuse new calls, end waiting ones, and give the others the configured grace period to finish.

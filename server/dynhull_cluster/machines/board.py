@@ -17,12 +17,14 @@ import psycopg
 from dynhull_server.state.errors import words
 from dynhull_server.storage.port import StorageError
 
-from ..postgres.database import Connection, Database, as_storage_errors
-from ..postgres.ownership import CHANNEL, LEASE
+from ..postgres.database import Connection, Database, as_storage_errors, storage_error
+from ..postgres.ownership import CHANNEL, LEASE, is_known_dead, this_process
 from ..postgres.schema import hold, partitions_of, prepare
 
 # Seconds between looks at the tables, and until a look that gets no answer is given up.
 LOOK, PATIENCE = 0.5, 10.0
+# Seconds until something that is to be written is given up.
+SAY_SECONDS = 1.0
 # Seconds after which a worker that does not renew its row is one no longer.
 PRESENT = 5
 
@@ -30,19 +32,27 @@ log = logging.getLogger(__name__)
 
 TABLES = (
     "CREATE TABLE IF NOT EXISTS cluster (secret text NOT NULL)",
-    "CREATE TABLE IF NOT EXISTS workers (worker text PRIMARY KEY, draining boolean NOT NULL, seen timestamptz)",
+    "CREATE TABLE IF NOT EXISTS workers (worker text PRIMARY KEY, draining boolean, process text, seen timestamptz)",
+    "CREATE TABLE IF NOT EXISTS heirs (partition integer PRIMARY KEY, worker text, process text, epoch bigint)",
     "CREATE TABLE IF NOT EXISTS wishes (partition integer PRIMARY KEY, worker text NOT NULL)",
 )
 OWNERS = b"SELECT partition, epoch, worker, process, address, until::text, until = '-infinity' FROM owners"
 WORKERS = (
-    f"SELECT worker, draining FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
+    f"SELECT worker, draining, process FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
     "ORDER BY worker"
 ).encode()
 WISHES = b"SELECT partition, worker FROM wishes"
+HEIRS = b"SELECT partition, worker, process, epoch FROM heirs"
 RENEW = (
-    b"INSERT INTO workers VALUES (%s, %s, clock_timestamp()) ON CONFLICT (worker) "
-    b"DO UPDATE SET seen = clock_timestamp(), draining = workers.draining OR excluded.draining"
+    b"INSERT INTO workers VALUES (%s, %s, %s, clock_timestamp()) ON CONFLICT (worker) DO UPDATE SET "
+    b"seen = clock_timestamp(), process = excluded.process, draining = workers.draining OR excluded.draining"
 )
+OFFER = (
+    b"INSERT INTO heirs VALUES (%s, %s, %s, %s) ON CONFLICT (partition) "
+    b"DO UPDATE SET worker = excluded.worker, process = excluded.process, epoch = excluded.epoch"
+)
+WITHDRAW = b"DELETE FROM heirs WHERE partition = %s AND worker = %s AND process = %s"
+ALL = OWNERS, WORKERS, WISHES, HEIRS
 GONE = (
     f"DELETE FROM workers WHERE seen < clock_timestamp() - interval '{20 * PRESENT}s'"  # noqa: S608  (ours)
 ).encode()
@@ -59,18 +69,35 @@ class Owner(NamedTuple):
     free: bool
 
 
+class Worker(NamedTuple):
+    """A worker that is present, and whether it is to give up its partitions."""
+
+    draining: bool
+    process: str
+
+
+class Heir(NamedTuple):
+    """A worker that has read what an owner has, up to the last moment, and takes the partition once that lets go."""
+
+    worker: str
+    process: str
+    epoch: int
+
+
 class Tables(NamedTuple):
     """The tables at one moment.
 
     Attributes:
         owners: the rows of the owners, by partition; a partition that nobody has had yet has none.
-        workers: whether each of the workers that are present is to give up its partitions.
+        workers: the workers that are present.
         wishes: the workers that are to have some of the partitions.
+        heirs: the workers that are ready to take some of the partitions.
     """
 
     owners: dict[int, Owner]
-    workers: dict[str, bool]
+    workers: dict[str, Worker]
     wishes: dict[int, str]
+    heirs: dict[int, Heir]
 
 
 class Cluster(NamedTuple):
@@ -107,8 +134,7 @@ def join(database: Database, partitions: int) -> Cluster:
 
 def read(connection: Connection) -> Tables:
     """The tables now."""
-    owners, workers, wishes = (connection.execute(sql).fetchall() for sql in (OWNERS, WORKERS, WISHES))
-    return _tables(owners, workers, wishes)
+    return _tables([connection.execute(sql).fetchall() for sql in ALL])
 
 
 class Board:
@@ -125,12 +151,13 @@ class Board:
     """
 
     def __init__(self, database: Database, changed: Callable[[Tables], None], worker: str = "") -> None:
-        self.tables = Tables({}, {}, {})
+        self.tables = Tables({}, {}, {}, {})
         self.leaving = False
         self._database = database
         self._changed = changed
         self._worker = worker
         self._since: dict[int, tuple[str, float]] = {}
+        self._renewed = 0.0, False
 
     def lapsed(self, partition: int) -> str | None:
         """The lease of an owner that has not been renewed for so long that it has ended; None of another."""
@@ -139,6 +166,25 @@ class Board:
             return None
         until, since = self._since[partition]
         return until if time.monotonic() > since + LEASE else None
+
+    def forsaken(self, partition: int, worker: str) -> bool:
+        """Whether nobody has a partition, and the worker that should take it has died, or does not do it."""
+        owner = self.tables.owners.get(partition)
+        if owner is None:
+            return False
+        if time.monotonic() > self._since[partition][1] + (LEASE if owner.free else 2 * LEASE):
+            return True
+        there = self.tables.workers.get(worker)
+        return owner.free and there is not None and is_known_dead(there.process)
+
+    def heir(self, partition: int) -> str:
+        """The worker that has read what the owner has, or had when it let go; empty for none."""
+        owner, heir = self.tables.owners.get(partition), self.tables.heirs.get(partition)
+        if owner is None or heir is None or heir.epoch != owner.epoch:
+            return ""
+        there = self.tables.workers.get(heir.worker)
+        known = there is not None and there.process == heir.process and not is_known_dead(heir.process)
+        return heir.worker if known else ""
 
     def holders(self, partitions: int) -> list[str]:
         """Which worker has each partition, as far as is known; empty for none."""
@@ -168,20 +214,43 @@ class Board:
                 away = True
                 await asyncio.sleep(LOOK)
 
+    async def offer(self, partition: int, epoch: int) -> None:
+        """Say that the worker has read what the owner of that epoch has, and waits for it to let go.
+
+        Raises:
+            StorageError, OSError: the database cannot be used.
+        """
+        await self._say(OFFER, [partition, self._worker, this_process(), epoch])
+
+    async def withdraw(self, partition: int) -> None:
+        """Say that the worker does not wait any more."""
+        await self._say(WITHDRAW, [partition, self._worker, this_process()])
+
     async def leave(self) -> None:
         """Remove the row of the worker; if the database is away, it expires."""
         try:
-            async with asyncio.timeout(1.0), self._connected() as connection:
-                await connection.execute("DELETE FROM workers WHERE worker = %s", [self._worker])
-                await connection.execute(f"NOTIFY {CHANNEL}".encode())
-        except (StorageError, psycopg.Error, OSError, TimeoutError) as error:
+            await self._say(b"DELETE FROM workers WHERE worker = %s", [self._worker])
+        except (StorageError, OSError) as error:
             log.warning("the worker has not signed off", extra={"reason": words(error)})
 
+    async def _say(self, sql: bytes, values: list[object]) -> None:
+        """Write into the tables, and have all processes look at them."""
+        try:
+            async with asyncio.timeout(SAY_SECONDS), self._connected() as connection:
+                await connection.execute(sql, values)
+                await connection.execute(f"NOTIFY {CHANNEL}".encode())
+        except psycopg.Error as error:
+            raise storage_error(error) from error
+
     async def _look(self, connection: "psycopg.AsyncConnection[tuple[Any, ...]]") -> None:
-        if self._worker:
-            await connection.execute(RENEW, [self._worker, self.leaving])
-        rows = [await (await connection.execute(sql)).fetchall() for sql in (OWNERS, WORKERS, WISHES)]
-        self.tables = _tables(*rows)
+        now = time.monotonic()
+        renewed, leaving = self._renewed
+        if self._worker and (now >= renewed + LOOK or leaving != self.leaving):
+            await connection.execute(RENEW, [self._worker, self.leaving, this_process()])
+            self._renewed = now, self.leaving
+        async with connection.pipeline():
+            cursors = [await connection.execute(sql) for sql in ALL]
+        self.tables = _tables([await each.fetchall() for each in cursors])
         now = time.monotonic()
         for partition, owner in self.tables.owners.items():
             if self._since.get(partition, ("", 0.0))[0] != owner.until:
@@ -198,5 +267,11 @@ class Board:
             await connection.close()
 
 
-def _tables(owners: list[Any], workers: list[Any], wishes: list[Any]) -> Tables:
-    return Tables({partition: Owner(*rest) for partition, *rest in owners}, dict(workers), dict(wishes))
+def _tables(rows: list[list[Any]]) -> Tables:
+    owners, workers, wishes, heirs = rows
+    return Tables(
+        {partition: Owner(*rest) for partition, *rest in owners},
+        {worker: Worker(*rest) for worker, *rest in workers},
+        dict(wishes),
+        {partition: Heir(*rest) for partition, *rest in heirs},
+    )

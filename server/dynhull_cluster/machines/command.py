@@ -31,7 +31,8 @@ def status(journal: JOURNAL) -> None:
     served = Counter(owner.worker for owner in tables.owners.values() if not owner.free)
     typer.echo(f"{count} partitions")
     for worker in sorted({*tables.workers, *served}):
-        state = {None: "away", False: "serves", True: "gives up its partitions"}[tables.workers.get(worker)]
+        present = tables.workers.get(worker)
+        state = "away" if present is None else "gives up its partitions" if present.draining else "serves"
         own = [str(each) for each, owner in sorted(tables.owners.items()) if owner.worker == worker and not owner.free]
         typer.echo(f"{worker}  {state}  {len(own)}: {', '.join(own) or '-'}")
     free = [str(each) for each in range(count) if (owner := tables.owners.get(each)) is None or owner.free]

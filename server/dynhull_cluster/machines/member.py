@@ -1,7 +1,12 @@
 """A worker of a cluster: a process that owns some of the partitions, each with a server and ports of its own.
 
-It looks at the tables, takes what it should have and is free, and lets go of what another worker should have. A
-partition is moved only while all of them are served, so that one at a time is away.
+It looks at the tables, takes what it should have and is free, and lets go of what another worker should have, once that
+has read it. A partition is moved only while all of them are served, so that one at a time is away.
+
+A move, from both ends: the worker that should have the partition reads it while the other one serves it (`ahead`), and
+says so in the tables. The other one then lets go, when its last commit is complete, and the first takes the partition
+and reads what has come since. If either dies or fails in between, the tables say so, and the partition is free for the
+other one or a third: whoever takes it raises the epoch, so that there are never two owners.
 """
 
 import asyncio
@@ -20,19 +25,22 @@ from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
 from dynhull_server.settings import Settings
 from dynhull_server.state.errors import words
-from dynhull_server.storage.port import StorageError, TakenOverError
+from dynhull_server.storage.port import TakenOverError
 
 from ..journal import database_of
 from ..metrics import merged
 from ..postgres.ownership import is_known_dead
 from ..postgres.storage import PostgresStorage
 from ..worker import own_settings
+from .ahead import FAILURES, Ahead
 from .board import Board, Cluster, Tables, join
 from .claims import shares
 from .entrance import PartitionEntrance
 
 # Seconds before a partition that could not be taken is tried again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
+# What may fail.
+READ_AHEAD, TAKE = "a partition cannot be read ahead", "a partition cannot be served"
 # Seconds that gateways get to receive what their calls have ended with, before another worker may have the partition.
 LAST_STATUSES = 0.03
 
@@ -60,7 +68,8 @@ class Member:
         self._cluster = Cluster(0, "")
         self._served: dict[int, Server] = {}
         self._busy: dict[int, asyncio.Task[None]] = {}
-        self._failed: dict[int, tuple[float, float]] = {}
+        self._ahead: dict[int, Ahead] = {}
+        self._failed: dict[tuple[str, int], tuple[float, float]] = {}
         self._looked = asyncio.Event()
         self._settled = asyncio.Event()
         self.address = settings.cluster_host
@@ -93,6 +102,7 @@ class Member:
             except TimeoutError:
                 log.warning("partitions are left behind", extra={"partitions": len(self._served)})
         await self._supervisor.stop()
+        await asyncio.gather(*(each.drop() for each in self._ahead.values()))
         await asyncio.gather(*self._busy.values(), return_exceptions=True)
         await asyncio.gather(*(server.drain() for server in self._served.values()))
         if self._looked.is_set():
@@ -100,29 +110,47 @@ class Member:
 
     def _others(self) -> list[str]:
         """The other workers that can take partitions."""
-        return [each for each, draining in self._board.tables.workers.items() if not draining and each != self._worker]
+        workers = self._board.tables.workers
+        return [name for name, each in workers.items() if not each.draining and name != self._worker]
 
     def _decide(self, tables: Tables) -> None:
-        """Begin to take and to let go, after each look at the tables."""
+        """Begin to take, to read ahead and to let go, after each look at the tables."""
         count = self._cluster.partitions
         holders = self._board.holders(count)
-        leaving = self._board.leaving or tables.workers.get(self._worker, False)
+        own = tables.workers.get(self._worker)
+        leaving = self._board.leaving or (own is not None and own.draining)
         workers = self._others() + ([] if leaving else [self._worker])
-        wanted = shares(holders, workers, tables.wishes)
+        expected = [holder or self._board.heir(number) for number, holder in enumerate(holders)]
+        wanted = shares(expected, workers, tables.wishes)
         for number in range(count):
-            if wanted[number] == self._worker and number not in self._served and self._is_free(number):
-                self._begin(number, self._take(number))
+            if self._board.forsaken(number, wanted[number]) and len(workers) > 1:
+                left = [each for each in workers if each != wanted[number]]
+                wanted[number] = shares(expected, left, tables.wishes)[number]
+        for number, ahead in self._ahead.items():
+            if wanted[number] != self._worker:
+                ahead.give_up()
+        for number in range(count):
+            if wanted[number] != self._worker or number in self._served or number in self._busy:
+                continue
+            if self._is_free(number):
+                if self._may_try(TAKE, number):
+                    self._begin(number, self._take(number))
+            elif not self._ahead and holders[number] != self._worker and self._may_try(READ_AHEAD, number):
+                self._read_ahead(number)
         if all(holders) and all(tables.owners[each].address for each in range(count)) and not self._busy:
             to_go = (each for each in self._served if wanted[each] not in ("", self._worker))
-            if (gone := next(to_go, None)) is not None:
+            ready = (each for each in to_go if self._board.heir(each) == wanted[each])
+            if (gone := next(ready, None)) is not None:
                 self._begin(gone, self._let_go(gone, wanted[gone]))
         self._looked.set()
         self._settled.set()
 
+    def _may_try(self, what: str, number: int) -> bool:
+        """Whether there is no reason to wait before something that has failed is tried again."""
+        return time.monotonic() >= self._failed.get((what, number), (0.0, 0.0))[0]
+
     def _is_free(self, number: int) -> bool:
-        """Whether a partition can be taken at once, and there is no reason to wait before it is tried again."""
-        if number in self._busy or time.monotonic() < self._failed.get(number, (0.0, 0.0))[0]:
-            return False
+        """Whether a partition can be taken at once."""
         owner = self._board.tables.owners.get(number)
         free = owner is None or owner.free or self._board.lapsed(number) is not None
         return free or (owner is not None and is_known_dead(owner.process))
@@ -133,12 +161,36 @@ class Member:
         def ended(_: "asyncio.Task[None]") -> None:
             del self._busy[number]
             self._settled.set()
+            self._require_well(number, task)
 
         task.add_done_callback(ended)
 
-    async def _take(self, number: int) -> None:
-        """Own a partition, and serve it; if that fails, others may, and this worker tries again later."""
-        begun = time.monotonic()
+    def _read_ahead(self, number: int) -> None:
+        ahead = self._ahead[number] = Ahead(number, *self._server(number), self._board)
+        log.info("a partition is read ahead", extra={"partition": number})
+
+        def ended(_: "asyncio.Task[None]") -> None:
+            del self._ahead[number]
+            if ahead.failure is not None:
+                self._note_failure(READ_AHEAD, number, ahead.failure)
+            self._require_well(number, ahead.task)
+
+        ahead.task.add_done_callback(ended)
+
+    def _require_well(self, number: int, task: "asyncio.Task[None]") -> None:
+        """End the process if work has failed in a way that nobody has foreseen: its partition would not be served."""
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._supervisor.died(f"partition {number}", error)
+
+    def _note_failure(self, what: str, number: int, error: BaseException) -> None:
+        """Try it again later."""
+        _, pause = self._failed.get((what, number), (0.0, FIRST_PAUSE))
+        self._failed[what, number] = time.monotonic() + pause, min(2 * pause, LONGEST_PAUSE)
+        if isinstance(error, TakenOverError):
+            end_process(words(error))
+        log.error(what, extra={"partition": number, "reason": words(error)})
+
+    def _server(self, number: int) -> tuple[Server, PostgresStorage, PartitionEntrance]:
         entrance = PartitionEntrance(self._settings, number, self._cluster.secret)
         storage = PostgresStorage(
             self._database,
@@ -147,21 +199,27 @@ class Member:
             partition=number,
             partitions=self._cluster.partitions,
             worker=self._worker,
-            lapsed=self._board.lapsed(number),
         )
-        server = Server(own_settings(self._settings), entrance, storage)
+        return Server(own_settings(self._settings), entrance, storage), storage, entrance
+
+    async def _take(self, number: int) -> None:
+        """Own a partition, and serve it; if that fails, others may, and this worker tries again later."""
+        begun = time.monotonic()
+        ahead = self._ahead.get(number)
+        if ahead is None or not await ahead.finish():
+            server, storage, entrance = self._server(number)
+        else:
+            server, storage, entrance = ahead.server, ahead.storage, ahead.entrance
+        storage.lapsed = self._board.lapsed(number)
         try:
             await server.start()
             await asyncio.to_thread(storage.announce, entrance.address)
-        except (StorageError, OSError, RuntimeError) as error:
+        except FAILURES as error:
             await server.drain()
-            _, pause = self._failed.get(number, (0.0, FIRST_PAUSE))
-            self._failed[number] = time.monotonic() + pause, min(2 * pause, LONGEST_PAUSE)
-            if isinstance(error, TakenOverError):
-                end_process(words(error))
-            log.error("a partition cannot be served", extra={"partition": number, "reason": words(error)})
+            self._note_failure(TAKE, number, error)
             return
-        self._failed.pop(number, None)
+        for what in (READ_AHEAD, TAKE):
+            self._failed.pop((what, number), None)
         self._served[number] = server
         seconds = round(time.monotonic() - begun, 3)
         log.info("a partition is served", extra={"partition": number, "seconds": seconds})

@@ -130,6 +130,11 @@ class Ownership:
         """Whether the lease has not ended."""
         return _now() < self._until
 
+    def connect(self) -> None:
+        """Connect, so that `take` need not. Raises StorageError."""
+        with self._turn, self._working():
+            return
+
     def take(self, lapsed: str | None = None) -> None:
         """Own the partition: at once if nobody does, or a process that has ended; else when the lease has ended.
 

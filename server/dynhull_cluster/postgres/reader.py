@@ -1,6 +1,6 @@
 """Reading rows of a partition during commits."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -59,6 +59,13 @@ class PostgresReader:
         with as_storage_errors(), self._connection.cursor() as cursor:
             yield from cursor.stream(sql, [self._partition], binary=True)
 
+    def after(self, table: str, columns: str, place: int) -> Iterator[tuple[Any, ...]]:
+        """Some columns of the rows with greater numbers."""
+        key = COLUMNS[table][0]
+        sql = f"SELECT {columns} FROM {table} WHERE partition = %s AND {key} > %s ORDER BY {key}".encode()  # noqa: S608
+        with as_storage_errors(), self._connection.cursor() as cursor:
+            yield from cursor.stream(sql, [self._partition, place], binary=True)
+
     def some(self, table: str, columns: str, places: "array[int]") -> Iterator[tuple[Any, ...]]:
         """Some columns of some rows."""
         sql = (
@@ -82,19 +89,27 @@ class PostgresReader:
         return self._connection.execute(sql, [self._partition]).fetchall()
 
 
+class BegunReader(PostgresReader):
+    """A reader within a transaction that others have begun, and end."""
+
+    def begin(self) -> None:
+        """Read on as of the same moment."""
+
+
 class Readers:
     """Connections for reading. Some are kept; one that has failed is not used again.
 
     Args:
         connect: opens a connection; raises StorageError.
         partition: the partition.
+        idle: connections that there are.
     """
 
-    def __init__(self, connect: Callable[[], Connection], partition: int) -> None:
+    def __init__(self, connect: Callable[[], Connection], partition: int, idle: Sequence[Connection] = ()) -> None:
         self._connect = connect
         self._partition = partition
         self._turn = Lock()
-        self._idle: list[Connection] = []
+        self._idle = list(idle)
         self._closed = False
 
     @contextmanager

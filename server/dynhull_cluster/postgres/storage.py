@@ -36,8 +36,9 @@ from dynhull_server.storage.rows.tables import FORMAT, UnreadableError
 from dynhull_server.storage.rows.totals import COPIES
 
 from .database import Connection, Database, as_storage_errors, storage_error
+from .follower import Follower
 from .ownership import REQUIRE, Ownership, taken_over, writer_name
-from .reader import PostgresReader, Readers
+from .reader import BegunReader, PostgresReader, Readers
 from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of
 
 # With `off` commits survive the end of this process; a crash of PostgreSQL may lose those since the last `sync`.
@@ -67,6 +68,9 @@ class PostgresStorage(RowStorage):
         address: where callers reach this server, for others to see.
         worker: what others call this server.
         lapsed: the lease of an owner before, which this process has seen to end.
+
+    Attributes:
+        lapsed: the same; it may be set until `open`.
     """
 
     def __init__(
@@ -87,7 +91,9 @@ class PostgresStorage(RowStorage):
         self._partition = partition
         self._partitions = partitions
         self._owner = Ownership(database, partition, address, lost, worker)
-        self._lapsed = lapsed
+        self.lapsed = lapsed
+        self._follower: Follower | None = None
+        self._spare: Connection | None = None
         self._writer: Connection | None = None
         self._not_durable = False
         self._size = 0
@@ -98,40 +104,96 @@ class PostgresStorage(RowStorage):
         """Whether this server may answer reads: no other one owns the partition."""
         return self._owner.holds()
 
+    @property
+    def followed_epoch(self) -> int:
+        """The epoch of the owner that is followed; 0 before `follow`, and after `open`."""
+        return 0 if self._follower is None else self._follower.epoch
+
     def announce(self, address: str) -> None:
         """Say where callers reach this server. Raises TakenOverError, or StorageError."""
         self._owner.announce(address)
 
     # Opening and closing
 
+    def follow(self, progress: Progress) -> Contents:
+        """Read the partition while another server owns it, and later what has come since."""
+        if self._follower is None:
+            with ExitStack() as stack:
+                self._follower = Follower(self._prepared(), self._partition, self._place)
+                stack.callback(self._follower.close)
+                stack.callback(self._owner.release)
+                self._owner.connect()
+                self._spare = self._connect_writer(f"dynhull ahead {self._partition}")
+                stack.callback(self._spare.close)
+                self._follower.begin(progress)
+                self._open = stack.pop_all()
+        else:
+            self._follower.go_on()
+        self._ledger = self._follower.ledger
+        return self._contents([])
+
     def open(self, progress: Progress) -> Contents:
         """Own the partition, examine it, repair what can be repaired, and load it."""
         with ExitStack() as stack:
-            with closing(self._database.connect("dynhull start")) as connection, as_storage_errors():
-                connection.execute("BEGIN")
-                hold(connection, self._database)
-                prepare(connection, self._database, self._partitions)
-                connection.execute("COMMIT")
-                stack.callback(self._owner.release)
-                self._owner.take(self._lapsed)
-                connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
-                findings = examined(connection, self._partition, progress)
+            stack.push(self._open.pop_all())
+            findings = self._examine(stack, progress) if self._follower is None else self._take_followed(self._follower)
             if findings.fatal:
                 raise DamagedError(f"{self._place}: {'; '.join(findings.fatal)}: restore a backup")
             stack.callback(self._disconnect)
             self._ledger = findings.ledger
             if not findings.both_totals:
                 self._restore_totals()
-            self._write(Group(self._ledger, findings.repairs))
+            if self._follower is None or findings.repairs:
+                self._write(Group(self._ledger, findings.repairs))
+            idle = () if self._follower is None else (self._follower.connection,)
+            self._follower = None
             self._readers = Readers(
-                partial(self._database.connect, f"dynhull reader {self._partition}"), self._partition
+                partial(self._database.connect, f"dynhull reader {self._partition}"), self._partition, idle
             )
             stack.callback(self._readers.close)
             self._open = stack.pop_all()
+        return self._contents(findings.notes)
+
+    def _examine(self, stack: ExitStack, progress: Progress) -> Findings:
+        """Own the partition, and examine it."""
+        with closing(self._prepared()) as connection, as_storage_errors():
+            stack.callback(self._owner.release)
+            self._owner.take(self.lapsed)
+            connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
+            return examined(connection, self._partition, progress)
+
+    def _take_followed(self, follower: Follower) -> Findings:
+        """Own the partition, and follow what its last owner has left."""
+        before = follower.epoch
+        self._owner.take(self.lapsed)
+        if self._owner.epoch != before + 1:
+            raise StorageError(f"{self._place} is to be read anew: another server has owned it meanwhile")
+        follower.go_on(self._owner.epoch)
+        with as_storage_errors():
+            follower.connection.execute("COMMIT")
+            assert self._spare is not None  # `follow` has connected it
+            name = writer_name(self._partition, self._owner.epoch)
+            self._spare.execute("SELECT set_config('application_name', %s, false)", [name])
+        self._writer, self._spare = self._spare, None
+        return Findings(follower.ledger, repairs=follower.repairs)
+
+    def _prepared(self) -> Connection:
+        """A connection to the database, whose tables are there, and in the present format."""
+        connection = self._database.connect("dynhull start")
+        try:
+            with as_storage_errors(), connection.transaction():
+                hold(connection, self._database)
+                prepare(connection, self._database, self._partitions)
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _contents(self, notes: Sequence[str]) -> Contents:
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
-        notes = [f"{self._place}: {note}" for note in findings.notes]
-        return Contents(rows, self._ledger.totals.next_number, notes, fences)
+        told = [f"{self._place}: {note}" for note in notes]
+        return Contents(rows, self._ledger.totals.next_number, told, fences)
 
     def close(self) -> None:
         """Make all commits durable, and let another server own the partition."""
@@ -151,7 +213,7 @@ class PostgresStorage(RowStorage):
         if not self._unsettled:
             return
         self._disconnect()
-        connection = self._writer = self._connect_writer()
+        connection = self._writer = self._connect_writer(writer_name(self._partition, self._owner.epoch))
         with as_storage_errors():
             self._owner.end_writers(connection, self._owner.epoch)
             connection.execute("BEGIN")
@@ -194,7 +256,7 @@ class PostgresStorage(RowStorage):
                 if not self._writer.broken:
                     raise
                 self._disconnect()
-        connection = self._writer = self._connect_writer()
+        connection = self._writer = self._connect_writer(writer_name(self._partition, self._owner.epoch))
         self._send(connection, group)
         return connection
 
@@ -220,13 +282,13 @@ class PostgresStorage(RowStorage):
 
     def _restore_totals(self) -> None:
         """Renew both copies of the totals, one of which is damaged."""
-        connection = self._writer = self._connect_writer()
+        connection = self._writer = self._connect_writer(writer_name(self._partition, self._owner.epoch))
         with as_storage_errors(), connection.transaction():
             self._require_ownership(connection.execute(REQUIRE, [self._partition, self._owner.epoch]).rowcount)
             put_totals(connection, self._partition, self._ledger.totals)
 
-    def _connect_writer(self) -> Connection:
-        connection = self._database.connect(writer_name(self._partition, self._owner.epoch))
+    def _connect_writer(self, name: str) -> Connection:
+        connection = self._database.connect(name)
         try:
             with as_storage_errors():
                 connection.execute(f"SET synchronous_commit = {SYNCHRONOUS[self._durability]}".encode())
@@ -250,6 +312,10 @@ class PostgresStorage(RowStorage):
 
     @contextmanager
     def _lend(self) -> Iterator[PostgresReader]:
+        if self._follower is not None:
+            with as_storage_errors():
+                yield BegunReader(self._follower.connection, self._partition)
+            return
         with self._readers.lend() as reader:
             yield reader
 

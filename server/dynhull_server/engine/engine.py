@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, assert_never
 
@@ -42,7 +43,7 @@ from ..state.limits import Limits
 from ..state.records import DEFAULT, HullRow, HullSettings, Kept
 from ..state.root_state import state_of
 from ..state.trip import Trip, unsaved_of
-from ..storage.port import Contents, Progress, Storage, StorageError
+from ..storage.port import Contents, FollowedStorage, Progress, Storage, StorageError
 from .batch_stream import BatchStream
 from .divided_hull import DividedHull
 from .division import Divisions
@@ -70,6 +71,15 @@ READ_TOGETHER = 1000
 LOAD = 0.1
 # Seconds between looks at the commit in progress.
 WATCH_SECONDS = 1.0
+
+
+@dataclass(slots=True)
+class _Loaded:
+    """A hull that is loaded, and not yet in the core; `unsaved` is the number of points since its last snapshot."""
+
+    row: HullRow
+    state: HullState
+    unsaved: int
 
 
 class Expiries:
@@ -129,9 +139,26 @@ class Engine:
         self._stepping = False
         self._expiries = Expiries(supervisor)
         self._idle: asyncio.Event | None = None
-        self._started = False
+        self._followed: FollowedStorage | None = None
+        self._loaded: dict[int, _Loaded] = {}
+        self._begun = self._started = False
 
     # Start and shutdown
+
+    async def read_ahead(self, storage: FollowedStorage, progress: Progress) -> None:
+        """Load the hulls while another server owns them; again to load what has come since, before `start`.
+
+        Args:
+            storage: the storage of the engine.
+            progress: called with the amount read so far and the total; what it raises ends this.
+
+        Raises:
+            StorageError: the storage cannot be used; only `close` may follow, as after any other error.
+        """
+        self._begin()
+        self._followed = storage
+        contents: Contents = await self.run(self.disk, partial(storage.follow, progress))
+        await self._load(contents, progress)
 
     async def start(self, progress: Progress) -> list[str]:
         """Load the hulls of the storage. Returns messages about what was lost or repaired there.
@@ -142,10 +169,8 @@ class Engine:
         Raises:
             StorageError: the storage cannot be used.
         """
-        self._loop = asyncio.get_running_loop()
+        self._begin()
         clock, threads = self._machine.clock, self._machine.threads
-        self._turns, self._reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
-        self.disk = threads.pool("disk", DISK_THREADS)
         contents: Contents = await self.run(self.disk, partial(self._storage.open, progress))
         self._core = Core(
             self._limits,
@@ -154,14 +179,11 @@ class Engine:
             immediate=self._storage.immediate,
             keeps=self._storage.keeps,
         )
+        await self._load(contents, progress)
+        for loaded in self._loaded.values():
+            self._core.restore(loaded.row, loaded.state, loaded.unsaved)
+        self._loaded.clear()
         shards = [row for row in contents.hulls if row.settings.shard is not None]
-        whole = [row for row in contents.hulls if row.settings.shard is None]
-        progress(0, len(whole))
-        left = self._stored_hulls(whole)
-        while loaded := await self.run(self.disk, partial(self._load_some, left)):
-            for restored in loaded:
-                self._core.restore(*restored)
-            progress(len(self._core.hulls), len(whole))
         await self.run(self._turns, partial(self._restore_fences, contents))
         self._time = ServerTime(clock, self._core.latest_time)
         self._commits = GroupCommit(
@@ -184,22 +206,56 @@ class Engine:
             raise StorageError("the storage has hulls over shards: start the server with `dynhull serve`")
         return contents.notes
 
+    def _begin(self) -> None:
+        """Start the threads."""
+        if self._begun:
+            return
+        self._begun = True
+        self._loop = asyncio.get_running_loop()
+        threads = self._machine.threads
+        self._turns, self._reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
+        self.disk = threads.pool("disk", DISK_THREADS)
+
+    async def _load(self, contents: Contents, progress: Progress) -> None:
+        """Load the hulls of the storage, or what has come since they were loaded."""
+        rows = [row for row in contents.hulls if row.settings.shard is None]
+        if self._loaded:
+            for number in self._loaded.keys() - {row.number for row in rows}:
+                del self._loaded[number]
+            await self.run(self.disk, self._catch_up)
+        progress(len(self._loaded), len(rows))
+        left = self._stored_hulls([row for row in rows if row.number not in self._loaded])
+        while loaded := await self.run(self.disk, partial(self._load_some, left)):
+            self._loaded.update((each.row.number, each) for each in loaded)
+            progress(len(self._loaded), len(rows))
+
+    def _catch_up(self) -> None:
+        """Follow what has come since to the hulls that are loaded."""
+        assert self._followed is not None  # otherwise none are
+        now = self._machine.clock.monotonic()
+        for number, records in self._followed.read_since(
+            {number: each.state.counts.revision for number, each in self._loaded.items()}
+        ):
+            hull = self._loaded[number]
+            hull.state.catch_up(records, now)
+            hull.unsaved += sum(map(unsaved_of, records))
+
     def _stored_hulls(self, rows: Sequence[HullRow]) -> Iterator[tuple[HullRow, Kept]]:
         for first in range(0, len(rows), READ_TOGETHER):
             some = rows[first : first + READ_TOGETHER]
             yield from zip(some, self._storage.read_each([row.number for row in some]), strict=True)
 
-    def _load_some(self, stored: Iterator[tuple[HullRow, Kept]]) -> list[tuple[HullRow, HullState, int]]:
+    def _load_some(self, stored: Iterator[tuple[HullRow, Kept]]) -> "list[_Loaded]":
         """Load the next hulls, for LOAD seconds: handing each to a thread takes longer than loading a small one.
 
-        Returns the hulls and the numbers of their points in batches since the last snapshot; none after the last.
+        Returns none after the last.
         """
         clock = self._machine.clock
         until = clock.monotonic() + LOAD
         loaded = []
         for row, kept in stored:
             state = state_of(self._limits, row.settings, kept, now=clock.monotonic())
-            loaded.append((row, state, sum(map(unsaved_of, kept.records))))
+            loaded.append(_Loaded(row, state, sum(map(unsaved_of, kept.records))))
             if clock.monotonic() > until:
                 break
         return loaded
@@ -225,6 +281,8 @@ class Engine:
     async def close(self) -> None:
         """Complete the trips in progress, refuse the waiting requests, and close the storage."""
         if not self._started:
+            if self._followed is not None:
+                await asyncio.to_thread(self._forget)
             return
         if self.divisions is not None:
             await self.divisions.close()
@@ -237,6 +295,9 @@ class Engine:
 
     def _join(self) -> None:
         self._commits.close()
+        self._forget()
+
+    def _forget(self) -> None:
         for pool in (self._turns, self._reads, self.disk):
             pool.shutdown()
         self._storage.close()

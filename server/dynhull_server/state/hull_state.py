@@ -74,21 +74,25 @@ class HullState:
         most_points = min(settings.max_points or limits.max_points, limits.max_points)
         self.contents = contents = replayed(kept, settings, most_points)
         self.hull: AnyHull = contents.hull
-        last, cause = kept.last_revision, _last_cause(kept)
-        self._follow_center()
-        self.counts = self._counted(last, len(self.hull), cause, last)
         self._limits = limits
         self._producers: Producers | None = None  # most of ten thousand hulls have none
         if sequences := _last_sequences(kept):
             self._producers = self._new_producers(sequences, _skipping(kept), now)
+        self._stand_at(kept)
+
+    def _stand_at(self, kept: Kept) -> None:
+        """Derive what follows from the points, as of the last revision: what was before it is not known."""
+        last = kept.last_revision
+        self._follow_center()
+        self.counts = self._counted(last, len(self.hull), _last_cause(kept), last)
         self._vertices = self.hull.vertices().copy()  # a copy of a few vertices takes a third of the memory
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
-        self._changed_at = self.counts.revision
+        self._changed_at = last
         self._layers: dict[int, tuple[int, Points]] = {}  # those that fences ask for
         self._vertex_keys: VertexKeys | None = None
         self._keys_as_of = -1
-        self._history = History(limits.history_bytes, self._vertices, self.counts.revision)
+        self._history = History(self._limits.history_bytes, self._vertices, last)
         self._outline: tuple[Points, Center | None, GlobeOutline] | None = None
 
     @property
@@ -118,6 +122,18 @@ class HullState:
         return len(self._vertices)
 
     # Changes
+
+    def catch_up(self, records: Sequence[Record], now: float) -> None:
+        """Apply the next revisions, which another server has committed, as if the hull had been read after them."""
+        self.torn = True
+        self.contents.replay(records)
+        for record in records:
+            if record.producer:
+                if self._producers is None:
+                    self._producers = self._new_producers({}, frozenset(), now)
+                self._producers.applied(record.producer, record.sequence, "", now, may_skip=record.may_skip)
+        self._stand_at(Kept(records=list(records)))
+        self.torn = False
 
     def apply(
         self,

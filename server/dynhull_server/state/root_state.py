@@ -78,6 +78,12 @@ class RootState(HullState):
                 records.append(record)
         self.torn = False
 
+    def catch_up(self, records: Sequence[Record], now: float) -> None:
+        """Apply the next revisions, which another server has committed."""
+        for record in records:
+            self._count(record)
+        super().catch_up(records, now)
+
     def kept(self) -> Kept:
         """The root at this revision, for a snapshot. O(number of vertices of all shards)."""
         kept = super().kept()

@@ -4,12 +4,12 @@ Calls block until they are complete. One thread commits; any thread may read at 
 but to keep a lease: the engine calls `sync` and `checkpoint`, and commits the steps of `snapshot` and `sweep`.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from ..state.fences.records import FenceEvent, FenceRow, Inside, KeptFence
-from ..state.records import HullRow, Kept
+from ..state.records import HullRow, Kept, Record
 
 if TYPE_CHECKING:
     from ..state.changes import Change
@@ -220,3 +220,26 @@ class Storage(Protocol):
 
     def close(self) -> None:
         """Release the storage. Called once, after all other calls have returned."""
+
+
+class FollowedStorage(Storage, Protocol):
+    """A storage that can be read while another server owns it, so that little is left to read for `open`.
+
+    From the first `follow` on, `read_each` and `read_since` read it as of the last one. After an error only
+    `close` may be called.
+    """
+
+    def follow(self, progress: Progress) -> Contents:
+        """Examine the data; again, before `open`, to find what has come since.
+
+        Raises:
+            DamagedError: something is damaged, which `open` could perhaps repair.
+            StorageError: it cannot be read, or what has come since does not follow what there was.
+        """
+
+    def read_since(self, after: Mapping[int, int]) -> Iterator[tuple[int, list[Record]]]:
+        """The batches of hulls after these revisions, by number; of hulls that have any.
+
+        Raises:
+            DamagedError: the data of a hull is damaged.
+        """

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
-from ...state.records import Kept
+from ...state.records import Kept, Record
 from ..port import DamagedError
 from .chunks import joined, state_from
 from .encoding import checksum, decode
@@ -34,6 +34,19 @@ def read_hull(reader: Reader, hull: HullRows, until: int) -> Kept:
         rows = reader.some("batches", BATCH_COLUMNS, hull.between(kept.revision, until))
         _add_records(kept, hull, rows, until)
     return kept
+
+
+def read_records(reader: Reader, hull: HullRows, after: int) -> list[Record]:
+    """The batches of a hull after a revision.
+
+    Raises:
+        DamagedError: a row is damaged or missing.
+    """
+    kept = Kept(revision=after)
+    with _as_damage(hull):
+        rows = reader.some("batches", BATCH_COLUMNS, hull.between(after, hull.last))
+        _add_records(kept, hull, rows, hull.last)
+    return kept.records
 
 
 def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from threading import Lock
 from typing import Protocol, TypeVar
@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.records import FenceEvent, Inside, KeptFence
-from ...state.records import HullRow, Kept
+from ...state.records import HullRow, Kept, Record
 from ..port import NEWEST, DamagedError, NotCommittedError, Step, StorageError
 from . import chunks
 from .encoding import weight
@@ -27,10 +27,11 @@ from .ledger import (
     DropSnapshot,
     Finish,
     Group,
+    HullRows,
     Ledger,
     Snapshot,
 )
-from .reading import read_each, read_hull
+from .reading import read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader
 
@@ -111,6 +112,16 @@ class RowStorage(ABC):
         """Hulls at their last revisions."""
         with self._reading(lambda ledger: [ledger.hulls[number].copy() for number in numbers]) as (reader, hulls):
             yield from read_each(reader, hulls)
+
+    def read_since(self, after: Mapping[int, int]) -> Iterator[tuple[int, list[Record]]]:
+        """The batches of hulls after these revisions."""
+
+        def pick(ledger: Ledger) -> list[HullRows]:
+            return [ledger.hulls[each].copy() for each in after if ledger.hulls[each].last > after[each]]
+
+        with self._reading(pick) as (reader, hulls):
+            for hull in hulls:
+                yield hull.row.number, read_records(reader, hull, after[hull.row.number])
 
     def oldest(self, number: int) -> int:
         """The oldest revision that `read` can return."""
