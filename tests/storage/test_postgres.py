@@ -1,11 +1,13 @@
 """The storage on PostgreSQL: damage, other servers, lost connections, and databases that it cannot use."""
 
+import shutil
 import threading
 import time
 from contextlib import closing
 
+import folders
 import pytest
-from folders import append, fill, fill_fence, no_progress, record
+from folders import OLD_FOLDERS, append, fill, fill_fence, no_progress, record, same
 from patience import wait_until
 from postgresql import query
 
@@ -22,6 +24,7 @@ from dynhull_server.storage.port import (
     StorageError,
     TakenOverError,
 )
+from dynhull_server.storage.rows.tables import FORMAT
 
 WRITERS = "FROM pg_stat_activity WHERE application_name LIKE 'dynhull writer%%' AND datname = current_database()"
 # Another server has owned the partition, and has ended; or does not renew its lease, whatever clocks say.
@@ -296,6 +299,31 @@ def test_databases_that_cannot_be_used_are_named(postgres, tmp_path):
     query(url, "CREATE SCHEMA dynhull; CREATE TABLE dynhull.other (a integer)")
     with pytest.raises(FormatError, match="of another program"):
         on(url).open(no_progress)
+
+
+def test_a_database_of_format_8_has_everything_and_goes_on(postgres, tmp_path):
+    """The folder beside it, and a batch of a server: as the version before hulls over shards left it."""
+    url = postgres.new_database()
+    query(url, (OLD_FOLDERS / "format8" / "database.sql").read_text())
+    assert query(url, "SELECT format FROM dynhull.format") == [(8,)]
+    expected, there = folders.opened(shutil.copytree(OLD_FOLDERS / "format8" / "stopped", tmp_path / "folder"))
+    for life in range(2):
+        storage, contents = opened(url)
+        with closing(storage):
+            assert query(url, "SELECT format FROM format") == [(FORMAT,)]
+            assert (contents.hulls, contents.fences, contents.notes) == (there.hulls, there.fences, [])
+            for row in there.hulls:
+                found, kept = storage.read(row.number), expected.read(row.number)
+                added = found.records[len(kept.records) :]
+                found.records = found.records[: len(kept.records)]
+                same(found, kept)
+                assert len(added) == (1 + life if row.name == "fleet" else 0)
+            for row in there.fences:
+                assert storage.read_events(row.number, 0, 1000) == expected.read_events(row.number, 0, 1000)
+            fleet = next(row for row in there.hulls if row.name == "fleet")
+            last = storage.read(fleet.number).last_revision + 1
+            storage.commit([Append(fleet.number, [record(last)])])
+    expected.close()
 
 
 def test_newer_formats_are_refused(url):
