@@ -1,0 +1,87 @@
+"""What callers ask of a root that is served: each request is answered in its thread, and told on the event loop."""
+
+import asyncio
+from typing import Any
+
+from dynhull_server.state import events
+from dynhull_server.state.hull import Hull
+from dynhull_server.state.trip import refuse
+
+from ..shards import messages as say
+from ..shards.requests import Expire, Read, Write
+
+
+class AskedWrite(Write):
+    """A batch of a caller. Its stream stops with it, in the thread of the root, before another one begins."""
+
+    def __init__(self, request: events.WriteBatch, hull: Hull, now: float, answered: "list[Asked]") -> None:
+        super().__init__(request, now)
+        self._hull = hull
+        self._answered = answered
+
+    def answer(self, result: Any = None, error: Exception | None = None) -> None:
+        """Answer it."""
+        super().answer(result, error)
+        if error is not None:
+            refuse(self.batch, error)
+        else:
+            self.batch.result = result
+            if self.batch.stream is not None:
+                self.batch.stream.hull = self._hull
+        self._answered.append(self)
+
+    @property
+    def for_another_hull(self) -> bool:
+        """Whether the batches of its stream before it were applied to another hull of this name."""
+        stream = self.batch.stream
+        return stream is not None and stream.hull is not None and stream.hull is not self._hull
+
+    def tell(self) -> None:
+        """Have the caller hear of it."""
+        if not self.batch.abandoned:
+            self.batch.to.answer(self.batch)
+
+
+class AskedExpiry(Expire):
+    """Points that leave by the clock, as the core has noticed."""
+
+    def __init__(self, request: events.Expire, answered: "list[Asked]") -> None:
+        super().__init__(request.time)
+        self._request = request
+        self._answered = answered
+
+    def answer(self, result: Any = None, error: Exception | None = None) -> None:
+        """Answer it."""
+        super().answer(result, error)
+        self._request.result, self._request.error = result, error
+        self._answered.append(self)
+
+    def tell(self) -> None:
+        """Have the core hear of it."""
+        self._request.to.answer(self._request)
+
+
+class AskedRead(Read):
+    """A question of a reader. The counts are those of its revision: readers see each decision before the next one."""
+
+    def __init__(self, question: say.Question, hull: Hull, answered: "list[Asked]") -> None:
+        super().__init__(question)
+        self.counts = hull.counts
+        self.asked: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._hull = hull
+        self._answered = answered
+
+    def answer(self, result: Any = None, error: Exception | None = None) -> None:
+        """Answer it."""
+        super().answer(result, error)
+        self.counts = self._hull.counts
+        assert error is not None or self.counts.revision == result[0]
+        self._answered.append(self)
+
+    def tell(self) -> None:
+        """Have the reader hear of it."""
+        if not self.asked.done():
+            self.asked.set_result(None)
+
+
+Asked = AskedWrite | AskedExpiry | AskedRead
