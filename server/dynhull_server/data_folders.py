@@ -10,8 +10,8 @@ from .exports import WRITERS
 from .failure import code_of, fail, text_of
 from .progress import progress_bar
 from .state.contents import replayed
-from .state.records import HullRow, Kept
-from .storage.port import StorageError
+from .state.contents.joining import joined
+from .storage.port import DamagedError, StorageError
 from .storage.sqlite import copies
 from .storage.worker_folders import parts_of, workers_of, write_manifest
 
@@ -22,10 +22,10 @@ def copy_folder(source: Path, target: Path, *, accept_loss: bool = False) -> Non
         workers = workers_of(source)
         if workers is not None and target.exists() and any(target.iterdir()):
             raise StorageError(f"{target} is not empty")
-        for part in parts_of(source):
-            copy = target / part.relative_to(source)
-            with progress_bar("pages") as progress:
-                report = copies.copy(part, copy, progress, accept_loss=accept_loss)
+        folders = [(part, target / part.relative_to(source)) for part in parts_of(source)]
+        with progress_bar("pages") as progress:
+            copied = list(copies.copy_all(folders, progress, accept_loss=accept_loss))
+        for copy, report in copied:
             for note in report.notes:
                 typer.echo(note, err=True)
             typer.echo(f"{copy}: {_hulls(report)}")
@@ -37,8 +37,16 @@ def check_folder(data: Path) -> bool:
     """Examine a data folder and print a report, of one with workers on each part; returns whether all is intact."""
     with _errors_reported():
         parts = parts_of(data)
-    whole = [_check_part(part) for part in parts]
-    return all(whole)
+        whole = [_check_part(part) for part in parts]
+        if not all(whole):
+            return False
+        try:
+            copies.check_together(parts)
+        except DamagedError as error:
+            typer.echo(f"{error}", err=True)
+            typer.echo(f"{data}: damaged; it can be served without the hull named above")
+            return False
+    return True
 
 
 def _check_part(data: Path) -> bool:
@@ -74,25 +82,14 @@ def export_hull(data: Path, name: str, file: Path) -> None:
     if file.suffix not in WRITERS:
         fail(f"{file}: the name must end in {', '.join(WRITERS)}")
     with _errors_reported():
-        row, kept, notes = _read(data, name)
-        for note in notes:
+        found = copies.read(parts_of(data), name)
+        for note in found.notes:
             typer.echo(note, err=True)
-        if row.settings.divided:
-            raise StorageError(f"hull {name!r} is divided among shards: read its points from a running server")
-        contents = replayed(kept, row.settings).stored()
+        contents = joined([replayed(kept, settings).stored() for settings, kept in found.kepts])
         with progress_bar("points") as progress:
-            WRITERS[file.suffix](file, contents, progress, geographic=row.settings.geographic)
+            WRITERS[file.suffix](file, contents, progress, geographic=found.row.settings.geographic)
     points = "1 point" if len(contents) == 1 else f"{len(contents):,} points"
-    typer.echo(f"{file}: {points} of {name} at revision {kept.last_revision}")
-
-
-def _read(data: Path, name: str) -> tuple[HullRow, Kept, list[str]]:
-    """A hull of a folder, in whichever part it is."""
-    *parts, last = parts_of(data)
-    for part in parts:
-        if name in copies.names(part):
-            return copies.read(part, name)
-    return copies.read(last, name)
+    typer.echo(f"{file}: {points} of {name} at revision {found.revision}")
 
 
 @contextmanager

@@ -2,8 +2,11 @@
 
 import fcntl
 import os
+import shutil
 import signal
 import sqlite3
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -12,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cluster import processes
+from command_line import dynhull
 from patience import PATIENCE, wait_until
 from server_process import Server, server_process
 
@@ -25,6 +29,7 @@ from dynhull_client import (
     Quarantine,
     UnavailableError,
 )
+from dynhull_server.storage.sqlite import copies
 
 WORKERS = ("--workers", "2", "--gateways", "1")
 SHAPES = {"process": (), "workers": WORKERS}
@@ -337,3 +342,157 @@ def test_the_shards_of_a_deleted_hull_are_deleted_and_a_new_one_is_empty(tmp_pat
         wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 3)
         assert client.sample_points("fleet", 9).points.tolist() == [[3, 4]]
         assert client.verify("fleet").equal
+
+
+@pytest.mark.parametrize("options", [(), WORKERS], ids=["process", "workers"])
+def test_shards_of_a_deleted_hull_do_not_prevent_a_start(tmp_path: Path, options: tuple[str, ...]) -> None:
+    """Killed with shards of both, the deleted hull and the new one of its name."""
+    with server_process(*options, "--data", str(tmp_path), killed=True) as server, HullClient(server.address) as client:
+        for point in ([1.0, 2.0], [3.0, 4.0]):
+            client.create_hull("fleet", shards=2)
+            client.apply("fleet", insert=[point])
+            if point[0] == 1:
+                client.delete_hull("fleet")
+        assert len(rows_of(tmp_path, "SELECT name FROM hulls")) == 5
+        server.process.kill()
+        server.process.wait(PATIENCE)
+    with server_process(*options, "--data", str(tmp_path)) as server, HullClient(server.address) as client:
+        assert client.sample_points("fleet", 9).points.tolist() == [[3, 4]]
+        wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 3)
+
+
+# Copies
+
+
+class Marks:
+    """Batches of one point each, by revision: what a copy must have of them follows from its revision."""
+
+    def __init__(self, client: HullClient, name: str) -> None:
+        self._client = client
+        self._name = name
+        self.acknowledged = 0
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._write)
+
+    @staticmethod
+    def points(revision: int) -> np.ndarray:
+        """The points at a revision: every third batch has replaced the point of the one before it."""
+        numbers = np.arange(1, revision + 1)
+        left = numbers[(numbers % 3 != 2) | (numbers == revision)]
+        return np.column_stack([left, left * left % 1009]).astype(float)
+
+    def _write(self) -> None:
+        while not self._stop.is_set():
+            number = self.acknowledged + 1
+            point, before = ([[each, each * each % 1009]] for each in (number, number - 1))
+            gone = before if number % 3 == 0 else None
+            self._client.apply(self._name, insert=point, delete=gone, producer="ship", sequence=number)
+            self.acknowledged = number
+
+    def __enter__(self) -> "Marks":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+
+
+def in_order(points: np.ndarray) -> list[list[float]]:
+    return sorted(points.tolist())
+
+
+# Of worker 0 and of worker 1: where the root of one is, the other has a shard.
+HERDS = "north/a", "cows/a"
+
+
+@pytest.mark.parametrize("options", [(), WORKERS], ids=["process", "workers"])
+def test_copies_beside_writes_are_of_one_revision(
+    tmp_path: Path, options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a machine so busy that some time passes between the moments of the parts."""
+    read = copies.format_of
+    monkeypatch.setattr(copies, "format_of", lambda *given: (time.sleep(0.02), read(*given))[1])
+    data, made = tmp_path / "data", [tmp_path / f"copy{i}" for i in range(5)]
+    spans = []
+    with (
+        server_process(*options, "--data", str(data), "--snapshot-points", "10") as server,
+        HullClient(server.address) as client,
+    ):
+        for name in HERDS:
+            client.create_hull(name, shards=SHARDS)
+        with Marks(client, HERDS[0]) as one, Marks(client, HERDS[1]) as other:
+            for copy in made:
+                wait_until(lambda: min(one.acknowledged, other.acknowledged) > 40 * (len(spans) + 1))
+                before = [each.acknowledged for each in (one, other)]
+                done = dynhull("backup", copy, "--data", data)
+                assert done.exit_code == 0, done.stderr
+                spans.append([*zip(before, [each.acknowledged + 1 for each in (one, other)], strict=True)])
+            file = tmp_path / "points.csv"
+            done = dynhull("export", HERDS[0], file, "--data", data)
+            assert done.exit_code == 0, done.stderr
+            assert in_order(np.loadtxt(file, delimiter=",", skiprows=1)) == in_order(
+                Marks.points(int(done.stdout.split()[-1]))
+            )
+    for copy, span in zip(made, spans, strict=True):
+        assert dynhull("check", copy).exit_code == 0
+        for name, (least, most) in zip(HERDS, span, strict=True):
+            file = tmp_path / f"{copy.name}.csv"
+            done = dynhull("export", name, file, "--data", copy)
+            revision = int(done.stdout.split()[-1])
+            assert least <= revision <= most
+            assert in_order(np.loadtxt(file, delimiter=",", skiprows=1)) == in_order(Marks.points(revision))
+    new = tmp_path / "new"
+    done = dynhull("restore", made[-1], "--data", new)
+    assert done.exit_code == 0, done.stderr
+    with server_process(*options, "--data", str(new)) as server, HullClient(server.address) as client:
+        for name, (least, most) in zip(HERDS, spans[-1], strict=True):
+            info = client.get_hull(name).info
+            assert least <= info.revision <= most
+            points = Marks.points(info.revision)
+            assert in_order(client.sample_points(name, 10**6).points) == in_order(points)
+            assert client.verify(name).equal
+            again = client.apply(name, insert=[[0, 0]], producer="ship", sequence=info.revision + 1)
+            assert again.points == len(points) + 1
+
+
+def test_a_shard_of_another_moment_is_not_restored(tmp_path: Path) -> None:
+    data, old = tmp_path / "data", tmp_path / "old"
+    for _ in range(2):
+        with server_process(*WORKERS, "--data", str(data)) as server, HullClient(server.address) as client:
+            client.create_hull("north/a", shards=2, exist_ok=True)  # of worker 0
+            client.apply("north/a", insert=np.random.default_rng(1).normal(size=(50, 2)))
+        if not old.exists():
+            shutil.copytree(data / "worker-1", old)
+    assert dynhull("check", data).exit_code == 0
+    shutil.rmtree(data / "worker-1")
+    shutil.copytree(old, data / "worker-1")
+    for done in (dynhull("check", data), dynhull("backup", tmp_path / "copy", "--data", data)):
+        assert done.exit_code != 0
+        assert "shard 1 of hull 'north/a' is at step 1, not 2" in done.stderr
+    assert not (tmp_path / "copy").exists()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_export_has_the_rows_of_one_hull(tmp_path: Path, kind: str) -> None:
+    data, settings = tmp_path / "data", KINDS[kind]
+    with server_process(*WORKERS, "--data", str(data)) as server, HullClient(server.address) as client:
+        client.create_hull("h/one", **settings)
+        client.create_hull("h/many", shards=SHARDS, **settings)
+        client.create_hull("h/none", shards=SHARDS, **settings)
+        batches = Batches(settings, seed=7)
+        for _ in range(20):
+            batch = batches.next()
+            for name in ("h/one", "h/many"):
+                batches.apply(client, name, batch)
+        exported = []
+        for name in ("one", "many", "none"):
+            file = tmp_path / f"{name}.csv"
+            done = dynhull("export", f"h/{name}", file, "--data", data)
+            assert done.exit_code == 0, done.stderr
+            header, *rows = file.read_text().splitlines()
+            exported.append((header, rows if "keyed" in settings else sorted(rows)))
+    one, many, none = exported
+    assert many == one
+    assert one[1]
+    assert none == (one[0], [])

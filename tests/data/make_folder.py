@@ -1,11 +1,11 @@
 """Write a data folder with the installed version: a fixture for the versions after it, which must open it.
 
-    python tests/data/make_folder.py tests/data/format8
+    python tests/data/make_folder.py tests/data/format9
 
 By hand, with the last version that writes a format. `stopped` is the folder of a server that was stopped. `killed` is
 the folder of a second server on the same data, which was killed with batches in its log. The CSV files are the points
 of each hull, as that version exports them, with keys and times; the JSON files have the events of fences, and who is
-inside, and positions in quarantine.
+inside, positions in quarantine, and hulls over shards.
 """
 
 import json
@@ -20,7 +20,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 
-from dynhull_client import Circle, HullClient, Prefix, Quarantine
+from dynhull_client import Circle, HullClient, PointMissingError, Prefix, Quarantine
 from dynhull_proto.v1 import hull_pb2, hull_service_pb2, hull_service_pb2_grpc
 
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
@@ -116,6 +116,52 @@ def change_held(client):
     client.put("held", ["flight é0", "flight é49"], [[1000, 999], [-999, 0]], times=[MOMENT + 3 * SECOND] * 2)
 
 
+DIVIDED = {"many": {"shards": 3}, "herd": {"shards": 2, "keyed": "str", "max_age": 60, "clock": "data"}}
+
+
+def fill_divided(data, client):
+    """Hulls over shards: one of points, some of which are deleted, with snapshots of root and shards; one of keys."""
+    for name, settings in DIVIDED.items():
+        client.create_hull(name, **settings)
+    for sequence in range(1, 40):
+        points = np.random.default_rng(sequence).normal(size=(8, 2))
+        client.apply("many", insert=points, delete=points[:3], producer="ship", sequence=sequence)
+        if sequence == 30:
+            while not snapshots(data, "many#1"):
+                client.count("many", [[0, 0]])  # a shard takes its snapshot when the root says that all is decided
+    for second in range(0, 90, 10):
+        keys = [f"cow é{i}" for i in range(second // 10, 20)]
+        client.put(
+            "herd", keys, np.arange(2.0 * len(keys)).reshape(-1, 2) % 7, times=[MOMENT + second * SECOND] * len(keys)
+        )
+
+
+def change_divided(client):
+    """Batches after the last snapshots, one of them refused."""
+    client.apply("many", insert=[[7, 7], [-7, 7]], producer="ship", sequence=40)
+    try:
+        client.apply("many", insert=[[1, 1], [2, 2], [3, 3]], delete=[[99, 99]], producer="ship", sequence=41)
+    except PointMissingError:
+        client.apply("many", delete=[[-7, 7]], producer="ship", sequence=41)
+    client.put("herd", ["cow é0", "calf"], [[9, 9], [8, -8]], times=[MOMENT + 100 * SECOND] * 2)
+
+
+def export_divided(client, target):
+    found = {}
+    for name in DIVIDED:
+        info = client.get_hull(name).info
+        entities = client.entities(name) if info.keyed else None
+        found[name] = {
+            "revision": info.revision,
+            "clock": info.clock and info.clock.isoformat(),
+            "points": client.sample_points(name, 10_000).points.tolist(),
+            "vertices": client.get_hull(name).vertices.tolist(),
+            "keys": entities and list(entities.keys),
+            "sequence": client.last_sequence(name, "ship"),
+        }
+    target.with_name(f"{target.name}-divided.json").write_text(json.dumps(found, indent=1, ensure_ascii=False))
+
+
 def export_held(client, target):
     info = client.get_hull("held").info
     found = {
@@ -191,7 +237,9 @@ def main():
         fill(data, address, client)
         fill_fences(client)
         fill_held(data, client)
+        fill_divided(data, client)
         export_held(client, target / "stopped")
+        export_divided(client, target / "stopped")
         export_fences(client, target / "stopped")
     take(data, target / "stopped")
     export(data, target / "stopped")
@@ -201,7 +249,9 @@ def main():
         client.put("vans", ["van é0"], [[5, 5]], times=[MOMENT + 2 * SECOND], producer="gate", sequence=2)
         client.put("vans", ["van é0"], [[-5, 5]], times=[MOMENT + 3 * SECOND])
         change_held(client)
+        change_divided(client)
         export_held(client, target / "killed")
+        export_divided(client, target / "killed")
         export(data, target / "killed")
         export_fences(client, target / "killed")
         process.kill()

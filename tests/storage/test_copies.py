@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,7 +31,19 @@ from forked import COMMAND, Process
 from server_process import PATIENCE, server_process
 
 from dynhull_client import HullClient
-from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, Kept, PointRows, Record
+from dynhull_server.state.records import (
+    Append,
+    Contents,
+    Create,
+    Delete,
+    HullRow,
+    HullSettings,
+    Kept,
+    PointRows,
+    Record,
+    Shares,
+    Tally,
+)
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite import copies
 
@@ -381,3 +394,57 @@ def test_a_database_of_something_else(tmp_path):
 def test_what_cannot_be_done_is_said_in_a_line(tmp_path, monkeypatch, command, message):
     monkeypatch.chdir(tmp_path)
     refused(*command, says=message)
+
+
+# Hulls over shards
+
+
+def divided_folder(data, last=6):
+    """A root and its shard, both at revision `last` with a snapshot at 3 and at 5; the shard has one step more."""
+    storage, _ = opened(data)
+    root = HullRow(1, "fleet", "uid", 0.0, HullSettings(shards=1))
+    shard = HullRow(2, "fleet#uid.0", "uid", 0.0, HullSettings(shards=1, shard=0))
+    storage.commit([Create(root), Create(shard)])
+    for step in range(1, last + 2):
+        storage.commit([Append(2, [replace(record(step), producer="steps", sequence=step)])])
+        if step <= last:
+            storage.commit([Append(1, [replace(record(step), shares=Shares({0: Tally(step, 3 * step, 3 * step)}))])])
+        if step in (3, 5):
+            of_shard = Kept(step, Contents(record(1).rows.inserts), {"steps": step})
+            of_root = Kept(step, Contents(record(1).rows.inserts), tallies={0: Tally(step)})
+            for number, kept in ((2, of_shard), (1, of_root)):
+                for each in storage.snapshot(number, kept):
+                    storage.commit([each])
+    storage.close()
+
+
+@pytest.mark.parametrize(("before", "kept"), [(0, None), (2, None), (3, 3), (4, 4), (6, 6), (9, 6)])
+def test_roots_and_shards_are_led_back_to_the_revision_before(paths, monkeypatch, before, kept):
+    data, copy, _ = paths
+    divided_folder(data)
+    monkeypatch.setattr(copies.divided, "revisions", lambda _: {"uid": before})
+    if kept is None:
+        refused("backup", copy, "--data", data, says="the folder changes faster than it can be read")
+        assert not copy.exists()
+        return
+    done("backup", copy, "--data", data, says=f"{copy}: 2 hulls")
+    storage, contents = opened(copy)
+    assert contents.notes == []
+    assert [storage.read(number).last_revision for number in (1, 2)] == [kept, kept]
+    storage.close()
+
+
+@pytest.mark.parametrize("lost", ["steps", "the shard"])
+def test_a_root_whose_shard_has_lost_what_was_decided_is_not_copied(paths, lost):
+    data, copy, _ = paths
+    divided_folder(data)
+    storage, _ = opened(data)
+    if lost == "steps":
+        storage.commit([storage.cut(2, 5)])
+    else:
+        storage.commit([Delete(2)])
+    storage.close()
+    says = "is at step 5, not 6" if lost == "steps" else "is missing"
+    refused("backup", copy, "--data", data, says=f"shard 0 of hull 'fleet' {says}", code=1)
+    refused("check", data, says=f"shard 0 of hull 'fleet' {says}", code=1)
+    refused("export", "fleet", copy.with_suffix(".csv"), "--data", data, says=says, code=1)

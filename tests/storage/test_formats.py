@@ -11,8 +11,10 @@ import pytest
 from command_line import dynhull
 from faulty_disk import FaultyDisk, failure
 from folders import DATABASE, OLD_FOLDERS, append, event, flip, opened, read_fence, same, snapshot
+from server_process import server_process
 
 from dynhull.keys import PackedKeys
+from dynhull_client import HullClient
 from dynhull_server.state.contents import replayed
 from dynhull_server.state.fences.event_block import block_of
 from dynhull_server.state.fences.records import AppendEvents, Delay, DropEvents, PutDelays
@@ -237,7 +239,7 @@ def test_a_folder_of_format_4_has_every_fence(folder, name):
         assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
 
 
-# Formats 6 to 8, written by tests/data/make_folder.py
+# Formats 6 to 9, written by tests/data/make_folder.py
 
 
 def as_told(event):
@@ -246,7 +248,7 @@ def as_told(event):
     return [event.sequence, event.type.name.lower(), event.hull, key, position, event.distance]
 
 
-@pytest.mark.parametrize("version", ["format6", "format7", "format8"])
+@pytest.mark.parametrize("version", ["format6", "format7", "format8", "format9"])
 @pytest.mark.parametrize("name", ["stopped", "killed"])
 def test_a_folder_with_events_has_every_event(folder, name, version):
     """Those of rows for one fence each, and of shared ones; the next ones share rows, and are dropped one by one."""
@@ -282,11 +284,12 @@ def test_a_folder_with_events_has_every_event(folder, name, version):
     storage.close()
 
 
+@pytest.mark.parametrize("version", ["format8", "format9"])
 @pytest.mark.parametrize("name", ["stopped", "killed"])
-def test_a_folder_with_a_quarantine_has_every_position(folder, name):
+def test_a_folder_with_a_quarantine_has_every_position(folder, name, version):
     """In a snapshot and, after a kill, in batches after it; a byte that flips there is noticed."""
-    shutil.copytree(OLD_FOLDERS / "format8" / name, folder)
-    expected = json.loads((OLD_FOLDERS / "format8" / f"{name}-held.json").read_text())
+    shutil.copytree(OLD_FOLDERS / version / name, folder)
+    expected = json.loads((OLD_FOLDERS / version / f"{name}-held.json").read_text())
     storage, contents = opened(folder)
     (row,) = (each for each in contents.hulls if each.name == "held")
     kept = storage.read(row.number)
@@ -311,3 +314,33 @@ def test_a_folder_with_a_quarantine_has_every_position(folder, name):
     (line,) = (each for each in done.stdout.splitlines() if each.startswith("held:"))
     assert done.exit_code == 1
     assert line.endswith("DAMAGED")
+
+
+# Format 9, written by tests/data/make_folder.py
+
+
+@pytest.mark.parametrize("name", ["stopped", "killed"])
+def test_a_folder_with_hulls_over_shards_has_every_point(folder, name, tmp_path):
+    """Roots and shards with snapshots and, after a kill, batches after these; the hulls go on."""
+    shutil.copytree(OLD_FOLDERS / "format9" / name, folder)
+    expected = json.loads((OLD_FOLDERS / "format9" / f"{name}-divided.json").read_text())
+    for hull, told in expected.items():
+        done = dynhull("export", hull, tmp_path / f"{hull}.csv", "--data", folder)
+        assert done.exit_code == 0, done.stderr
+        rows = [line.split(",") for line in (tmp_path / f"{hull}.csv").read_text().splitlines()[1:]]
+        columns = slice(1, 3) if told["keys"] else slice(0, 2)
+        assert sorted([float(each) for each in row[columns]] for row in rows) == told["points"]
+    with server_process("--data", str(folder)) as server, HullClient(server.address) as client:
+        for hull, told in expected.items():
+            found = client.get_hull(hull)
+            assert (found.revision, found.info.clock and found.info.clock.isoformat()) == (
+                told["revision"],
+                told["clock"],
+            )
+            assert client.sample_points(hull, 10_000).points.tolist() == told["points"]
+            assert found.vertices.tolist() == told["vertices"]
+            assert told["keys"] is None or list(client.entities(hull).keys) == told["keys"]
+            assert client.last_sequence(hull, "ship") == told["sequence"]
+        assert client.apply("many", insert=[[50, 50]]).revision == expected["many"]["revision"] + 1
+        assert all(client.verify(hull).equal for hull in expected)
+    assert query(folder, "PRAGMA user_version") == [(FORMAT,)]

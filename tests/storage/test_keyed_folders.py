@@ -100,7 +100,8 @@ def test_backup_check_and_restore(data, tmp_path):
         assert dynhull("check", tmp_path / target).stdout.endswith(": 3 hulls, all whole\n")
         for row, kept, records in hulls():
             kept.records = records
-            same(copies.read(tmp_path / target, row.name), (row, kept, []))
+            found = copies.read([tmp_path / target], row.name)
+            same(found, copies.Found(row, kept.last_revision, [(row.settings, kept)], []))
 
 
 def exported(data, file, name):

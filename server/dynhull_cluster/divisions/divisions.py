@@ -28,13 +28,13 @@ LOOK_SECONDS, WANTED_SECONDS = 0.25, 5.0
 
 # The name of the work that other processes ask for.
 SHARDS = "shards"
-# Between the name of a hull and the number of a shard, in the names of rows: no name of a hull has it.
+# Between the name of a hull and what distinguishes a shard, in the names of rows: no name of a hull has it.
 MARK = "#"
 
 
-def name_of_shard(name: str, shard: int) -> str:
-    """The name of a shard in the storage."""
-    return f"{name}{MARK}{shard}"
+def name_of_shard(name: str, uid: str, shard: int) -> str:
+    """The name of a shard in the storage, where those of a deleted hull of the same name may still be."""
+    return f"{name}{MARK}{uid}.{shard}"
 
 
 def hull_of_shard(name: str) -> str:
@@ -165,7 +165,7 @@ class ServedDivisions:
         async with self._creating:
             if key not in self._shards:
                 engine = self._started
-                name = name_of_shard(greeting.name, settings.shard)
+                name = name_of_shard(greeting.name, greeting.uid, settings.shard)
                 row = HullRow(engine.core.number_of_shard(), name, greeting.uid, greeting.created, settings)
                 if engine.keeps:
                     await engine.commit([Create(row)])

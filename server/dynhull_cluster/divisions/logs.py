@@ -14,6 +14,8 @@ from dynhull_server.state.events import Follow, ReadHull
 from dynhull_server.state.hull import Hull
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import (
+    EPOCHS,
+    STEPS,
     Append,
     HullRow,
     HullSettings,
@@ -31,9 +33,6 @@ from dynhull_server.storage.port import DamagedError
 
 from ..shards.logs import Decided, Decision, FencedError
 from ..shards.messages import Change, Corners, Effect
-
-# The producers in the log of a shard: the steps of its root, and the epochs that were begun.
-STEPS, EPOCHS = "steps", "epochs"
 
 
 class StoredRootLog:

@@ -18,6 +18,8 @@ Keys = PackedKeys | npt.NDArray[np.uint64]
 Times = npt.NDArray[np.int64]  # microseconds since 1970
 NO_TIME = -(2**63)
 FOREVER = 2**63 - 1
+# The producers in the log of a shard: the steps of its root, and the epochs that were begun.
+STEPS, EPOCHS = "steps", "epochs"
 
 
 @dataclass(frozen=True, slots=True)

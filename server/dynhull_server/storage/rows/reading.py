@@ -85,8 +85,13 @@ def _newest_snapshot(reader: Reader, hull: HullRows, until: int) -> Kept:
     return Kept()
 
 
-def _snapshot(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
-    """A snapshot, None if it is damaged."""
+def snapshot_state(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
+    """A snapshot without its contents, None if it is damaged."""
+    state = _state(reader, number, snapshot)
+    return None if state is None else state_from(state)[0]
+
+
+def _state(reader: Reader, number: int, snapshot: Snapshot) -> bytes | None:
     keys = snapshot.id, number, snapshot.revision, len(snapshot.chunks)
     row = next(
         reader.some("snapshots", "state, checksum, snapshots.id, hull, revision, chunks", array("q", [snapshot.id])),
@@ -94,7 +99,16 @@ def _snapshot(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
     )
     if row is None or tuple(row[2:]) != keys or checksum(row[0], *keys) != row[1]:
         return None
-    kept, decode_chunk = state_from(row[0])
+    state: bytes = row[0]
+    return state
+
+
+def _snapshot(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
+    """A snapshot, None if it is damaged."""
+    state = _state(reader, number, snapshot)
+    if state is None:
+        return None
+    kept, decode_chunk = state_from(state)
     parts = []
     found = reader.some("chunks", "number, checksum, points", array("q", snapshot.chunks))
     for expected, (number, stored, data) in enumerate(found):

@@ -13,6 +13,7 @@ from ...state.fences.records import FenceEvent, Inside, KeptFence
 from ...state.records import HullRow, Kept, Record
 from ..port import NEWEST, DamagedError, NotCommittedError, Step, StorageError
 from . import chunks
+from .divided import newest_rows
 from .encoding import weight
 from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
@@ -23,7 +24,6 @@ from .ledger import (
     Chunk,
     DropBatches,
     DropDead,
-    DropNewest,
     DropSnapshot,
     Finish,
     Group,
@@ -200,16 +200,8 @@ class RowStorage(ABC):
 
     def cut(self, number: int, last: int) -> Step | None:
         """The step that drops the revisions after `last`."""
-        with self._visible:
-            ids = self._settled().hulls[number].after(last)
-        if not ids:
-            return None
-        with self._lend() as reader:
-            rows = list(reader.some("batches", "batches.rowid, first, last, checksum", ids))
-        if [row[0] for row in rows] != list(ids) or rows[0][1] != last + 1:
-            raise DamagedError(f"{self._place}: a row of batches of hull {number} is missing")
-        weights = sum(weight(stored, number, first, end) for _, first, end, stored in rows)
-        return DropNewest(number, last, ids, weights)
+        with self._reading(lambda ledger: ledger.hulls[number].copy()) as (reader, hull):
+            return newest_rows(reader, hull, last)
 
     def sweep(self) -> Iterator[Step]:
         """Drop the rows of deleted hulls and unfinished snapshots."""

@@ -2,15 +2,18 @@
 
 import os
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ...state.records import HullRow, Kept
+from ...state.records import HullRow, HullSettings, Kept
 from ..port import NEWEST, DamagedError, FormatError, LockedError, Progress, StorageError
+from ..rows import divided
+from ..rows.divided import NoLongerKeptError, Part, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
+from ..rows.ledger import Group, Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
@@ -22,6 +25,8 @@ from .readers import SQLiteReader
 from .schema import PAGE_BYTES, renew_totals, sql_of
 
 PAGES_A_STEP = 256
+# How often the folders of a server are opened to find what they have in common.
+ATTEMPTS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,23 @@ class Report:
     fences: list[FenceReport] = field(default_factory=list)
 
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A hull in the folders of a server.
+
+    Attributes:
+        row: its row.
+        revision: its revision.
+        kepts: the settings and the contents of the hull or, of a hull over shards, of each shard.
+        notes: messages about losses at the ends of logs.
+    """
+
+    row: HullRow
+    revision: int
+    kepts: list[tuple[HullSettings, Kept]]
+    notes: list[str]
+
+
 def check(path: Path, progress: Progress) -> Report:
     """Examine all data of a folder without changing anything. A server may be writing to it.
 
@@ -75,26 +97,80 @@ def check(path: Path, progress: Progress) -> Report:
         return replace(report, fences=fences)
 
 
-def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = False) -> Report:
-    """Copy a folder, including its log, as of one moment. Returns a report on the copy.
+def check_together(paths: Sequence[Path]) -> None:
+    """Compare the shards of hulls with their roots, which may be in other folders of a server.
 
-    The copy has a different file name until it is complete and on the disk, so a partial copy is never used.
+    Raises:
+        DamagedError: a shard does not have what was decided.
+        StorageError: the folders cannot be read, or change faster than that.
+    """
+    with _together(paths):
+        return
+
+
+def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = False) -> Report:
+    """Copy a folder, including its log, as of one moment: `copy_all` of one folder."""
+    ((_, report),) = copy_all([(source, target)], progress, accept_loss=accept_loss)
+    return report
+
+
+def copy_all(
+    folders: Sequence[tuple[Path, Path]], progress: Progress, *, accept_loss: bool = False
+) -> Iterator[tuple[Path, Report]]:
+    """Copy folders of one server, including their logs, each as of one moment. Yields each copy, and a report on it.
+
+    Hulls over shards are copied as of the moment before these, so that the copies belong together: what their roots and
+    shards have beyond is left out.
+
+    A copy has a different file name until it is complete and on the disk, so a partial copy is never used.
 
     Args:
-        source: a data folder or a backup; a server may be writing to it.
-        target: the new folder; it must be empty if it exists.
+        folders: the source and the target of each. A source is a data folder or a backup; a server may be writing to
+            it. A target must be empty if it exists.
         progress: called with the pages copied so far and the total.
         accept_loss: whether to copy without the damaged or missing part of the log.
 
     Raises:
-        StorageError: the source has no database, or the target is not empty.
+        StorageError: a source has no database, a target is not empty, or hulls change faster than they are copied.
         DamagedError: the copied data is damaged.
     """
-    with _opened(source, accept_loss=accept_loss) as opened, _new(source, target) as connection:
-        opened.connection.backup(
-            connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
-        )
-        return _finish(connection, opened)
+    with _together([source for source, _ in folders], accept_loss=accept_loss) as together:
+        for place, (opened, (source, target)) in enumerate(zip(together.sources, folders, strict=True)):
+            with _new(source, target) as connection:
+                opened.connection.backup(
+                    connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
+                )
+                report = _finish(connection, opened, together.lasts(place))
+            yield target, report
+
+
+@contextmanager
+def _together(paths: Sequence[Path], *, accept_loss: bool = False) -> Iterator["_Together"]:
+    """The databases of one server, and what they have in common of hulls over shards.
+
+    Raises:
+        StorageError: these hulls change faster than the databases can be opened.
+    """
+    failure: Exception | None = None
+    for _ in range(ATTEMPTS):
+        before: dict[str, int] = {}
+        for path in paths if len(paths) > 1 else ():
+            with _opened(path, accept_loss=accept_loss) as opened:
+                before |= divided.revisions(load(opened.connection, opened.version))
+        with ExitStack() as stack:
+            sources = [stack.enter_context(_opened(path, accept_loss=accept_loss)) for path in paths]
+            ledgers = [load(each.connection, each.version) for each in sources]
+            parts = [Part(SQLiteReader(each.connection), ledger) for each, ledger in zip(sources, ledgers, strict=True)]
+            if len(parts) == 1:
+                before = divided.revisions(ledgers[0])
+            try:
+                wholes = list(divided.wholes(parts, before))
+            except NoLongerKeptError as error:  # a snapshot was written meanwhile, and another one before
+                failure = error
+                continue
+            yield _Together(sources, parts, wholes)
+            return
+    raise StorageError(f"the folder changes faster than it can be read, so try again, or stop the server: {failure}")
 
 
 @contextmanager
@@ -142,25 +218,31 @@ def write(source: str, target: Path, rows: Iterable[Insert], totals: Totals) -> 
     return findings
 
 
-def read(path: Path, name: str) -> tuple[HullRow, Kept, list[str]]:
-    """A hull as of the last commit: its row and its contents; and messages about losses at the end of the log.
+def read(paths: Sequence[Path], name: str) -> Found:
+    """A hull as of the last commit; a hull over shards as `copy_all` copies it.
+
+    Args:
+        paths: the folders of one server.
+        name: the name of the hull.
 
     Raises:
         StorageError: no hull has that name.
         DamagedError: it cannot be read.
     """
-    with _opened(path) as opened:
-        hulls = load(opened.connection, opened.version).hulls.values()
-        hull = next((hull for hull in hulls if hull.row.name == name), None)
-        if hull is None:
-            raise StorageError(f"there is no hull {name!r} in {path}")
-        return hull.row, read_hull(SQLiteReader(opened.connection), hull, NEWEST), opened.notes
-
-
-def names(path: Path) -> set[str]:
-    """The names of the hulls as of the last commit. Raises StorageError."""
-    with _opened(path) as opened:
-        return {hull.row.name for hull in load(opened.connection, opened.version).hulls.values()}
+    with _together(paths) as together:
+        parts, notes = together.parts, [note for each in together.sources for note in each.notes]
+        for part in parts:
+            for hull in part.ledger.hulls.values():
+                if hull.row.name == name and not hull.row.settings.divided:
+                    kept = read_hull(part.reader, hull, NEWEST)
+                    return Found(hull.row, kept.last_revision, [(hull.row.settings, kept)], notes)
+        for whole in together.wholes:
+            if whole.row.name == name:
+                shards = [(parts[of], parts[of].ledger.hulls[number], last) for of, number, last in whole.shards]
+                nothing = replace(whole.row.settings, shards=0), Kept()  # says which columns there are
+                kepts = [(hull.row.settings, read_hull(part.reader, hull, last)) for part, hull, last in shards]
+                return Found(whole.row, whole.revision, [nothing, *kepts], notes)
+    raise StorageError(f"there is no hull {name!r} in {paths[0] if len(paths) == 1 else paths[0].parent}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +260,20 @@ class _Opened:
     version: int
     notes: list[str]
     own: Totals | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Together:
+    """The databases of one server, and what they have in common of hulls over shards."""
+
+    sources: list[_Opened]
+    parts: list[Part]
+    wholes: list[Whole]
+
+    def lasts(self, place: int) -> dict[int, int]:
+        """The last revisions of roots and shards in one of the databases that belong to what they have in common."""
+        roots = {whole.row.number: whole.revision for whole in self.wholes if whole.part == place}
+        return roots | {number: last for whole in self.wholes for of, number, last in whole.shards if of == place}
 
 
 @contextmanager
@@ -256,21 +352,37 @@ def _opened(path: Path, *, accept_loss: bool = False, unused: bool = False) -> I
             raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
 
 
-def _finish(connection: sqlite3.Connection, opened: _Opened) -> Report:
-    """Examine copied pages, and turn them into a database of the present format that is marked as not in use."""
+def _finish(connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int, int]) -> Report:
+    """Examine copied pages, and turn them into a database of the present format that is marked as not in use.
+
+    `lasts` are the last revisions of the hulls that may have later ones.
+    """
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("BEGIN IMMEDIATE")
     findings = examine(connection, opened.version, opened.own, lambda *_: None)
-    report = _report(findings, opened.notes)
-    if report.fatal:
-        raise DamagedError(f"the data is damaged and was not copied: {'; '.join(report.fatal)}")
+    if findings.fatal:
+        raise DamagedError(f"the data is damaged and was not copied: {'; '.join(findings.fatal)}")
+    _lead_back(connection, findings.ledger, lasts)
     findings.ledger.totals = findings.ledger.totals._replace(mode=STOPPED)
     if opened.version < FORMAT:
         migrate(connection, opened.version, findings.ledger, findings.starts)
     else:
         renew_totals(connection, findings.ledger.totals)
     connection.execute("COMMIT")
-    return report
+    return _report(findings, opened.notes)
+
+
+def _lead_back(connection: sqlite3.Connection, ledger: Ledger, lasts: Mapping[int, int]) -> None:
+    """Drop what hulls have beyond their last revisions."""
+    reader = SQLiteReader(connection)
+    steps = [step for number, last in lasts.items() for step in dropping(reader, ledger.hulls[number], last)]
+    if not steps:
+        return
+    group = Group(ledger, steps)
+    for statement in group.statements:
+        for sql, values in sql_of(statement):
+            connection.execute(sql, values)
+    group.adopt()
 
 
 def _report(findings: Findings, notes: list[str]) -> Report:
