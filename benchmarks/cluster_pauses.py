@@ -1,10 +1,12 @@
-"""How long a hull of a cluster is away: when its partition is moved, and when its worker is killed.
+"""How long a hull of a cluster is away: when its partition is moved, and when its worker or its node is killed.
 
     python benchmarks/cluster_pauses.py --points 1000000
+    python benchmarks/cluster_pauses.py --points 1000000 --ray
 
 Two servers on this machine share a PostgreSQL of their own, and one partition. A caller writes numbered batches of one
 point to one hull, each as soon as the one before is acknowledged. Prints the longest wait around each event, and the
-median of all waits.
+median of all waits. With --ray, Ray has started the servers, each on a node of its own, and the raylet of the one that
+has the partition is killed; callers use the other one.
 """
 
 import argparse
@@ -12,9 +14,8 @@ import os
 import signal
 import statistics
 import sys
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -24,7 +25,9 @@ sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
 from cluster import processes
 from patience import wait_until
 from postgresql import postgresql, query
+from ray_nodes import ENVIRONMENT, nodes_of_ray
 from server_process import run, server_process
+from steady_writer import SteadyWriter
 
 from dynhull_client import HullClient
 
@@ -35,102 +38,122 @@ OWNER = "SELECT epoch, worker FROM owners WHERE until > '-infinity' AND address 
 BEFORE, AFTER = 1.0, 0.5
 
 
-class Caller(threading.Thread):
-    """Writes, and remembers how long each batch took."""
+OPTIONS = ("--partitions", "1", "--scrub-cpu", "0", "--log-level", "error")
 
-    def __init__(self, address: str, revision: int) -> None:
-        super().__init__(daemon=True)
-        self._address = address
-        self._producer = f"caller-{revision}"
-        self._over = threading.Event()
-        self.waits: list[float] = []
-        self.revision = revision
 
-    def run(self) -> None:
-        with HullClient(self._address, retries=1000) as client:
-            while not self._over.is_set():
-                sequence = len(self.waits) + 1
-                begun = time.perf_counter()
-                done = client.apply(HULL, insert=[[0, 0]], producer=self._producer, sequence=sequence)
-                self.revision = done.revision
-                self.waits.append(time.perf_counter() - begun)
-
-    def stop(self) -> None:
-        self._over.set()
-        self.join()
+def fill(address: str, points: int) -> None:
+    """A hull of that many points."""
+    with HullClient(address, retries=1000) as client:
+        client.create_hull(HULL)
+        random = np.random.default_rng(1)
+        for first in range(0, points, CHUNK):
+            client.apply(HULL, insert=random.normal(size=(min(CHUNK, points - first), 2)))
 
 
 class Cluster:
     """Two servers."""
 
-    def __init__(self, stack: ExitStack, points: int) -> None:
-        database = stack.enter_context(postgresql("shared_buffers=256MB", "autovacuum=off"))
-        self.url = database.new_database()
-        options = ("--cluster", "--partitions", "1", "--journal", self.url, "--scrub-cpu", "0", "--log-level", "error")
+    def __init__(self, stack: ExitStack, url: str, points: int) -> None:
+        self.url = url
+        options = ("--cluster", "--journal", url, *OPTIONS)
         self.servers = [stack.enter_context(server_process(*options, complaints=None, killed=True)) for _ in range(2)]
-        with HullClient(self.address, retries=1000) as client:
-            client.create_hull(HULL)
-            random = np.random.default_rng(1)
-            for first in range(0, points, CHUNK):
-                client.apply(HULL, insert=random.normal(size=(min(CHUNK, points - first), 2)))
+        fill(self.address, points)
 
     @property
     def address(self) -> str:
         return self.servers[0].address
 
-    def owner(self) -> tuple[int, str]:
-        """Its epoch and its name."""
-        rows: list[tuple[int, str]] = []
-
-        def found() -> bool:
-            rows[:] = query(self.url, OWNER)
-            return bool(rows)
-
-        wait_until(found)
-        return rows[0]
-
     def move(self) -> None:
         """The partition, to the worker that does not have it."""
-        epoch, before = self.owner()
+        epoch, before = owner(self.url)
         workers = [name for (name,) in query(self.url, "SELECT worker FROM workers")]
         run("cluster", "move", 0, next(each for each in workers if each != before), "--journal", self.url)
-        wait_until(lambda: self.owner()[0] > epoch)
+        wait_until(lambda: owner(self.url)[0] > epoch)
 
     def kill(self) -> None:
         """The worker that has the partition. Its server starts it again."""
-        epoch, name = self.owner()
+        epoch, name = owner(self.url)
         server = next(each for each in self.servers if name.partition("/")[0].endswith(f"-{each.process.pid}"))
         os.kill(processes(server.process.pid)["worker-0"], signal.SIGKILL)
-        wait_until(lambda: self.owner()[0] > epoch)
+        wait_until(lambda: owner(self.url)[0] > epoch)
 
 
-def measured(cluster: Cluster, event: Callable[[], None]) -> tuple[float, float]:
+def owner(url: str) -> tuple[int, str]:
+    """The epoch and the name of the worker that serves the partition."""
+    rows: list[tuple[int, str]] = []
+
+    def found() -> bool:
+        rows[:] = query(url, OWNER)
+        return bool(rows)
+
+    wait_until(found)
+    return rows[0]
+
+
+def measured(address: str, event: Callable[[], None]) -> tuple[float, float]:
     """The longest wait around an event, and the median."""
-    with HullClient(cluster.address, retries=1000) as client:
+    with HullClient(address, retries=1000) as client:
         before = client.get_hull(HULL).revision
-        caller = Caller(cluster.address, before)
-        caller.start()
-        time.sleep(BEFORE)
-        event()
-        time.sleep(AFTER)
-        caller.stop()
-        assert caller.revision == client.get_hull(HULL).revision == before + len(caller.waits), "lost or doubled"
-    return max(caller.waits), statistics.median(caller.waits)
+    writer = SteadyWriter(address, HULL, f"writer-{before}")
+    writer.start()
+    time.sleep(BEFORE)
+    event()
+    time.sleep(AFTER)
+    writer.stop()
+    assert writer.revisions == list(range(before + 1, before + len(writer.waits) + 1)), "lost or doubled"
+    return max(writer.waits), statistics.median(writer.waits)
+
+
+def killed_node(url: str, points: int) -> tuple[float, float]:
+    """What callers notice of the death of a node of Ray."""
+    with nodes_of_ray(2) as nodes:
+        os.environ |= {**ENVIRONMENT, "RAY_ADDRESS": nodes[0].address}
+        import ray
+
+        from dynhull_cluster.machines import launcher
+
+        launcher.start_ray()
+        launcher.scale(2, ["--port", "0", "--insecure", *OPTIONS], {"DYNHULL_JOURNAL": url}, "")
+        actors = list(launcher.servers().values())
+        addresses = [said.split()[-1] for said in ray.get([each.serving.remote() for each in actors])]
+        processes = [server for _, server in ray.get([each.processes.remote() for each in actors])]
+        fill(addresses[0], points)
+        epoch, name = owner(url)
+        which = next(i for i, each in enumerate(processes) if name.partition("/")[0].endswith(f"-{each}"))
+        node = next(each for each in nodes if processes[which] in each.servers())
+
+        def kill() -> None:
+            node.kill("raylet")
+            wait_until(lambda: owner(url)[0] > epoch)
+
+        pause = measured(addresses[1 - which], kill)
+        ray.shutdown()
+    return pause
+
+
+def show(what: str, pauses: Sequence[tuple[float, float]]) -> None:
+    """A line of the table."""
+    longest, usual = zip(*pauses, strict=True)
+    each = ", ".join(f"{1000 * pause:.0f}" for pause in longest)
+    middle, of_all = 1000 * statistics.median(longest), 1000 * statistics.median(usual)
+    print(f"{what}: median of the longest {middle:.0f} ({each}); of all {of_all:.1f}", flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure how long a hull is away.")
     parser.add_argument("--points", type=int, default=1_000_000)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--ray", action="store_true", help="kill nodes of Ray, which take long to start")
     options = parser.parse_args()
-    with ExitStack() as stack:
-        cluster = Cluster(stack, options.points)
-        print(f"{options.points:,} points; milliseconds until a batch is acknowledged")
+    print(f"{options.points:,} points; milliseconds until a batch is acknowledged", flush=True)
+    with postgresql("shared_buffers=256MB", "autovacuum=off") as database, ExitStack() as stack:
+        if options.ray:
+            pauses = [killed_node(database.new_database(), options.points) for _ in range(options.rounds)]
+            show("its node is killed", pauses)
+            return
+        cluster = Cluster(stack, database.new_database(), options.points)
         for what, event in {"the partition is moved": cluster.move, "its worker is killed": cluster.kill}.items():
-            longest, usual = zip(*(measured(cluster, event) for _ in range(options.rounds)), strict=True)
-            all_of_them = ", ".join(f"{1000 * each:.0f}" for each in longest)
-            middle, every = 1000 * statistics.median(longest), 1000 * statistics.median(usual)
-            print(f"{what}: median of the longest {middle:.0f} ({all_of_them}); of all {every:.1f}", flush=True)
+            show(what, [measured(cluster.address, event) for _ in range(options.rounds)])
         for server in cluster.servers:
             server.process.kill()
 

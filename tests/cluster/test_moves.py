@@ -5,7 +5,6 @@ Whatever ends or stops in between: what is acknowledged stays, nothing is applie
 
 import os
 import signal
-import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -17,45 +16,13 @@ from command_line import dynhull
 from patience import wait_until
 from postgresql import PostgreSQL, query
 from server_process import Server, server_process
+from steady_writer import SteadyWriter
 
 from dynhull_client import HullClient, Quarantine
 
 POINTS = np.random.default_rng(1).normal(size=(5_000, 2))
 OWNER = "SELECT epoch, worker FROM owners WHERE until > '-infinity' AND address <> ''"
 HEIR = "SELECT heirs.worker FROM heirs JOIN owners USING (partition, epoch)"
-
-
-class Writer(threading.Thread):
-    """Writes numbered batches of one point until `stop`, each once the one before is acknowledged."""
-
-    def __init__(self, address: str, hull: str) -> None:
-        super().__init__(daemon=True)
-        self._address = address
-        self._hull = hull
-        self._over = threading.Event()
-        self.revisions: list[int] = []
-        self.error: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            with HullClient(self._address, retries=1000) as client:
-                while not self._over.is_set():
-                    sequence = len(self.revisions) + 1
-                    done = client.apply(self._hull, insert=[[9, sequence]], producer="writer", sequence=sequence)
-                    self.revisions.append(done.revision)
-        except BaseException as error:
-            self.error = error
-
-    def more(self) -> None:
-        """Wait until what is sent from now on is acknowledged."""
-        count = len(self.revisions)
-        wait_until(lambda: len(self.revisions) > count + 1 or self.error is not None)
-        assert self.error is None
-
-    def stop(self) -> None:
-        self._over.set()
-        self.join()
-        assert self.error is None
 
 
 class Pair:
@@ -69,7 +36,7 @@ class Pair:
             client.create_hull(hull)
             client.apply(hull, insert=POINTS)
         wait_until(lambda: len(query(url, "SELECT worker FROM workers")) == 2)
-        self.writer = Writer(servers[1].address, hull)
+        self.writer = SteadyWriter(servers[1].address, hull)
         self.writer.start()
 
     def owner(self) -> str:
@@ -98,15 +65,8 @@ class Pair:
         """Every batch that was acknowledged is there once."""
         self.writer.more()
         self.writer.stop()
-        count = len(self.writer.revisions)
-        assert self.writer.revisions == list(range(2, count + 2))
         for server in self.servers:
-            with HullClient(server.address, retries=1000) as client:
-                info = client.get_hull(self.hull).info
-                assert (info.revision, info.points) == (count + 1, len(POINTS) + count)
-                assert client.verify(self.hull).equal
-                counts = client.count(self.hull, [[9, sequence] for sequence in range(1, count + 2)]).counts
-                assert counts.tolist() == [1] * count + [0]
+            self.writer.check(server.address, before=1)
 
 
 @contextmanager
