@@ -1,13 +1,20 @@
 """A partition that is read ahead, while its owner goes on, is the same as one that is read at once."""
 
+import asyncio
 import random
+import time
 
 import pytest
 from folders import append, appended, events, fence_row, no_progress, record, same
+from live_engine import LIMITS
 from postgresql import query
 
 from dynhull_cluster.postgres.database import Database
+from dynhull_cluster.postgres.ownership import LEASE, MARGIN
 from dynhull_cluster.postgres.storage import PostgresStorage
+from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.supervisor import Supervisor
+from dynhull_server.engine.threads import Machine
 from dynhull_server.state.fences.records import AddFence, DropFence, Inside
 from dynhull_server.state.records import Contents, Create, Delete, HullRow, Kept
 from dynhull_server.storage.port import DamagedError, StorageError
@@ -262,3 +269,31 @@ def test_damage_is_not_taken_over(url):
         heir.follow(no_progress)
     heir.close()
     owner.close()
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+def test_an_engine_that_cannot_load_leaves_the_partition_to_others(url, ahead):
+    """Its rows are whole, but there is not enough memory for a hull, say."""
+    owner = on(url)
+    owner.open(no_progress)
+    owner.commit([Create(HullRow(1, "fleet", "u", 1.5))])
+    append(owner, 1, 3)
+    owner.close()
+
+    class Small(PostgresStorage):
+        def read_each(self, numbers):
+            raise MemoryError(numbers)
+
+    async def fail():
+        machine, storage = Machine(), Small(Database(url), pytest.fail)
+        engine = Engine(LIMITS, storage, Supervisor(machine.clock, pytest.fail, pytest.fail), machine)
+        with pytest.raises(MemoryError):
+            await (engine.read_ahead(storage, no_progress) if ahead else engine.start(no_progress))
+        await engine.close()
+
+    asyncio.run(fail())
+    begun = time.monotonic()
+    again = on(url)
+    again.open(no_progress)
+    assert time.monotonic() - begun < LEASE - MARGIN, "nobody else has it"
+    again.close()

@@ -23,6 +23,8 @@ from ..postgres.schema import hold, partitions_of, prepare
 
 # Seconds between looks at the tables, and until a look that gets no answer is given up.
 LOOK, PATIENCE = 0.5, 10.0
+# Seconds between two looks after which it is not known whether leases were renewed in between.
+GAP = 2.0
 # Seconds until something that is to be written is given up.
 SAY_SECONDS = 1.0
 # Seconds after which a worker that does not renew its row is one no longer.
@@ -158,6 +160,7 @@ class Board:
         self._worker = worker
         self._since: dict[int, tuple[str, float]] = {}
         self._renewed = 0.0, False
+        self._looked = 0.0
 
     def lapsed(self, partition: int) -> str | None:
         """The lease of an owner that has not been renewed for so long that it has ended; None of another."""
@@ -252,6 +255,9 @@ class Board:
             cursors = [await connection.execute(sql) for sql in ALL]
         self.tables = _tables([await each.fetchall() for each in cursors])
         now = time.monotonic()
+        if now > self._looked + GAP:  # perhaps the owners could not renew them either
+            self._since.clear()
+        self._looked = now
         for partition, owner in self.tables.owners.items():
             if self._since.get(partition, ("", 0.0))[0] != owner.until:
                 self._since[partition] = owner.until, now

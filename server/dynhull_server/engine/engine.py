@@ -141,7 +141,7 @@ class Engine:
         self._idle: asyncio.Event | None = None
         self._followed: FollowedStorage | None = None
         self._loaded: dict[int, _Loaded] = {}
-        self._begun = self._started = False
+        self._begun = self._opened = self._started = False
 
     # Start and shutdown
 
@@ -157,6 +157,7 @@ class Engine:
         """
         self._begin()
         self._followed = storage
+        self._opened = True
         contents: Contents = await self.run(self.disk, partial(storage.follow, progress))
         await self._load(contents, progress)
 
@@ -171,7 +172,7 @@ class Engine:
         """
         self._begin()
         clock, threads = self._machine.clock, self._machine.threads
-        contents: Contents = await self.run(self.disk, partial(self._storage.open, progress))
+        contents: Contents = await self.run(self.disk, partial(self._open, progress))
         self._core = Core(
             self._limits,
             contents.next_number,
@@ -205,6 +206,11 @@ class Engine:
         elif shards or any(hull.divided for hull in self._core.hulls.values()):
             raise StorageError("the storage has hulls over shards: start the server with `dynhull serve`")
         return contents.notes
+
+    def _open(self, progress: Progress) -> Contents:
+        contents = self._storage.open(progress)
+        self._opened = True
+        return contents
 
     def _begin(self) -> None:
         """Start the threads."""
@@ -281,7 +287,7 @@ class Engine:
     async def close(self) -> None:
         """Complete the trips in progress, refuse the waiting requests, and close the storage."""
         if not self._started:
-            if self._followed is not None:
+            if self._begun:
                 await asyncio.to_thread(self._forget)
             return
         if self.divisions is not None:
@@ -300,7 +306,8 @@ class Engine:
     def _forget(self) -> None:
         for pool in (self._turns, self._reads, self.disk):
             pool.shutdown()
-        self._storage.close()
+        if self._opened:
+            self._storage.close()
 
     # Hulls
 

@@ -8,13 +8,15 @@ network to it those of postgres_torture.py. The other faults:
 * a worker is killed, or stopped until its partitions are taken over, and then goes on
 * a gateway is killed
 * a machine with its worker and its gateway is killed, or stopped as an operator does it, and started again
-* partitions are moved by hand
+* partitions are moved by hand; or are to be moved when the worker that has one, or is to have it, is killed or stopped
 """
 
 import os
 import signal
 import sys
 import time
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1] / "server"))
@@ -107,12 +109,35 @@ class Torture(postgres_torture.Torture):
 
     def _move(self) -> None:
         """Every partition to one worker, and then anywhere."""
-        worker = self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0]
+        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
+        time.sleep(self._random.uniform(0.2, 2.0))
+        self._order("anywhere")
+
+    def _order(self, worker: str) -> None:
+        """Have every partition moved to one worker, or anywhere."""
         for partition in range(PARTITIONS):
             self._command("cluster", "move", str(partition), worker, "--journal", self._url)
-        time.sleep(self._random.uniform(0.2, 2.0))
-        for partition in range(PARTITIONS):
-            self._command("cluster", "move", str(partition), "anywhere", "--journal", self._url)
+
+    def _kill_in_move(self) -> None:
+        """One of the two workers of a move is killed, at any moment."""
+        self._balanced()
+        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
+        time.sleep(self._random.uniform(0.0, 0.6))
+        with suppress(ProcessLookupError):
+            os.kill(self._one_of("worker"), signal.SIGKILL)
+        self._order("anywhere")
+
+    def _stop_in_move(self) -> None:
+        """One of the two is stopped for a while, at any moment, and goes on before it is replaced, or after."""
+        self._balanced()
+        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
+        time.sleep(self._random.uniform(0.0, 0.6))
+        worker = self._one_of("worker")
+        with suppress(ProcessLookupError):
+            os.kill(worker, signal.SIGSTOP)
+            time.sleep(self._random.uniform(0.1, 6.0))
+            os.kill(worker, signal.SIGCONT)
+        self._order("anywhere")
 
     def _command(self, *words: str) -> None:
         done = run_command(*words)
@@ -137,31 +162,34 @@ KINDS = [
     "kill_worker",
     "move",
     "terminate",
+    "kill_in_move",
     "stop_machine",
     "cut",
     "kill_gateway",
-    "zombie",
+    "stop_in_move",
     "hold",
-    "kill_worker",
+    "kill_in_move",
     "freeze",
     "kill_machine",
     "full_disk",
 ]
 
 
-def run(folder: Path, faults: int, seed: int) -> str:
+def run(folder: Path, kinds: Sequence[str], faults: int, seed: int) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     tortured = Torture(folder, seed)
-    tortured.rounds(KINDS, faults)
+    tortured.rounds(kinds, faults)
     return tortured.counts()
 
 
 def main() -> None:
-    options = torture.arguments("Kill, stop and cut off the machines of a cluster while a model watches.").parse_args()
+    parser = torture.arguments("Kill, stop and cut off the machines of a cluster while a model watches.")
+    parser.add_argument("--kinds", nargs="+", choices=sorted({*KINDS}), default=KINDS, help="which (default: all)")
+    options = parser.parse_args()
     torture.on_small_disk(
         __file__,
         postgres_torture.DISK,
-        lambda folder: run(folder, options.faults, options.seed),
+        lambda folder: run(folder, options.kinds, options.faults, options.seed),
         mounted=options.mounted,
     )
 
