@@ -106,7 +106,7 @@ class Live:
 
     def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """(k,) signs of (k, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
-        return self._tree.locate(self._as_points(xy))
+        return self._tree.locate(xy)
 
     def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """(k,) booleans: which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""

@@ -162,11 +162,11 @@ class GlobeTree(HullTree):
         start = pairs.index(min(pairs)) if pairs else 0
         return np.array(pairs[start:] + pairs[:start], dtype=np.float64).reshape(-1, 2)
 
-    def locate(self, xy: Points) -> npt.NDArray[np.int8]:
+    def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """+1 inside, 0 on the boundary, -1 outside, for each row. O(log n) a row."""
-        places, near = self._projected(xy)
+        places, near = self._projected(self._as_points(xy))
         signs = np.full(len(places), -1, dtype=np.int8)
-        signs[near] = super().locate(places[near])
+        signs[near] = [self._locate(p)[0] for p in as_tuples(places[near])]
         return signs
 
     def tangents(self, xy: Points) -> npt.NDArray[np.float64]:

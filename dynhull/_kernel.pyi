@@ -48,7 +48,7 @@ class HullTree:
     def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The upper (0) or lower (1) chain from left to right. O(h log n)."""
 
-    def locate(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
+    def locate(self, xy: object) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
         """For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row."""
 
     def support(self, directions: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
@@ -150,7 +150,7 @@ class Entities:
     def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The upper (0) or lower (1) chain from left to right. O(h log n)."""
 
-    def locate(self, xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
+    def locate(self, xy: object) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
         """For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row."""
 
     def support(self, directions: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:

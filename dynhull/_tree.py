@@ -45,8 +45,8 @@ from .arrays import Points, as_coordinate, as_points
 class HullTree:
     """A multiset of points and its convex hull.
 
-    Single coordinates are checked, and so are the arrays of `__init__` and `apply`. Callers ensure that other arrays
-    hold finite floats without negative zeros.
+    Single coordinates are checked, and so are the arrays of `__init__`, `apply` and `locate`. Callers ensure that other
+    arrays hold finite floats without negative zeros.
 
     O(log² n) an update, O(log n) a query, O(n) space.
     """
@@ -395,9 +395,9 @@ class HullTree:
 
     # Queries
 
-    def locate(self, xy: Points) -> npt.NDArray[np.int8]:
+    def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """+1 inside, 0 on the boundary, -1 outside, for each row. O(log n) a row."""
-        return np.array([self._locate(p)[0] for p in _tuples(xy)], dtype=np.int8)
+        return np.array([self._locate(p)[0] for p in _tuples(self._as_points(xy))], dtype=np.int8)
 
     def support(self, directions: Points) -> Points:
         """The farthest vertex in each direction, the lexicographically smaller of two. O(log n) a row."""

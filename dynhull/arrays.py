@@ -27,8 +27,6 @@ MOST_SHOWN = 80  # characters of a value in a message
 class Checked:
     """Points that `as_points` returns unchanged, so that a request's points are checked only once.
 
-    A check costs about as much as locating the points.
-
     Args:
         points: an array that `as_points` or `packed_points` returned.
     """

@@ -18,6 +18,7 @@
 #endif
 #if defined(__unix__) || defined(__APPLE__)
 #include <pthread.h>
+#include <time.h>
 #define DYNHULL_HAS_FORK
 #endif
 
@@ -76,10 +77,11 @@ class Team {
     work_ = work;
     context_ = context;
     done_ = 0;
+    displaced_ = false;
     open_ = (open_ >> ROUND << ROUND) + (std::uint64_t{1} << ROUND) + (std::uint64_t{tasks} << TASKS);
     if (asleep_ > 0) wake(helpers_);
     const auto began = Clock::now();
-    work_on();
+    work_on([] {});
     const auto worked = Clock::now();
     await(tasks);
     note_wait(worked - began, Clock::now() - worked);
@@ -90,6 +92,26 @@ class Team {
   static constexpr auto WHILE_TAKEN = std::chrono::microseconds(200);
   static constexpr auto AFTERWARDS = std::chrono::microseconds(20);  // about what it costs to wake a thread
   static constexpr unsigned FIRST_ALONE = 16, LONGEST_ALONE = 255;   // calls
+
+  // How long the calling thread has waited for a processor since this was made; also counts its work on systems that do
+  // not tell the two apart.
+  class Displacement {
+   public:
+    Clock::duration operator()() const { return Clock::now() - began_ - (worked() - before_); }
+
+   private:
+    static Clock::duration worked() {
+#ifdef DYNHULL_HAS_FORK
+      timespec spent;
+      if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &spent) == 0)
+        return std::chrono::seconds(spent.tv_sec) + std::chrono::nanoseconds(spent.tv_nsec);
+#endif
+      return {};
+    }
+
+    Clock::time_point began_ = Clock::now();
+    Clock::duration before_ = worked();
+  };
 
   // The fields of open_: the number of the run, its tasks, and how many of them are claimed.
   static constexpr unsigned ROUND = 32, TASKS = 16;
@@ -127,9 +149,13 @@ class Team {
   }
 
   [[noreturn]] void help() {
-    for (;; work_on()) {
-      const auto opens = [this] { return is_open(); };
+    const auto opens = [this] { return is_open(); };
+    for (;;) {
       if (!spins_until(opens, AFTERWARDS) && !(taken_ && spins_until(opens, WHILE_TAKEN))) sleep();
+      const Displacement displacement;
+      work_on([&] {
+        if (displacement() > WHILE_TAKEN) displaced_ = true;
+      });
     }
   }
 
@@ -142,9 +168,10 @@ class Team {
     waits_ = false;
   }
 
-  // More than twice as many calls alone each time that helpers are late: on a busy machine nearly all calls are.
+  // More than twice as many calls alone each time that helpers are late: on a busy machine nearly all calls are. Where
+  // helpers had a processor all the time, a long wait only shows that the tasks were uneven.
   void note_wait(Clock::duration worked, Clock::duration waited) {
-    const bool late = waited > worked + WHILE_TAKEN;
+    const bool late = displaced_ && waited > worked + WHILE_TAKEN;
     late_ = late ? std::min(2 * late_ + FIRST_ALONE, LONGEST_ALONE) : late_ / 2;
     if (late) alone_ = late_;
   }
@@ -154,10 +181,13 @@ class Team {
     return claimed(open) < tasks(open);
   }
 
-  void work_on() {
+  // Calls `after_each` after each task's work, before it counts as done.
+  template <class After>
+  void work_on(After after_each) {
     for (std::uint64_t open = open_; claimed(open) < tasks(open);) {
       if (!open_.compare_exchange_weak(open, open + 1)) continue;
       work_(context_, claimed(open));
+      after_each();
       if (++done_ == tasks(open) && waits_) {
         const std::lock_guard lock(mutex_);
         finished_.notify_one();
@@ -206,7 +236,8 @@ class Team {
   Work work_ = nullptr;
   void* context_ = nullptr;
   alignas(64) std::atomic<std::size_t> done_ = 0;
-  std::atomic<bool> waits_ = false;  // the caller sleeps
+  std::atomic<bool> waits_ = false;      // the caller sleeps
+  std::atomic<bool> displaced_ = false;  // a helper had to wait for a processor in this run
 
   alignas(64) std::mutex mutex_;
   std::condition_variable called_, finished_;

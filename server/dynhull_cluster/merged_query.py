@@ -140,14 +140,9 @@ def _waits(read: pb.Read) -> bool:
 
 
 class _WorkerAnswers:
-    """The call of one worker.
-
-    Attributes:
-        over: whether it has ended: the next message needs another one.
-    """
+    """The call of one worker."""
 
     def __init__(self, link: WorkerLink, call: Call) -> None:
-        self.over = False
         self._stream: Upstream | None = None
         self._answers: deque[pb.ReadAnswer] = deque()
         self._failure: RelayedError | WorkerAwayError | None = None
@@ -155,6 +150,11 @@ class _WorkerAnswers:
             self._stream = link.stream(QUERY, metadata_of(call))
         except WorkerAwayError as error:
             self._failure = error
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended: the next message needs another one."""
+        return self._failure is not None or (self._stream is not None and self._stream.over)
 
     async def send(self, part: pb.QueryRequest) -> None:
         """Send reads. An error is that of their answers."""
@@ -176,7 +176,6 @@ class _WorkerAnswers:
                     assert response is not None  # it reads for as long as it is sent reads
                     self._answers.extend(pb.QueryResponse.FromString(response).answers)
                     continue
-            self.over = True
             answer = pb.ReadAnswer()
             answer.error.MergeFromString(error_status(self._failure).SerializeToString())
             return answer

@@ -98,7 +98,6 @@ class Processes:
         self._gateways = gateways
         self.all = [*workers, *gateways]
         self._tasks: set[asyncio.Task[None]] = set()
-        self._one_restart = asyncio.Lock()
 
     @property
     def address(self) -> str:
@@ -118,10 +117,12 @@ class Processes:
         return True
 
     async def keep(self, stop: asyncio.Event, again: asyncio.Event) -> None:
-        """Keep them alive until `stop`, and restart them, one at a time, whenever `again` is set."""
-        while await self._wait(stop, again):
-            again.clear()
-            self._tasks.add(asyncio.create_task(self._restart(), name=RESTART))
+        """Keep them alive until `stop`, and restart them, one at a time, whenever `again` is set.
+
+        If it is set while they are restarted, they are restarted once more, however often it was.
+        """
+        self._tasks.add(asyncio.create_task(self._restart_whenever(again), name=RESTART))
+        await self._wait(stop, stop)
 
     async def stop(self) -> None:
         """Stop the gateways, which end their calls, and then the workers."""
@@ -132,12 +133,14 @@ class Processes:
                 task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    async def _restart(self) -> None:
-        async with self._one_restart:
+    async def _restart_whenever(self, again: asyncio.Event) -> None:
+        while True:
+            await again.wait()
+            again.clear()
             for each in self.all:
                 log.info("a process is restarted", extra={"restarted": each.name})
                 await each.restart()
-        log.info("all processes are restarted")
+            log.info("all processes are restarted")
 
     async def _wait(self, stop: asyncio.Event, *events: asyncio.Event) -> bool:
         """Wait for all of the events, or for `stop`; returns False for that.

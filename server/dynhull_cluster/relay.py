@@ -1,8 +1,8 @@
 """What a gateway does with a call: it passes the bytes to the worker that has the name, and the answers back."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -12,7 +12,7 @@ from dynhull_server.state.errors import LimitExceededError
 
 from .callers import metadata_of
 from .placement import worker_of
-from .upstream import Upstream
+from .upstream import Upstream, one_request
 from .worker_link import WorkerLink
 
 Route = Callable[[bytes, Call], WorkerLink]
@@ -132,23 +132,6 @@ async def _response(upstream: Upstream, feeding: "asyncio.Task[None]") -> bytes 
         if task is not None and not task.cancelling():
             await feeding
         raise
-
-
-@asynccontextmanager
-async def one_request(
-    upstream: Upstream, message: bytes, sending: AbstractContextManager[None]
-) -> AsyncIterator[Upstream]:
-    """The call of a worker, with this request and no other, which ends with the block.
-
-    `sending` is around the sending of the request, which waits while the worker starts.
-    """
-    try:
-        with sending:
-            await upstream.write(message)
-            await upstream.done_writing()
-        yield upstream
-    finally:
-        upstream.cancel()
 
 
 def within(max_bytes: int) -> Any:

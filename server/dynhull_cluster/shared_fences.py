@@ -21,7 +21,8 @@ from dynhull_server.rpc.metrics import Metrics
 
 from .callers import metadata_of, metadata_of_feed
 from .feeds import Feeds
-from .relay import Relay, one_request
+from .relay import Relay
+from .upstream import one_request
 from .worker_link import WorkerLink
 
 WATCH_FENCE = f"/{FENCES.full_name}/WatchFence"

@@ -26,8 +26,8 @@ from dynhull_server.state.errors import HullNotFoundError
 from .callers import metadata_of, metadata_of_feed
 from .feeds import Feeds
 from .held import Held
-from .relay import Relay, one_request
-from .upstream import lost_status
+from .relay import Relay
+from .upstream import lost_status, one_request
 from .worker_link import WorkerLink
 
 WATCH = f"/{DESCRIPTOR.full_name}/Watch"

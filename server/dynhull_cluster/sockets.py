@@ -23,7 +23,6 @@ class Sockets:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._channels: dict[int, Any] = {}
 
     def frames(self, worker: int) -> Path:
         """The socket for frames."""
@@ -39,10 +38,8 @@ class Sockets:
         return frames
 
     def channel(self, worker: int) -> Any:
-        """A channel to the socket for gRPC, which connects by itself."""
-        if worker not in self._channels:
-            self._channels[worker] = grpc.aio.insecure_channel(f"unix:{self.grpc(worker)}", options=OPTIONS)
-        return self._channels[worker]
+        """A new channel to the socket for gRPC."""
+        return grpc.aio.insecure_channel(f"unix:{self.grpc(worker)}", options=OPTIONS)
 
     def proof(self, _: int) -> Metadata:
         """Nothing: only gateways can reach the sockets."""
@@ -50,11 +47,6 @@ class Sockets:
 
     def when_moved(self, _: int, __: Callable[[], None]) -> None:
         """Workers have their sockets for good."""
-
-    async def close(self, worker: int) -> None:
-        """Close the channel."""
-        if worker in self._channels:
-            await self._channels.pop(worker).close()
 
 
 def socket_folder(data: Path | None) -> Path:

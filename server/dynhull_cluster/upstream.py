@@ -1,8 +1,8 @@
 """A call of a worker with any number of requests and responses."""
 
 import asyncio
-from collections.abc import Coroutine, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import AsyncIterator, Coroutine, Iterator
+from contextlib import AbstractContextManager, asynccontextmanager, contextmanager, suppress
 from typing import Any, TypeVar
 
 import grpc
@@ -16,7 +16,7 @@ ENDED = suppress(asyncio.InvalidStateError, grpc.aio.AioRpcError)
 # What gRPC itself makes of a connection that breaks, or of a worker that ends in the middle of a request; a worker
 # gives its own errors details.
 BROKEN = grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN
-# Seconds that the status of a worker may arrive after a write that it has made fail.
+# Seconds that what a worker has sent may arrive after a write that it has made fail, or after its end.
 LATE_SECONDS = 1.0
 
 T = TypeVar("T")
@@ -33,7 +33,6 @@ class Upstream:
     def __init__(self, call: "grpc.aio.StreamStreamCall[bytes, bytes]") -> None:
         self._call = call
         self._severed = False
-        self._sending = 0
         self._waiting: set[asyncio.Task[Any]] = set()
         self._interrupted: set[asyncio.Task[Any]] = set()
         self._responses = aiter(call)
@@ -42,14 +41,14 @@ class Upstream:
 
     async def write(self, message: bytes) -> bool:
         """Send a request. Returns False if the call has ended: `read` says why."""
-        with ENDED, self._sends():
+        with ENDED, self._unless_severed():
             await self._call.write(message)
             return True
         return False
 
     async def done_writing(self) -> None:
         """Say that there are no more requests."""
-        with ENDED, self._sends():
+        with ENDED, self._unless_severed():
             await self._call.done_writing()
 
     async def read(self) -> bytes | None:
@@ -68,26 +67,17 @@ class Upstream:
             raise RelayedError(status) from None
 
     @property
-    def sending(self) -> bool:
-        """Whether a request has not been sent yet."""
-        return self._sending > 0
+    def over(self) -> bool:
+        """Whether the call has ended, though responses may be left to read."""
+        return bool(self._call.done())
 
     def sever(self) -> None:
-        """End the call as if the connection were lost: whoever would answer it is not to be heard any more."""
+        """End the call as one whose connection was lost: nobody will answer it."""
         self._severed = True
         for task in self._waiting:  # gRPC leaves who writes to a connection that is never made waiting for ever
             self._interrupted.add(task)
             task.cancel()
         self._call.cancel()
-
-    @contextmanager
-    def _sends(self) -> Iterator[None]:
-        self._sending += 1
-        try:
-            with self._unless_severed():
-                yield
-        finally:
-            self._sending -= 1
 
     @contextmanager
     def _unless_severed(self) -> Iterator[None]:
@@ -118,6 +108,23 @@ class Upstream:
             status = Status(code=code.value[0], message=details or "")
         if status is not None and not self._said.done():
             self._said.set_result(status)
+
+
+@asynccontextmanager
+async def one_request(
+    upstream: Upstream, message: bytes, sending: AbstractContextManager[None]
+) -> AsyncIterator[Upstream]:
+    """The call of a worker, with this request and no other, which ends with the block.
+
+    `sending` is around the sending of the request, which waits while the worker starts.
+    """
+    try:
+        with sending:
+            await upstream.write(message)
+            await upstream.done_writing()
+        yield upstream
+    finally:
+        upstream.cancel()
 
 
 def status_of(error: "grpc.aio.AioRpcError") -> Status:

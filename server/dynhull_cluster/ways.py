@@ -10,7 +10,7 @@ OPTIONS = [
     ("grpc.max_receive_message_length", -1),
     ("grpc.max_send_message_length", -1),
     ("grpc.initial_reconnect_backoff_ms", 50),
-    ("grpc.min_reconnect_backoff_ms", 50),
+    ("grpc.min_reconnect_backoff_ms", 2000),  # the time that an attempt has at least
     ("grpc.max_reconnect_backoff_ms", 500),
     ("grpc.http2.lookahead_bytes", 2**20),
     ("grpc.http2.bdp_probe", 0),
@@ -33,13 +33,10 @@ class Ways(Protocol):
         """Connect for frames. Raises OSError."""
 
     def channel(self, worker: int) -> Any:
-        """The channel for gRPC, where `connect` has led."""
+        """A new channel for gRPC, to where `connect` has just led."""
 
     def proof(self, worker: int) -> Metadata:
         """The metadata that let the worker believe what a gateway says of its callers."""
 
     def when_moved(self, worker: int, moved: Callable[[], None]) -> None:
-        """Have a function called whenever the worker is elsewhere: what has not been answered will not be."""
-
-    async def close(self, worker: int) -> None:
-        """Close the channel."""
+        """Have a function called whenever the worker is elsewhere."""

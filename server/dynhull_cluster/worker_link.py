@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from functools import partial
 from typing import Any
 from weakref import WeakSet
@@ -18,7 +18,7 @@ from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 from .again import may_repeat
 from .callers import Metadata, metadata_of
 from .frames import MOST_BYTES, Frames, Kind, pack_request
-from .upstream import Upstream, lost_status, status_of
+from .upstream import LATE_SECONDS, Upstream, lost_status, one_request
 from .ways import Ways
 
 # Seconds until a worker that is away is looked for again.
@@ -48,8 +48,8 @@ class WorkerLink:
         self.health = dict.fromkeys(watched, UNKNOWN)
         self._ways = ways
         self._changed = changed
-        self._frames: AskingFrames | None = None
-        self._upstreams: WeakSet[Upstream] = WeakSet()
+        self._connection: Connection | None = None
+        self._leaving: set[asyncio.Task[None]] = set()
         self._arrived = asyncio.Event()
         self._elsewhere = asyncio.Event()
         self._again = asyncio.Event()
@@ -58,7 +58,7 @@ class WorkerLink:
     @property
     def present(self) -> bool:
         """Whether the worker can be called."""
-        return self._frames is not None and self._frames.connected
+        return self._connection is not None and self._connection.frames.connected
 
     async def run(self) -> None:
         """Connect, and connect again whenever the worker has ended."""
@@ -71,14 +71,11 @@ class WorkerLink:
             except OSError:
                 await _until(self._elsewhere)
                 continue
-            # The worker that these were being sent to has ended. gRPC may not notice, and have them wait for ever.
-            for upstream in list(self._upstreams):
-                if upstream.sending:
-                    upstream.sever()
+            connection = Connection(frames, self._ways.channel(self.number))
             try:
                 async with asyncio.TaskGroup() as tasks:
-                    watches = [tasks.create_task(self._watch(service)) for service in self.health]
-                    self._frames = frames
+                    watches = [tasks.create_task(self._watch(connection, service)) for service in self.health]
+                    self._connection = connection
                     self._arrived.set()
                     self._again.set()
                     self._again = asyncio.Event()
@@ -87,21 +84,24 @@ class WorkerLink:
                     for each in watches:
                         each.cancel()
             finally:
-                self._frames = None
+                self._connection = None
                 self._arrived.clear()
                 self.health = dict.fromkeys(self.health, UNKNOWN)
                 frames.close()
-                if self._ways.patience:  # the machine may be gone, which gRPC would not notice
-                    self._sever()
+                leaving = loop.create_task(connection.end())
+                self._leaving.add(leaving)
+                leaving.add_done_callback(self._leaving.discard)
                 self._changed()
 
     async def close(self) -> None:
-        """Close the channel, after `run`."""
-        await self._ways.close(self.number)
+        """End what is left of former connections, after `run`."""
+        for each in self._leaving:
+            each.cancel()
+        await asyncio.gather(*self._leaving, return_exceptions=True)
 
     async def arrive(self) -> None:
         """Wait for a worker that is away, for as long as the ways to it say; `stream` says if that was in vain."""
-        if self._frames is None and self._ways.patience:
+        if self._connection is None and self._ways.patience:
             try:
                 async with asyncio.timeout(self._ways.patience):
                     await self._arrived.wait()
@@ -134,25 +134,15 @@ class WorkerLink:
             await _until(self._again)
 
     async def _ask(self, method: str, call: Call, message: bytes) -> bytes:
-        frames = self._present()
+        frames = self._present().frames
         if len(message) <= MOST_BYTES:
             while not frames.writable.is_set():  # what a worker that does not read has not got is its caller's alone
                 await frames.writable.wait()
-                frames = self._present()
+                frames = self._present().frames
             return await frames.ask(method, f"{call.owner} {call.caller.key}".encode(), message)
-        metadata = (*metadata_of(call), *self._ways.proof(self.number))
-        asked = self._channel.unary_unary(method)(message, metadata=metadata, wait_for_ready=True)
-        try:
-            response: bytes = await asked
-        except grpc.aio.AioRpcError as error:
-            raise RelayedError(status_of(error)) from None
-        except asyncio.CancelledError:
-            task = asyncio.current_task()
-            if task is None or task.cancelling():
-                raise
-            raise RelayedError(lost_status()) from None  # its channel was closed
-        finally:
-            asked.cancel()
+        async with one_request(self.stream(method, metadata_of(call)), message, nullcontext()) as upstream:
+            response = await upstream.read()
+        assert response is not None  # a call that succeeds has one
         return response
 
     def stream(self, method: str, caller: Metadata) -> Upstream:
@@ -162,37 +152,23 @@ class WorkerLink:
             method: its path.
             caller: the metadata that name the caller.
         """
-        self._present()
-        metadata = (*caller, *self._ways.proof(self.number))
-        upstream = Upstream(self._channel.stream_stream(method)(metadata=metadata, wait_for_ready=True))
-        self._upstreams.add(upstream)
-        return upstream
+        return self._present().stream(method, (*caller, *self._ways.proof(self.number)))
 
-    def _present(self) -> "AskingFrames":
-        if self._frames is None or not self._frames.connected:
+    def _present(self) -> "Connection":
+        if self._connection is None or not self._connection.frames.connected:
             raise WorkerAwayError(self.number)
-        return self._frames
-
-    @property
-    def _channel(self) -> Any:
-        return self._ways.channel(self.number)
+        return self._connection
 
     def _follow(self) -> None:
-        """The worker is elsewhere."""
+        """Connect again: the worker is elsewhere."""
         self._elsewhere.set()
-        self._sever()
+        if self._connection is not None:
+            self._connection.frames.abort()
 
-    def _sever(self) -> None:
-        """Hear nothing more from where the worker was."""
-        if self._frames is not None:
-            self._frames.abort()
-        for each in list(self._upstreams):
-            each.sever()
-
-    async def _watch(self, service: str) -> None:
+    async def _watch(self, connection: "Connection", service: str) -> None:
         """Follow one health service of the worker."""
         while True:
-            responses = self._channel.unary_stream(
+            responses = connection.channel.unary_stream(
                 HEALTH_WATCH,
                 request_serializer=health_pb2.HealthCheckRequest.SerializeToString,
                 response_deserializer=health_pb2.HealthCheckResponse.FromString,
@@ -213,6 +189,37 @@ async def _until(event: asyncio.Event) -> None:
     with suppress(TimeoutError):
         async with asyncio.timeout(LOOK_SECONDS):
             await event.wait()
+
+
+class Connection:
+    """What leads to a worker until it ends: frames, and a channel for gRPC.
+
+    The frames notice the end of the worker. gRPC may not, as when a machine is gone, and have calls wait for ever.
+
+    Args:
+        frames: the connected frames.
+        channel: the channel.
+    """
+
+    def __init__(self, frames: "AskingFrames", channel: Any) -> None:
+        self.frames = frames
+        self.channel = channel
+        self._upstreams: WeakSet[Upstream] = WeakSet()
+
+    def stream(self, method: str, metadata: Metadata) -> Upstream:
+        """A call of the worker."""
+        upstream = Upstream(self.channel.stream_stream(method)(metadata=metadata, wait_for_ready=True))
+        self._upstreams.add(upstream)
+        return upstream
+
+    async def end(self) -> None:
+        """End the calls: they have a moment for what has arrived, and then end without an answer."""
+        try:
+            await asyncio.sleep(LATE_SECONDS)
+        finally:
+            for each in list(self._upstreams):
+                each.sever()
+            await self.channel.close()
 
 
 class AskingFrames(Frames):

@@ -3,6 +3,7 @@
 import os
 import resource
 import signal
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ import numpy as np
 import pytest
 from cluster import descendants, processes
 from command_line import dynhull
+from forked import COMMAND
 from grpc_health.v1 import health_pb2, health_pb2_grpc
+from logged_process import logged_process
 from patience import PATIENCE, wait_until
 from server_process import Server, run, server_process
 
@@ -152,6 +155,47 @@ def test_all_processes_are_restarted_one_at_a_time(server: Server) -> None:
         wait_until(lambda: processes(server.process.pid).keys() == before.keys())
         wait_until(lambda: reaches(client))
         assert client.get_hull(NAMES[0]).info.points == points + written
+
+
+def test_signals_during_a_restart_make_one_more() -> None:
+    command = [COMMAND, "serve", "--port", "0", *WORKERS, "--in-memory", "--log-format", "json"]
+    with logged_process(command) as server:
+        assert server.process.stdout is not None
+        server.process.stdout.readline()
+        server.process.send_signal(signal.SIGHUP)
+        for number in range(1, 4):
+            wait_until(lambda number=number: len(server.said("a process is restarted")) >= number)
+            server.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: len(server.said("all processes are restarted")) == 2)
+        server.process.terminate()
+        server.process.wait(PATIENCE)
+        assert len(server.said("a process is restarted")) == 2 * 4
+
+
+def test_reads_of_one_call_go_on_after_their_worker_was_away(server: Server) -> None:
+    """The first ones after it is back, too, if there were none meanwhile."""
+    more, answered = threading.Semaphore(0), threading.Event()
+
+    def requests() -> Iterator[pb.QueryRequest]:
+        while True:
+            reads = [pb.Read(get_hull=pb.GetHullRequest(name=name)) for name in NAMES]
+            yield pb.QueryRequest(reads=reads)
+            answered.wait(PATIENCE)
+            if not more.acquire(timeout=PATIENCE):
+                return
+
+    with HullClient(server.address) as client, grpc.insecure_channel(server.address) as channel:
+        query = HullServiceStub(channel).Query(requests(), timeout=PATIENCE)
+        answers = (answer for response in query for answer in response.answers)
+        assert [next(answers).WhichOneof("answer") for _ in NAMES] == ["get_hull"] * 2
+        answered.set()
+        worker = processes(server.process.pid)["worker-0"]
+        os.kill(worker, signal.SIGKILL)
+        again("worker-0", server, worker)
+        wait_until(lambda: reaches(client))
+        more.release()
+        assert [next(answers).WhichOneof("answer") for _ in NAMES] == ["get_hull"] * 2
+        query.cancel()
 
 
 def test_a_killed_supervisor_takes_all_along_and_the_folder_is_served_again(tmp_path: Path) -> None:

@@ -5,12 +5,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import grpc
 import numpy as np
 import pytest
 from patience import PATIENCE
 
 from dynhull_client import Batch, HullClient
-from dynhull_cluster.frames import Frames, Kind, unpack_request
+from dynhull_cluster.frames import MOST_BYTES, Frames, Kind, unpack_request
 from dynhull_cluster.sockets import Sockets
 from dynhull_cluster.worker_link import WorkerLink
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
@@ -71,6 +72,12 @@ async def linked(folder: Path, worker: type[Frames]) -> tuple[WorkerLink, "async
     return link, running
 
 
+async def ended(link: WorkerLink, running: "asyncio.Task[None]") -> None:
+    running.cancel()
+    await asyncio.wait([running])
+    await link.close()
+
+
 def test_who_asks_again_just_when_the_worker_has_ended_is_told(tmp_path: Path) -> None:
     async def run() -> None:
         link, running = await linked(tmp_path, Ends)
@@ -80,7 +87,69 @@ def test_who_asks_again_just_when_the_worker_has_ended_is_told(tmp_path: Path) -
             link.stream(METHOD, ())
         with pytest.raises(WorkerAwayError):
             await link.ask(METHOD, CALL, b"")
-        running.cancel()
+        await ended(link, running)
+
+    asyncio.run(run())
+
+
+class Leaves(Frames):
+    """A worker that ends when it is asked to."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        leaving.append(self)
+
+
+leaving: list[Leaves] = []
+
+
+def test_calls_that_grpc_would_have_wait_end_with_their_worker(tmp_path: Path) -> None:
+    """Nobody listens for gRPC, which waits for that."""
+
+    async def run() -> None:
+        link, running = await linked(tmp_path, Leaves)
+        large = asyncio.create_task(link.ask(METHOD, CALL, bytes(MOST_BYTES + 1)))
+        upstream = link.stream(METHOD, ())
+        writing = asyncio.create_task(upstream.write(b""))
+        reading = asyncio.create_task(upstream.read())
+        assert not (await asyncio.wait([large, writing, reading], timeout=0.1))[0]
+        leaving.pop().close()
+        async with asyncio.timeout(PATIENCE):
+            assert not await writing
+            for each in (large, reading):
+                with pytest.raises(RelayedError, match="the outcome is unknown"):
+                    await each
+        await ended(link, running)
+
+    asyncio.run(run())
+
+
+def test_what_a_worker_sent_before_it_ended_arrives(tmp_path: Path) -> None:
+    async def serve(requests: Any, context: Any) -> None:
+        async for request in requests:
+            for _ in range(3):
+                await context.write(request)
+
+    async def run() -> None:
+        worker = grpc.aio.server()
+        handlers = {"GetHull": grpc.stream_stream_rpc_method_handler(serve)}
+        worker.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("dynhull.v1.HullService", handlers),))
+        worker.add_insecure_port(f"unix:{Sockets(tmp_path).grpc(0)}")
+        await worker.start()
+        link, running = await linked(tmp_path, Leaves)
+        upstream = link.stream(METHOD, ())
+        assert await upstream.write(b"answer")
+        assert await upstream.read() == b"answer"
+        leaving.pop().close()
+        await worker.stop(None)
+        async with asyncio.timeout(PATIENCE):
+            while link.present:
+                await asyncio.sleep(0.01)
+            assert [await upstream.read(), await upstream.read()] == [b"answer"] * 2
+            with pytest.raises(RelayedError) as lost:
+                await upstream.read()
+            assert lost.value.status.code == grpc.StatusCode.UNAVAILABLE.value[0]
+        await ended(link, running)
 
     asyncio.run(run())
 
@@ -101,6 +170,6 @@ def test_a_worker_that_has_stopped_gets_nothing_from_callers_that_have_left(tmp_
         started[0].resume()
         assert await asyncio.wait_for(link.ask(METHOD, CALL, b""), PATIENCE) == b"answer"
         assert 1 < started[0].requests < 20
-        running.cancel()
+        await ended(link, running)
 
     asyncio.run(run())

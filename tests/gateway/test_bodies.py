@@ -93,6 +93,7 @@ BAD = [
     (NDJSON, b'{"key": "a", "x": 1, "y": 2}\n[1, 2]\n', 400, 1, "key", None),
     (NDJSON, b"[" + b"1" * 2**21, 400, 0, None, None),
     (CSV, b"x,y\n1,2\n1,inf\n", 400, 1, "y", "inf"),
+    (CSV, b"x,y\n1,2\n1,1_000\n", 400, 1, "y", "1_000"),
     (CSV, b"x,y\n1,2\n1\n", 400, 1, None, "1"),
     (CSV, b"x,y\n1,2\n1,5,2,5\n", 400, 1, None, "1,5,2,5"),
     (CSV, b"a,b\n1,2\n", 400, 0, "header", None),

@@ -1,12 +1,15 @@
 """Every unary call over HTTP, and what errors say."""
 
+import http.client
 import json
+import socket
 import threading
 
 import numpy as np
 import pytest
 from command_line import dynhull
-from gateway_process import Gateway, gateway_process
+from gateway_process import NDJSON, Gateway, gateway_process
+from patience import PATIENCE
 from server_process import server_process
 
 from dynhull_client import HullClient
@@ -19,6 +22,36 @@ def square(gateway: Gateway, name: str) -> str:
     assert gateway.post("/hulls", {"name": name}).status == 201
     assert gateway.post(f"/hulls/{name}/points", SQUARE).json["revision"] == 1
     return name
+
+
+def test_what_is_not_http_is_a_problem_as_all_others(gateway: Gateway) -> None:
+    host, _, port = gateway.place.rpartition(":")
+    for sent in (b"HULLO /hulls HTTP/1.1\r\n\r\n", b"GET /hulls HTTP/1.1\r\nbad header\r\n\r\n", b"\x16\x03\x01\x02"):
+        with socket.create_connection((host, int(port)), PATIENCE) as connection:
+            connection.sendall(sent)
+            response = http.client.HTTPResponse(connection)
+            response.begin()
+            problem = json.loads(response.read())
+            assert (response.status, response.headers["Content-Type"]) == (400, "application/problem+json")
+            assert (problem["status"], problem["reason"]) == (400, "MALFORMED_MESSAGE")
+            assert connection.recv(1) == b"", "the connection is closed"
+
+
+@pytest.mark.parametrize(("path", "kind"), [("points", "application/json"), ("rows", NDJSON)])
+def test_two_numbers_for_one_request_are_refused(gateway: Gateway, square: str, path: str, kind: str) -> None:
+    connection = gateway.connection()
+    connection.putrequest("POST", f"/hulls/{square}/{path}")
+    for name, value in (("Content-Type", kind), ("Content-Length", "5")):
+        connection.putheader(name, value)
+    for number in (1, 2):
+        connection.putheader("Idempotency-Key", f"p:{number}")
+    connection.endheaders(b"[1,2]")
+    response = connection.getresponse()
+    problem = json.loads(response.read())
+    connection.close()
+    assert (response.status, problem["field"], problem["reason"]) == (400, "Idempotency-Key", "INVALID_FIELD")
+    assert problem["value"] == "p:1, p:2"
+    assert gateway.get(f"/hulls/{square}").json["info"]["revision"] == 1
 
 
 def test_questions_have_the_answers_of_the_sdk(gateway: Gateway, address: str, square: str) -> None:

@@ -94,6 +94,17 @@ def test_locate(kind):
     assert (hull.locate(queries) == alone(lambda: hull.locate(queries))).all()
 
 
+def test_locate_names_the_first_bad_row():
+    random = np.random.default_rng(0)
+    hull = DynamicHull(random.random((2000, 2)))
+    queries = random.random((60_000, 2))
+    queries[[41_000, 59_000], [0, 1]] = np.nan, np.inf
+    for _ in range(2):  # without an index, and with one
+        with pytest.raises(ValueError, match="points row 41000 is"):
+            hull.locate(queries)
+        hull.locate(queries[:40_000])
+
+
 def test_many_callers_share_the_threads():
     """Who finds them busy works alone: nobody waits, and every hull is right."""
     random = np.random.default_rng(0)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from quarantine_rules import SECOND, Model
 
-from dynhull import convex_hull
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import KeyedBatch
 from dynhull_server.state.errors import (
@@ -24,7 +24,6 @@ from dynhull_server.state.records import FOREVER, NO_TIME, HullSettings, Kept, Q
 from dynhull_server.storage.rows import chunks
 from dynhull_server.storage.rows.encoding import decode, encode
 
-SECOND = 1_000_000
 START = 1_700_000_000 * SECOND
 LIMITS = Limits(10, 40, 10, 10, 1000)
 NONE = PackedKeys.pack([])
@@ -88,62 +87,6 @@ class Hull:
         quarantine, counts = self.state.quarantine, self.state.counts
         rules = None if quarantine is None else (quarantine.rules, repr(quarantine.stored()), quarantine.whole())
         return counts.revision, self.positions(), self.state.vertices().tolist(), counts.held, counts.rules, rules
-
-
-def doubled_area(points):
-    corners = [(Fraction(x), Fraction(y)) for x, y in convex_hull(np.array(points, float).reshape(-1, 2)).tolist()]
-    pairs = zip(corners, corners[1:] + corners[:1], strict=True)
-    return sum((ax * by - ay * bx for (ax, ay), (bx, by) in pairs), Fraction(0))
-
-
-class Model:
-    """The rules as the documentation states them."""
-
-    def __init__(self, rules, *, ordered):
-        self.rules, self.ordered = rules, ordered
-        self.there, self.held = {}, {}  # by key: x, y and time; of held ones also the confirmations
-
-    def breaks(self, at, before, points):
-        x, y, time = at
-        if self.rules.max_speed is not None and before is not None:
-            squared = (Fraction(x) - Fraction(before[0])) ** 2 + (Fraction(y) - Fraction(before[1])) ** 2
-            elapsed = Fraction(abs(int(time * SECOND) - int(before[2] * SECOND)), SECOND)
-            if squared > (Fraction(self.rules.max_speed) * elapsed) ** 2:
-                return True
-        area = doubled_area(points)
-        grown = self.rules.max_growth is not None and area
-        return bool(grown) and doubled_area([*points, (x, y)]) > Fraction(self.rules.max_growth) * area
-
-    def put(self, rows, removes):
-        points = [at[:2] for at in self.there.values()]
-        there, held, out, released = dict(self.there), dict(self.held), [], 0
-        for row, (key, *at) in enumerate(rows):
-            before, waiting = self.there.get(key), self.held.get(key)
-            if self.ordered and before is not None and at[2] < before[2]:
-                continue
-            if not self.breaks(at, before, points):
-                there[key] = tuple(at)
-                if waiting is not None and at[2] >= waiting[2]:
-                    held.pop(key)
-                continue
-            confirmed = 0
-            if waiting is not None:
-                if self.ordered and at[2] < waiting[2]:
-                    continue
-                if at[2] > waiting[2] and not self.breaks(at, waiting[:3], [*points, waiting[:2]]):
-                    confirmed = waiting[3] + 1
-                if 0 < self.rules.confirmations <= confirmed:
-                    there[key] = tuple(at)
-                    held.pop(key)
-                    released += 1
-                    continue
-            held[key] = (*at, confirmed)
-            out.append(row)
-        for key in removes:
-            there.pop(key, None)
-            held.pop(key, None)
-        self.there, self.held = there, held
-        return out, released
 
 
 # Few places, so that equal areas and speeds at their limits are frequent.

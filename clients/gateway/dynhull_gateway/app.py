@@ -25,7 +25,7 @@ from .hosts import KnownHosts
 from .ogc import routes as maps
 from .ogc.documents import FeatureCollection, Item
 from .ogc.entities import Snapshots
-from .parameters import require_known
+from .parameters import require_known, require_one_number
 from .paths import PathsAsSent
 from .problems import RESPONSES, Problem
 from .schemas import Batch, Feature
@@ -59,7 +59,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         docs_url=None,  # their pages load scripts from elsewhere
         redoc_url=None,
         responses=RESPONSES,
-        dependencies=[Depends(require_known)],
+        dependencies=[Depends(require_known), Depends(require_one_number)],
         separate_input_output_schemas=False,
         generate_unique_id_function=lambda route: route.name,
     )

@@ -1,4 +1,4 @@
-"""Parameters that a path does not have are refused: what a misspelled one asks for would be left out in silence."""
+"""Parameters that would be left out in silence are refused: misspelled ones, and a number that is given twice."""
 
 from difflib import get_close_matches
 from http import HTTPStatus
@@ -6,6 +6,17 @@ from http import HTTPStatus
 from fastapi import Request
 
 from .problems import ProblemError, cut
+
+IDEMPOTENCY_KEY = "Idempotency-Key"
+
+
+async def require_one_number(request: Request) -> None:
+    """Raise ProblemError if a request has two numbers: whichever is taken, the other one would seem to be applied."""
+    keys = request.headers.getlist(IDEMPOTENCY_KEY)
+    if len(keys) > 1:
+        detail = f"{IDEMPOTENCY_KEY}: the header is given {len(keys)} times: give it once"
+        more = {"field": IDEMPOTENCY_KEY, "value": cut(", ".join(keys))}
+        raise ProblemError(HTTPStatus.BAD_REQUEST, detail, "INVALID_FIELD", **more)
 
 
 async def require_known(request: Request) -> None:

@@ -1,6 +1,7 @@
 """Rows of bodies: points and keys as newline-delimited JSON, CSV and GeoJSON."""
 
 import csv
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal, NamedTuple, NotRequired
@@ -229,10 +230,9 @@ def _key(key: str | int | None, kind: str | None, row: int) -> str | int | None:
         return None
     if kind == "str":
         return str(key)
-    try:
-        return int(key)
-    except ValueError:
-        raise RowError(row, "must be an integer", "key", shown(key)) from None
+    if isinstance(key, str) and not INTEGER.fullmatch(key):
+        raise RowError(row, "must be an integer", "key", shown(key))
+    return int(key)
 
 
 def _cells(lines: Sequence[bytes]) -> Iterator[list[str]]:
@@ -260,12 +260,15 @@ def _typed(found: dict[str, str], row: int) -> Row:
 
 
 def _coordinate(text: str, field: str, row: int) -> float:
+    if "_" in text:  # notation of Python: 1_000
+        raise RowError(row, "must be a valid number", field, cut(text))
     try:
         return COORDINATE.validate_python(text)
     except ValidationError as error:
         raise RowError(row, detail(error.errors()[0]), field, cut(text)) from None
 
 
+INTEGER = re.compile(r"\s*[+-]?[0-9]{1,4300}\s*")  # as many digits as the interpreter reads
 COORDINATE: TypeAdapter[float] = TypeAdapter(Annotated[float, Field(allow_inf_nan=False)])
 TIME: TypeAdapter[datetime] = TypeAdapter(Time)
 

@@ -7,13 +7,16 @@ import signal
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from http import HTTPStatus
 
 import typer
 import uvicorn
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from dynhull_client import AsyncHullClient
 
 from .app import application
+from .problems import problem
 from .settings import Settings
 
 BACKLOG = 2048
@@ -29,6 +32,18 @@ class Server(uvicorn.Server):
         yield
 
 
+class Protocol(HttpToolsProtocol):
+    """uvicorn's protocol, with problem details for what is not HTTP, too."""
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer, and close the connection."""
+        answer = problem(HTTPStatus.BAD_REQUEST, f"{msg} The connection is closed.", reason="MALFORMED_MESSAGE")
+        headers = [*answer.raw_headers, (b"connection", b"close")]
+        lines = [b"HTTP/1.1 400 Bad Request", *(b"%b: %b" % header for header in headers), b"", bytes(answer.body)]
+        self.transport.write(b"\r\n".join(lines))
+        self.transport.close()
+
+
 def run(connect: Callable[[], AsyncHullClient], host: str, port: int, settings: Settings) -> None:
     """Serve until SIGTERM or SIGINT; the first line printed has the address."""
     config = uvicorn.Config("", log_config=None)  # for its choice of an event loop
@@ -42,6 +57,7 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
         app = application(client, settings)
         config = uvicorn.Config(
             app,
+            http=Protocol,
             log_config=None,
             log_level="error",  # bad requests are answered, not logged
             access_log=False,

@@ -99,18 +99,18 @@ class Hull {
     return array_of(std::move(vertices));
   }
 
-  SignArray locate(const Rows& rows) {
+  SignArray locate(const nb::object& xy) {
+    const Rows rows = tree_.frame().on_globe() ? nb::cast<Rows>(as_points(xy)) : as_rows(xy);
     const std::size_t count = rows.shape(0);
     const Output<std::int8_t> output(count);
     refresh_index_for(count);
-    {
+    const bool finite = [&] {
       const ReadLock lock(lock_, count);
-      if (tree_.frame().on_globe())
-        locate_projected(points_of(rows), count, output.data());
-      else
-        locate_places(points_of(rows), count, output.data());
-    }
-    return output.array();
+      if (!tree_.frame().on_globe()) return locate_places(points_of(rows), count, output.data());
+      locate_projected(points_of(rows), count, output.data());
+      return true;
+    }();
+    return finite ? output.array() : locate(checked(rows, INSERT));
   }
 
   CountArray count_many(const Rows& rows) {
@@ -356,12 +356,24 @@ class Hull {
  private:
   static constexpr std::size_t LOCATE_A_THREAD = 8192;
 
-  void locate_places(const Point* points, std::size_t count, std::int8_t* where) const {
+  // False if a point is not finite.
+  bool locate_places(const Point* points, std::size_t count, std::int8_t* where) const {
+    std::atomic<bool> finite = true;
     for_ranges(count, LOCATE_A_THREAD, [&](std::size_t from, std::size_t to) {
-      if (index_.fresh(tree_.plane())) return index_.locate(tree_.plane(), points + from, to - from, where + from);
-      for (std::size_t i = from; i < to; ++i)
-        where[i] = static_cast<std::int8_t>(dynhull::locate(tree_.plane().nodes(), points[i]).where);
+      if (!locate_range(points + from, to - from, where + from)) finite = false;
     });
+    return finite;
+  }
+
+  bool locate_range(const Point* points, std::size_t count, std::int8_t* where) const {
+    if (index_.fresh(tree_.plane())) return index_.locate(tree_.plane(), points, count, where);
+    Plain plain;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Point p = plain(points[i]);
+      if (!plain.finite()) return false;
+      where[i] = static_cast<std::int8_t>(dynhull::locate(tree_.plane().nodes(), p).where);
+    }
+    return true;
   }
 
   void locate_projected(const Point* points, std::size_t count, std::int8_t* where) const {
@@ -379,7 +391,10 @@ class Hull {
       rows[near] = static_cast<std::uint32_t>(i);
       near += has_place[i];
     }
-    if (near == count) return locate_places(places.data(), count, where);
+    if (near == count) {
+      locate_places(places.data(), count, where);
+      return;
+    }
     const Scratch<std::int8_t> found(near);
     locate_places(places.data(), near, found.data());
     for (std::size_t i = 0; i < near; ++i) where[rows[i]] = found[i];

@@ -33,10 +33,17 @@ class LocateIndex {
     version_ = tree.version();
   }
 
-  // +1 inside, 0 on the boundary, -1 outside.
-  void locate(const HullTree& tree, const Point* points, std::size_t count, std::int8_t* where) const {
-    for (std::size_t from = 0; from < count; from += BLOCK)
-      locate_block(tree, points + from, std::min(BLOCK, count - from), where + from);
+  // +1 inside, 0 on the boundary, -1 outside. Copies the points first, so that other threads may change them; false if
+  // one is not finite.
+  bool locate(const HullTree& tree, const Point* points, std::size_t count, std::int8_t* where) const {
+    Plain plain;
+    for (std::size_t from = 0; from < count && plain.finite(); from += BLOCK) {
+      const std::size_t here = std::min(BLOCK, count - from);
+      Point block[BLOCK];
+      for (std::size_t i = 0; i < here; ++i) block[i] = plain(points[from + i]);
+      if (plain.finite()) locate_block(tree, block, here, where + from);
+    }
+    return plain.finite();
   }
 
  private:
@@ -68,19 +75,23 @@ class LocateIndex {
 
   void locate_block(const HullTree& tree, const Point* points, std::size_t count, std::int8_t* where) const {
     std::uint8_t rest[BLOCK];  // the undecided queries
-    std::size_t left_over = 0;
+    std::size_t no_box = 0, left_over = 0;
     for (std::size_t i = 0; i < count; ++i) {
       where[i] = 1;
-      rest[left_over] = static_cast<std::uint8_t>(i);
-      left_over += !(inner_boxes_ && inner_boxes_->holds(points[i]));
+      rest[no_box] = static_cast<std::uint8_t>(i);
+      no_box += !(inner_boxes_ && inner_boxes_->holds(points[i]));
     }
     std::size_t cells[BLOCK];
     std::uint32_t left[BLOCK][2];
-    for (std::size_t k = 0; k < left_over; ++k) {
+    for (std::size_t k = 0; k < no_box; ++k) {
       const double x = points[rest[k]].x;
+      const bool beside = usable_ & either(x < least_, greatest_ < x);
       const bool within = usable_ & (x > least_) & (x < greatest_);
-      cells[k] = within ? cell(x) : NOWHERE;
-      prefetch(grid_.data() + (within ? cells[k] : 0));
+      where[rest[k]] = static_cast<std::int8_t>(1 - 2 * beside);
+      cells[left_over] = within ? cell(x) : NOWHERE;
+      prefetch(grid_.data() + (within ? cells[left_over] : 0));
+      rest[left_over] = rest[k];
+      left_over += !beside;
     }
     for (std::size_t k = 0; k < left_over; ++k) {
       if (cells[k] == NOWHERE) continue;

@@ -57,8 +57,6 @@ class Addresses:
         self._credentials = None if ca is None else grpc.ssl_channel_credentials(ca.read_bytes())
         self._known: dict[int, tuple[int, str]] = {}
         self._moved: dict[int, Callable[[], None]] = {}
-        self._channels: dict[int, Any] = {}
-        self._closing: set[asyncio.Task[None]] = set()
 
     def learn(self, tables: Tables) -> None:
         """Follow the owners; one that is away for the moment keeps its address, until another one has the partition."""
@@ -67,16 +65,12 @@ class Addresses:
             if owner.free or not owner.address or self._known.get(partition) == now:
                 continue
             self._known[partition] = now
-            if (channel := self._channels.pop(partition, None)) is not None:
-                closing = asyncio.get_running_loop().create_task(channel.close())
-                self._closing.add(closing)
-                closing.add_done_callback(self._closing.discard)
             if partition in self._moved:
                 self._moved[partition]()
 
     async def connect(self, worker: int, make: Callable[[], F]) -> F:
         """Connect to the owner of a partition, and prove to be a gateway. Raises OSError."""
-        host, _, frames_port = self._at(worker)
+        host, port, frames_port = self._at(worker)
         name = host if self._tls is not None else None
         async with asyncio.timeout(CONNECT_SECONDS):
             transport, frames = await asyncio.get_running_loop().create_connection(
@@ -90,19 +84,18 @@ class Addresses:
                 if isinstance(error, RelayedError):
                     raise OSError("another partition listens there now") from None
                 raise
+        if self._at(worker) != (host, port, frames_port):
+            transport.abort()
+            raise OSError(f"partition {worker} has moved meanwhile")
         return frames
 
     def channel(self, worker: int) -> Any:
-        """A channel to the owner of a partition, which connects by itself."""
-        if worker not in self._channels:
-            host, port, _ = self._at(worker)
-            address = f"{bracketed(host)}:{port}"
-            self._channels[worker] = (
-                grpc.aio.insecure_channel(address, options=OPTIONS)
-                if self._credentials is None
-                else grpc.aio.secure_channel(address, self._credentials, options=OPTIONS)
-            )
-        return self._channels[worker]
+        """A new channel to the owner of a partition."""
+        host, port, _ = self._at(worker)
+        address = f"{bracketed(host)}:{port}"
+        if self._credentials is None:
+            return grpc.aio.insecure_channel(address, options=OPTIONS)
+        return grpc.aio.secure_channel(address, self._credentials, options=OPTIONS)
 
     def proof(self, worker: int) -> Metadata:
         """What proves to the owner of a partition that this is a gateway."""
@@ -111,11 +104,6 @@ class Addresses:
     def when_moved(self, worker: int, moved: Callable[[], None]) -> None:
         """Have a function called when a partition has another owner, or its owner another address."""
         self._moved[worker] = moved
-
-    async def close(self, worker: int) -> None:
-        """Close the channel to a partition."""
-        if worker in self._channels:
-            await self._channels.pop(worker).close()
 
     def _at(self, partition: int) -> tuple[str, int, int]:
         """The host, the port for gRPC and that for frames. Raises OSError."""

@@ -146,11 +146,22 @@ class Call:
         begun = time.monotonic()
         if not self._begun:  # otherwise a cut-off first message would leave unclear whether the call has begun
             self._begun = True
-            await self._context.send_initial_metadata(())
+            await self._send_initial_metadata()
         with self.cutoff():
             await self.write(message)
         if time.monotonic() - begun > seconds:
             raise LimitExceededError("max_watch_lag", seconds)
+
+    async def _send_initial_metadata(self) -> None:
+        """Begin the answer, to its end: gRPC could not send the error of `end` with a beginning under way."""
+        task = _current_task()
+        in_cutoff = task in self.waiting
+        self.waiting.discard(task)
+        try:
+            await self._context.send_initial_metadata(())
+        finally:
+            if in_cutoff:
+                self.waiting.add(task)
 
     def stream(self) -> AbstractContextManager[None]:
         """Holds a place of a streaming call, whose number is limited."""
