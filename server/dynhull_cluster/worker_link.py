@@ -50,6 +50,7 @@ class WorkerLink:
         self._changed = changed
         self._connection: Connection | None = None
         self._leaving: set[asyncio.Task[None]] = set()
+        self._closed = asyncio.Event()
         self._arrived = asyncio.Event()
         self._elsewhere = asyncio.Event()
         self._again = asyncio.Event()
@@ -88,16 +89,15 @@ class WorkerLink:
                 self._arrived.clear()
                 self.health = dict.fromkeys(self.health, UNKNOWN)
                 frames.close()
-                leaving = loop.create_task(connection.end())
+                leaving = loop.create_task(connection.end(self._closed))
                 self._leaving.add(leaving)
                 leaving.add_done_callback(self._leaving.discard)
                 self._changed()
 
     async def close(self) -> None:
         """End what is left of former connections, after `run`."""
-        for each in self._leaving:
-            each.cancel()
-        await asyncio.gather(*self._leaving, return_exceptions=True)
+        self._closed.set()
+        await asyncio.gather(*self._leaving)
 
     async def arrive(self) -> None:
         """Wait for a worker that is away, for as long as the ways to it say; `stream` says if that was in vain."""
@@ -184,10 +184,10 @@ class WorkerLink:
             await asyncio.sleep(LOOK_SECONDS)
 
 
-async def _until(event: asyncio.Event) -> None:
+async def _until(event: asyncio.Event, seconds: float = LOOK_SECONDS) -> None:
     """Wait for an event, but not for long."""
     with suppress(TimeoutError):
-        async with asyncio.timeout(LOOK_SECONDS):
+        async with asyncio.timeout(seconds):
             await event.wait()
 
 
@@ -212,14 +212,12 @@ class Connection:
         self._upstreams.add(upstream)
         return upstream
 
-    async def end(self) -> None:
-        """End the calls: they have a moment for what has arrived, and then end without an answer."""
-        try:
-            await asyncio.sleep(LATE_SECONDS)
-        finally:
-            for each in list(self._upstreams):
-                each.sever()
-            await self.channel.close()
+    async def end(self, at_once: asyncio.Event) -> None:
+        """End the calls: they have a moment for what has arrived, or end `at_once`, then without an answer."""
+        await _until(at_once, LATE_SECONDS)
+        for each in list(self._upstreams):
+            each.sever()
+        await self.channel.close()
 
 
 class AskingFrames(Frames):
