@@ -125,6 +125,7 @@ def test_a_pipe_that_closes_early_is_success(served, name, command):
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+@pytest.mark.one_process("several workers keep no shards in memory alone")
 @pytest.mark.usefixtures("served")
 def test_a_hull_over_shards(name):
     assert dynhull("create", name, "--shards", "3").stdout == f"{name}: created\n"

@@ -274,6 +274,7 @@ def test_killed_workers_lose_and_double_nothing(tmp_path: Path) -> None:
         assert client.verify("fleet").equal
 
 
+@pytest.mark.one_process("the rows of one database are counted")
 def test_logs_of_shards_do_not_grow_for_ever(tmp_path: Path) -> None:
     with (
         server_process("--data", str(tmp_path), "--snapshot-points", "20") as server,
