@@ -50,9 +50,12 @@ fuzz: fuzz-reference fuzz-threads  ## random lives: OPERATIONS of the reference;
 fuzz-threads:  ## the kernel's lives with batches of a few rows on several threads, under each of the sanitizers, SECONDS each
 	mkdir -p build
 	for sanitizers in address,undefined thread; do \
-		$(FUZZ_THREADS) -fsanitize=$$sanitizers -fno-sanitize-recover=undefined -DDYNHULL_LEAF=4 -DDYNHULL_ROWS_A_THREAD=3 \
-			tests/kernel/fuzz.cpp -o build/fuzz_threads \
-		&& build/fuzz_threads $$(cat tests/kernel/seeds.txt) && build/fuzz_threads --seconds $(SECONDS) || exit 1; \
+		THREADED="$(FUZZ_THREADS) -fsanitize=$$sanitizers -fno-sanitize-recover=undefined -DDYNHULL_LEAF=4 \
+			-DDYNHULL_ROWS_A_THREAD=3"; \
+		$$THREADED tests/kernel/fuzz.cpp -o build/fuzz_threads \
+		&& build/fuzz_threads $$(cat tests/kernel/seeds.txt) && build/fuzz_threads --seconds $(SECONDS) \
+		&& $$THREADED -DDYNHULL_HASH_SEED=1 tests/kernel/fuzz_fences.cpp -o build/fuzz_fence_threads \
+		&& build/fuzz_fence_threads --seconds $(SECONDS) || exit 1; \
 	done
 
 fuzz-reference: .venv/.test-core  ## every operation checked against a model; a failure says the seed that repeats it

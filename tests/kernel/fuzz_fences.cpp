@@ -502,6 +502,7 @@ class Transfers {
 
 int main(int count, char** words) {
   return fuzz_lives(count, words, "lives of fences, leaves of " + std::to_string(LEAF), [](std::uint64_t seed) {
+    Team::set_limit(1 + static_cast<unsigned>(seed / 4 % 4));
     if (seed % 4 == 3)
       Transfers(seed).live();
     else

@@ -10,11 +10,14 @@ class Deciding : public Reports {
  protected:
   using Reports::Reports;
 
+  // What is found of a subject: that it enters or leaves a fence, or, after all that, that it may have passed through
+  // others.
   struct Found {
     std::uint32_t fence, slot;
     int change;
     std::optional<double> distance;
   };
+  using FoundList = std::vector<Found>;
 
   // Where a subject was that has changed or is gone; around the own hull, one from another index was nowhere.
   template <class Changed>
@@ -26,54 +29,59 @@ class Deciding : public Reports {
     return fence.given || fence.area != fence.decided || fence.own != fence.decided_own;
   }
 
-  void decide(std::uint32_t slot) {
+  // Finds the fences that a subject in this zone enters or leaves. Changes nothing else than its own `decided`.
+  void decide(std::uint32_t slot, const Zone& zone, FoundList& found) {
     const Point p = (*slots_)[slot].place;
-    const std::uint32_t number = subjects_[slot].zone;
-    if (number == NONE) return;  // there are no zones
-    const Zone& zone = zones_[number];
     Change* const change = change_of(slot);
     // The state before is that of areas which are still there, and the way from there is within the zone.
     const bool known = !everyone_ && recent_.empty() && change && !change->fresh && !change->carried &&
                        !change->decided && zone.holds(change->before);
     if (change) change->decided = true;
-    if (!known) decide_covering(slot, zone);
+    if (!known) decide_covering(slot, zone, found);
+    const Box way = Box::of({known ? change->before : p, p});
     for (std::size_t i = 0; i < zone.pieces.size();) {
-      const std::span<const Piece> run = zone.run(i);
+      const auto [run, met] = zone.run(i, way);
       i += run.size();
+      if (known && !met && !run[0].wide) continue;
       const std::uint32_t handle = run[0].fence;
       const bool was = members_.has(subjects_[slot].inside, handle);
       const bool from_before = known && !run[0].wide;
       const bool now =
           from_before ? holds(run, change->before, was, p, was) : holds(run, zone.anchor(), run[0].inside, p, was);
       if (now == was) continue;
-      find(handle, slot, now ? +1 : -1, now || run[0].disk ? std::nullopt : zone.distance(run, p));
+      find(found, handle, slot, now ? +1 : -1, now || run[0].disk ? std::nullopt : zone.distance(run, p));
     }
-    if (change && crossable_ > 0) {
-      former_.clear();
-      for (const Found& each : found_)
-        if (each.slot == slot && each.change < 0) former_.push_back(each.fence);
-      cross_found();
-      decide_ways(*change, p);
-    }
+    if (change && crossable_ > 0) found.push_back({NONE, slot, 0, {}});
   }
 
-  // Crossings of some subjects are reported together, when their fences have been fetched.
-  void find(std::uint32_t handle, std::uint32_t slot, int change, std::optional<double> distance = {}) {
+  void find(FoundList& found, std::uint32_t handle, std::uint32_t slot, int change,
+            std::optional<double> distance = {}) const {
     prefetch(fences_[handle].get());
-    found_.push_back({handle, slot, change, distance});
+    found.push_back({handle, slot, change, distance});
   }
-  void cross_found() {
-    for (const Found& each : found_) cross(each.fence, each.slot, each.change, each.distance);
-    found_.clear();
+  // Reports what was found, when all of these subjects are listed.
+  void cross_found(FoundList& found) {
+    former_.clear();
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const Found& each = found[i];
+      if (each.fence != NONE) {
+        if (each.change < 0) former_.push_back(each.fence);
+        cross(each.fence, each.slot, each.change, each.distance);
+        continue;
+      }
+      decide_ways(*change_of(each.slot), (*slots_)[each.slot].place);
+      former_.clear();
+    }
+    found.clear();
   }
 
   // Decides for the fences that cover a zone, and for those that are not near it.
-  void decide_covering(std::uint32_t slot, const Zone& zone) {
+  void decide_covering(std::uint32_t slot, const Zone& zone, FoundList& found) const {
     const auto is_near = [&](std::uint32_t handle) { return zone.covered_by(handle) || !zone.run_of(handle).empty(); };
     for (const std::uint32_t handle : members_.of(subjects_[slot].inside))
-      if (!is_near(handle) && !fences_[handle]->own) find(handle, slot, -1);
+      if (!is_near(handle) && !fences_[handle]->own) find(found, handle, slot, -1);
     for (const std::uint32_t handle : zone.covering)
-      if (!members_.has(subjects_[slot].inside, handle)) find(handle, slot, +1);
+      if (!members_.has(subjects_[slot].inside, handle)) find(found, handle, slot, +1);
   }
 
   // Decides for the fence of these pieces of a zone, by the way to p from another point of the zone, where it is known
@@ -247,7 +255,7 @@ class Deciding : public Reports {
 
   std::size_t crossable_ = 0;  // fences that report who passes through, other than those around the own hull
   Crossings taken_;
-  std::vector<Found> found_;
+  FoundList found_[MOST_PARTS];
   std::vector<std::uint32_t> ways_;
 };
 

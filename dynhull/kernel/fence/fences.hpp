@@ -154,16 +154,21 @@ class Fences : public OwnHull {
   // vertices. If memory does not suffice, nothing is lost: the next call returns it.
   template <class SlotsAt>
   Crossings take(HullTree& tree, SlotsAt slots_at) {
-    found_.clear();
+    for (auto& found : found_) found.clear();
     prepare(only_strayed_matter());
     for (const std::uint32_t handle : recent_)
       if (fences_[handle] && *fences_[handle]->area == *fences_[handle]->decided)
         fences_[handle]->decided = fences_[handle]->area;
     if (everyone_) {
-      for_each_strayed([](std::uint32_t) {}, [] {});
-      slots_->for_each([&](std::uint32_t slot) { decide(slot), cross_found(); });
+      settle_strayed([](std::uint32_t, const Zone&, std::size_t) {}, [](std::size_t) {});
+      slots_->for_each([&](std::uint32_t slot) {
+        if (subjects_[slot].zone == NONE) return;  // there are no zones
+        decide(slot, zones_[subjects_[slot].zone], found_[0]);
+        cross_found(found_[0]);
+      });
     } else {
-      for_each_strayed([&](std::uint32_t slot) { decide(slot); }, [&] { cross_found(); });
+      settle_strayed([&](std::uint32_t slot, const Zone& zone, std::size_t part) { decide(slot, zone, found_[part]); },
+                     [&](std::size_t part) { cross_found(found_[part]); });
     }
     divide_crowded();
     decide_waiting();
@@ -180,8 +185,8 @@ class Fences : public OwnHull {
 
   std::size_t bytes() const {
     std::size_t bytes = subjects_.bytes() + zones_.bytes() + members_.bytes() + changes_.capacity() * sizeof(Change) +
-                        strayed_.capacity() * sizeof(std::uint32_t) + gone_.capacity() * sizeof(Gone) +
-                        gone_keys_.capacity();
+                        strayed_.capacity() * sizeof(std::uint32_t) + strays_.capacity() * sizeof(Stray) +
+                        gone_.capacity() * sizeof(Gone) + gone_keys_.capacity();
     for (const auto& fence : fences_) bytes += fence ? fence->bytes() : 0;
     return bytes;
   }

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "../threads.hpp"
 #include "crossings.hpp"
 #include "zoning.hpp"
 
@@ -82,6 +83,8 @@ class Reports : protected Zoning {
 
   static constexpr Point NOWHERE = {NO_TIME, NO_TIME};
   static constexpr std::uint32_t FIRST = 1;  // the base of numbers of changes
+  // Subjects that are settled together, in how many parts at most, and so many that another thread is worth it.
+  static constexpr std::size_t AT_ONCE = 1024, MOST_PARTS = 8, STRAYS_A_THREAD = (ROWS_A_THREAD + 3) / 4;
 
   // A subject that has changed since crossings were last taken.
   struct Change {
@@ -184,7 +187,7 @@ class Reports : protected Zoning {
   // Lists every subject in the zone where it is. Makes the zones if there are none, or if the index is torn.
   void ready() {
     prepare(false);
-    for_each_strayed([](std::uint32_t) {}, [] {});
+    settle_strayed([](std::uint32_t, const Zone&, std::size_t) {}, [](std::size_t) {});
     divide_crowded();
   }
   void prepare(bool only_strayed) {
@@ -193,21 +196,39 @@ class Reports : protected Zoning {
     if (returned_ != reports_) return_gone();
   }
 
-  // Lists those that have strayed in the zone where they are, and visits them. Their cache misses overlap.
-  template <class Visit, class After>
-  void for_each_strayed(Visit visit, After after_some) {
+  // Lists those that have strayed in the zone where they are. Calls `look` with each and its zone before, on several
+  // threads if they are many, and with the number of the part that it is in, below MOST_PARTS; and `then` with each
+  // part, in order, when its subjects are listed.
+  template <class Look, class Then>
+  void settle_strayed(Look look, Then then) {
     if (!zoned_) return;
-    std::uint32_t slots[LOOKAHEAD], zones[LOOKAHEAD];
-    for (std::size_t from = 0; from < strayed_.size(); from += LOOKAHEAD) {
-      std::size_t count = 0;
-      for (std::size_t i = from; i < std::min(from + LOOKAHEAD, strayed_.size()); ++i)
-        if (current(strayed_[i])) slots[count++] = changes_[strayed_[i]].slot;
-      find_zones({slots, count}, zones);
-      for (std::size_t i = 0; i < count; ++i) {
-        relist(slots[i], zones[i]);
-        visit(slots[i]);
+    strays_.clear();
+    for (const std::uint32_t number : strayed_)
+      if (current(number)) strays_.push_back({changes_[number].slot});
+    for (std::size_t from = 0; from < strays_.size(); from += AT_ONCE) {
+      const std::size_t count = std::min(AT_ONCE, strays_.size() - from);
+      Threads threads(count / STRAYS_A_THREAD);
+      const std::size_t parts = threads.count() > 1 ? MOST_PARTS : 1;
+      const auto start = [&](std::size_t part) { return from + count * part / parts; };
+      threads.run(parts, [&](std::size_t part) {
+        for (std::size_t i = start(part); i < start(part + 1); i += LOOKAHEAD)
+          look_at(i, std::min(i + LOOKAHEAD, start(part + 1)),
+                  [&](std::uint32_t slot, const Zone& zone) { look(slot, zone, part); });
+      });
+      for (std::size_t part = 0; part < parts; ++part) {
+        for (std::size_t i = start(part); i < start(part + 1); ++i) relist(strays_[i]);
+        then(part);
       }
-      after_some();
+    }
+  }
+  // Finds the zones and the boxes of some of those that have strayed. Their cache misses overlap.
+  template <class Look>
+  void look_at(std::size_t from, std::size_t to, Look look) {
+    find_zones(std::span(strays_).subspan(from, to - from));
+    for (std::size_t i = from; i < to; ++i) {
+      const Zone& zone = zones_[strays_[i].zone];
+      strays_[i].box = box_in(zone, (*slots_)[strays_[i].slot].place);
+      look(strays_[i].slot, zone);
     }
   }
   // Makes the zones anew, and decides everything at the next occasion.
@@ -380,6 +401,7 @@ class Reports : protected Zoning {
 
   std::vector<Change> changes_;
   std::vector<std::uint32_t> strayed_;  // changes of subjects that have left their box, or are new
+  std::vector<Stray> strays_;           // these subjects, while they are settled
   std::size_t merged_ = 0, merged_strayed_ = 0, batches_ = 0;
   std::vector<Gone> gone_;
   std::string gone_keys_;

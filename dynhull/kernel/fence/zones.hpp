@@ -79,6 +79,14 @@ struct alignas(LINE) Zone {
         std::min({p.x - box.least.x, box.greatest.x - p.x, p.y - box.least.y, box.greatest.y - p.y});
     return nearest < to_border * (1 - NEARNESS_BOUND) ? std::optional(nearest) : std::nullopt;
   }
+  // The pieces of the fence of piece `first`, and whether the box of one of them meets another box.
+  std::pair<std::span<const Piece>, bool> run(std::size_t first, const Box& box) const {
+    bool met = false;
+    std::size_t end = first;
+    do met |= Box::of(pieces[end].edge).meets(box);
+    while (++end < pieces.size() && pieces[end].fence == pieces[first].fence);
+    return {std::span(pieces).subspan(first, end - first), met};
+  }
   // The pieces of the fence of piece `first`.
   std::span<const Piece> run(std::size_t first) const {
     std::size_t end = first + 1;

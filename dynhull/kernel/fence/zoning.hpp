@@ -45,37 +45,44 @@ class Zoning {
     if (is_crowded(zones_[zone])) crowded_.push_back(zone);
   }
 
-  void find_zones(std::span<const std::uint32_t> slots, std::uint32_t* zones) const {
-    for (const std::uint32_t slot : slots) {
-      prefetch(&(*slots_)[slot]);
-      if (const std::uint32_t zone = subjects_[slot].zone; zone != NONE) prefetch(&zones_[zone]);
+  // A subject that has left its box, with the zone and the box that it gets.
+  struct Stray {
+    std::uint32_t slot;
+    std::uint32_t zone = NONE;
+    SafeBox box = SafeBox::nowhere();
+  };
+  void find_zones(std::span<Stray> strays) const {
+    for (const Stray& stray : strays) {
+      prefetch(&(*slots_)[stray.slot]);
+      if (const std::uint32_t zone = subjects_[stray.slot].zone; zone != NONE) prefetch(&zones_[zone]);
     }
-    for (std::size_t i = 0; i < slots.size(); ++i) {
-      const Point p = (*slots_)[slots[i]].place;
-      const std::uint32_t old = zones[i] = subjects_[slots[i]].zone;
+    for (Stray& stray : strays) {
+      const Point p = (*slots_)[stray.slot].place;
+      const std::uint32_t old = stray.zone = subjects_[stray.slot].zone;
       if (old != NONE && zones_[old].holds(p)) continue;
-      zones[i] = zones_.find(p);
+      stray.zone = zones_.find(p);
       if (old != NONE) zones_[old].fetch_subjects();
-      zones_[zones[i]].fetch();
+      zones_[stray.zone].fetch();
     }
-    for (std::size_t i = 0; i < slots.size(); ++i) zones_[zones[i]].fetch_pieces();
+    for (const Stray& stray : strays) zones_[stray.zone].fetch_pieces();
   }
-  void relist(std::uint32_t slot, std::uint32_t zone) {
-    Subject& subject = subjects_[slot];
-    const Point p = (*slots_)[slot].place;
-    if (zone != subject.zone) {
-      grow(zones_[zone].subjects, 1);
+  void relist(const Stray& stray) {
+    Subject& subject = subjects_[stray.slot];
+    if (stray.zone != subject.zone) {
+      grow(zones_[stray.zone].subjects, 1);
       unlist(subject);
-      list(slot, zone);
+      list(stray.slot, stray.zone);
     }
-    lay_box(slot, p);
+    subjects_.box(stray.slot) = stray.box;
   }
-  void lay_box(std::uint32_t slot, Point p) {
-    const Zone& zone = zones_[subjects_[slot].zone];
+  // The box of a subject at p.
+  SafeBox box_in(const Zone& zone, Point p) const {
     SafeBox box = SafeBox::everywhere();
     box.stay_in(zone.box, p);
-    for (const Piece& piece : zone.pieces) box.keep_off(strip_of(piece), p);
-    subjects_.box(slot) = box;
+    Clearance clearance(box, p);
+    for (const Piece& piece : zone.pieces)
+      piece.wide ? clearance.keep_off(strip_of(piece)) : clearance.keep_off(piece.edge, Box::of(piece.edge));
+    return clearance.box();
   }
 
   // Makes the zones from the fences and the places.
@@ -96,7 +103,8 @@ class Zoning {
     crowded_.assign(1, 0);
     divide_crowded();
     for (std::uint32_t zone = 0; zone < zones_.size(); ++zone)
-      for (const std::uint32_t slot : zones_[zone].subjects) lay_box(slot, (*slots_)[slot].place);
+      for (const std::uint32_t slot : zones_[zone].subjects)
+        subjects_.box(slot) = box_in(zones_[zone], (*slots_)[slot].place);
   }
 
   static bool is_crowded(const Zone& zone) {

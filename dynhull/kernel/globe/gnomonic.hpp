@@ -10,8 +10,9 @@
 
 #include "../predicates/point.hpp"
 
-// Where the system can choose between two versions of a function by the processor. Their results are the same.
-#if defined(__GNUC__) && defined(__x86_64__) && defined(__GLIBC__)
+// Where the system can choose between two versions of a function by the processor. Their results are the same. It
+// chooses before the thread sanitizer has begun.
+#if defined(__GNUC__) && defined(__x86_64__) && defined(__GLIBC__) && !defined(__SANITIZE_THREAD__)
 #define DYNHULL_WIDE __attribute__((target_clones("avx2", "default")))
 #else
 #define DYNHULL_WIDE
