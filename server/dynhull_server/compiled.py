@@ -13,14 +13,31 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 
+class Places(Protocol):
+    """The places of fences in columns, by their numbers: a dictionary, or the class of that name in C++."""
+
+    def __len__(self) -> int: ...
+
+    def __contains__(self, number: int, /) -> bool: ...
+
+    def __getitem__(self, number: int, /) -> int: ...
+
+    def __setitem__(self, number: int, place: int, /) -> None: ...
+
+    def pop(self, number: int, /) -> int:
+        """Remove a fence, and return its place; KeyError if it is not there."""
+
+
 class Native(Protocol):
     """The module `dynhull_server._native`. mypy compares it with the module's stub."""
+
+    Places: "type[Any]"
 
     def numbered(
         self,
         waiting: "list[tuple[Any, ...]]",
         types: bytes,
-        places: "dict[int, int]",
+        places: "Any",
         lasts: "npt.NDArray[Any]",
         times: "npt.NDArray[Any]",
     ) -> "tuple[bytes, bytes, bytes]":
@@ -40,7 +57,7 @@ class Native(Protocol):
     def followed(
         self,
         runs: "npt.NDArray[Any]",
-        places: "dict[int, int]",
+        places: "Any",
         lasts: "npt.NDArray[Any]",
         news: "dict[int, int]",
     ) -> bool:
@@ -49,7 +66,7 @@ class Native(Protocol):
     def own(
         self,
         runs: "npt.NDArray[Any]",
-        places: "dict[int, int]",
+        places: "Any",
         subjects: "npt.NDArray[Any]",
         names: "tuple[int, ...]",
     ) -> bytes | None:
@@ -58,7 +75,7 @@ class Native(Protocol):
     def added(
         self,
         runs: "npt.NDArray[Any]",
-        places: "dict[int, int]",
+        places: "Any",
         lasts: "npt.NDArray[Any]",
         news: "npt.NDArray[Any]",
         end: int,

@@ -451,6 +451,27 @@ def test_many_that_are_inside_are_all_inside_after_a_start(folder):
     storage.close()
 
 
+def test_fences_keep_the_order_of_their_events_over_many_commits(folder):
+    """Beyond 131,072 runs of events, which are kept together at first. One fence is read earlier, one is deleted."""
+    storage, _ = opened(folder)
+    fill(storage, 1)
+    numbers = range(10, 710)
+    storage.commit([AddFence(fence_row(number, f"gate {number}"), Inside()) for number in numbers])
+    last = 2**17 // len(numbers) + 3
+    for sequence in range(1, last + 1):
+        made = events(sequence, sequence)
+        storage.commit([AppendEvents(block_of({number: made for number in numbers if number != 13 or sequence < 100}))])
+        if sequence == 100:
+            assert storage.read_events(11, 0, 1000) == events(1, 100)
+            storage.commit([DropFence(13)])
+    for _ in range(2):
+        for number in (10, 11, 12, 709):
+            assert storage.read_events(number, 0, 1000) == events(1, last)
+        storage.close()
+        storage, _ = opened(folder)
+    storage.close()
+
+
 def test_what_no_fence_needs_of_a_row_of_events_leaves_the_disk(folder):
     storage, _ = opened(folder)
     fill(storage, 1)

@@ -7,6 +7,8 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
+
 from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError, words_for_callers
 from ..state.fences.config import FenceConfig
 from ..state.fences.event_block import EventBlock
@@ -203,7 +205,8 @@ class Fences:
             events: the events; None for none.
         """
         if events is not None:
-            self.events.update(events.types.tolist())
+            for kind, count in enumerate(np.bincount(events.types).tolist()):
+                self.events[kind] += count
             if self.watched:
                 for number in self.watched.keys() & set(events.fences.tolist()):
                     self.watched[number].moved()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ...compiled import native
+from ...compiled import Places, native
 
 if TYPE_CHECKING:
     from .fence import Fence
@@ -35,7 +35,7 @@ class Table:
 
     def __init__(self, columns: int, room: int = ROOM) -> None:
         self.columns: Integers = np.zeros((columns, room), np.int64)
-        self.at: dict[int, int] = {}
+        self.at: Places = {} if native is None else native.Places()
         self._free: list[int] = []
 
     def add(self, number: int) -> int:

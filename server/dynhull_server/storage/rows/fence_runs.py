@@ -25,6 +25,7 @@ MOST_NEW = 2**17
 # The columns of `FenceRuns.table`.
 LAST, SUBJECTS, SEEN = range(3)
 NO_NAME = -1
+ITEM = 8  # bytes
 
 
 @dataclass(slots=True)
@@ -297,27 +298,31 @@ class FenceRuns:
         seen = int(columns[SEEN, fence.at])
         if seen < self._end:
             own = np.flatnonzero(self._new[0, seen : self._end] == fence.row.number) + seen
-            _extend(fence, self._new[1:, own])
+            fence.firsts.frombytes(self._new[1, own].tobytes())
+            fence.places.frombytes(self._new[2, own].tobytes())
             columns[SEEN, fence.at] = self._end
             fence.last = int(columns[LAST, fence.at])
 
     def _hand_out(self) -> None:
         """Let all fences have their runs, and begin anew."""
         with self._turn:
-            order = np.argsort(self._new[0, : self._end], kind="stable")
-            numbers = self._new[0, order]
-            starts = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1]))
-            ends = np.append(starts[1:], len(numbers))
-            for number, start, end in zip(numbers[starts].tolist(), starts.tolist(), ends.tolist(), strict=True):
+            numbers, *rest = self._new[:, : self._end]
+            order = np.argsort(numbers, kind="stable")
+            ascending = numbers[order]
+            starts = np.flatnonzero(np.append(True, ascending[1:] != ascending[:-1]))
+            ends = np.append(starts[1:], len(order)).tolist()
+            firsts, places = (memoryview(column[order]).cast("B") for column in rest)
+            lasts, seen = self.table.columns[LAST].tolist(), self.table.columns[SEEN].tolist()
+            for number, start, end in zip(ascending[starts].tolist(), starts.tolist(), ends, strict=True):
                 fence = self.fences.get(number)
-                if fence is not None:
-                    rows = order[start:end]
-                    _extend(fence, self._new[1:, rows[rows >= self.table.columns[SEEN, fence.at]]])
-                    fence.last = int(self.table.columns[LAST, fence.at])
+                if fence is None:
+                    continue
+                begin = start
+                if seen[fence.at]:
+                    begin += int(order[start:end].searchsorted(seen[fence.at]))
+                own = slice(begin * ITEM, end * ITEM)
+                fence.firsts.frombytes(firsts[own])
+                fence.places.frombytes(places[own])
+                fence.last = lasts[fence.at]
             self.table.columns[SEEN] = 0
             self._end = 0
-
-
-def _extend(fence: FenceRows, runs: Integers) -> None:
-    fence.firsts.frombytes(runs[0].tobytes())
-    fence.places.frombytes(runs[1].tobytes())
