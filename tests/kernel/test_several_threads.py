@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from inputs import cloud
 
-from dynhull import DynamicHull, set_threads
+from dynhull import DynamicHull, FenceIndex, KeyedHull, set_threads
 
 
 @pytest.fixture(autouse=True)
@@ -103,6 +103,42 @@ def test_locate_names_the_first_bad_row():
         with pytest.raises(ValueError, match="points row 41000 is"):
             hull.locate(queries)
         hull.locate(queries[:40_000])
+
+
+def fenced(places, random):
+    """A keyed hull with polygons and circles over it, some with a margin, some that report who passes through."""
+    hull = KeyedHull.from_entities(np.arange(len(places), dtype=np.uint64), places, key_type="int")
+    index = FenceIndex(hull)
+    for fence in range(120):
+        center, size = random.random(2), 0.01 + 0.05 * random.random()
+        options = {"margin": 0.01 * (fence % 2), "cross": random.random() < 0.3}
+        if fence % 3:
+            corners = center + size * np.array([[0, 0], [1, 0.2], [1.2, 1], [0.3, 0.6]])
+            index.set_polygons(fence, [[corners]], **options)
+        else:
+            index.set_circle(fence, *center, size, **options)
+    return hull, index
+
+
+def test_crossings():
+    """Afterwards those are inside who are so for an index that is new, where no margin keeps others."""
+    random = np.random.default_rng(0)
+    places = random.random((20_000, 2))
+    many, one = (fenced(places, np.random.default_rng(1)) for _ in range(2))
+    for _ in range(6):
+        moved = random.permutation(len(places))[:6000]
+        places[moved] += 0.03 * random.normal(size=(len(moved), 2))
+        found = []
+        for hull, index in (many, one):
+            set_threads(3 if hull is many[0] else 1)
+            hull.put_many(moved.astype(np.uint64), places[moved])
+            found.append(index.take())
+        assert len(found[0]) > 1000
+        for column in ("fences", "changes", "causes", "keys", "points", "previous", "distances"):
+            assert getattr(found[0], column).tobytes() == getattr(found[1], column).tobytes()
+    _, again = fenced(places, np.random.default_rng(1))
+    for fence in range(0, 120, 2):
+        assert sorted(many[1].inside(fence)) == sorted(one[1].inside(fence)) == sorted(again.inside(fence))
 
 
 def test_many_callers_share_the_threads():
