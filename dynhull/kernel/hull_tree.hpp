@@ -30,8 +30,13 @@ class HullTree {
   explicit HullTree(const Distinct& points) : size_(points.count()), distinct_(points.size()) {
     Threads threads(threads_for(size_));
     nodes_ = built(threads, points.data(), points.size(), points.repeated(), [&] {
-      copies_.reserve(points.repeated().size());
-      for (const auto& [number, copies] : points.repeated()) copies_.emplace(points.data()[number], copies);
+      const std::span<const Repeated> repeated = points.repeated();
+      const auto point = [&](std::size_t i) { return points.data()[repeated[i].number]; };
+      copies_.reserve(repeated.size());
+      for (std::size_t i = 0; i < repeated.size(); ++i) {
+        if (i + LOOKAHEAD < repeated.size()) copies_.fetch(point(i + LOOKAHEAD));
+        copies_.set(point(i), 0, repeated[i].copies);
+      }
     });
   }
 
@@ -43,15 +48,14 @@ class HullTree {
 
   std::uint64_t count(Point p) const {
     const Place place = find(nodes_, p);
-    if (!place.there) return 0;
-    return nodes_.leaf(place.leaf).repeated & bit(place.entry) ? copies_.find(p)->second : 1;
+    return place.there ? count(p, place) : 0;
   }
 
   void clear() {
     if (nodes_.root == NONE) return;
     Nodes empty;
     nodes_ = std::move(empty);
-    copies_.clear();
+    copies_ = Copies();
     size_ = distinct_ = 0;
     changed();
   }
@@ -61,7 +65,9 @@ class HullTree {
     nodes_.reserve(1);
     const Place place = find(nodes_, p);
     if (place.there) {
-      ++copies_.try_emplace(p, 1).first->second;
+      const std::uint64_t before = count(p, place);
+      copies_.reserve(1);
+      copies_.set(p, before, before + 1);
       mark(place, true);
       ++size_;
       return false;
@@ -77,12 +83,9 @@ class HullTree {
     const Place place = find(nodes_, p);
     if (!place.there) return Removal::MISSING;
     --size_;
-    if (nodes_.leaf(place.leaf).repeated & bit(place.entry)) {
-      const auto entry = copies_.find(p);
-      if (--entry->second == 1) {
-        copies_.erase(entry);
-        mark(place, false);
-      }
+    if (const std::uint64_t before = count(p, place); before > 1) {
+      copies_.set(p, before, before - 1);
+      mark(place, before > 2);
       return Removal::HULL_STANDS;
     }
     --distinct_;
@@ -157,6 +160,8 @@ class HullTree {
   std::size_t reserved_bytes() const { return nodes_.reserved_bytes(); }
 
  private:
+  static constexpr std::size_t LOOKAHEAD = 16;  // points whose number of copies is being prefetched
+
   // Inserts the first points of an empty tree.
   Applied fill(const Point* points, std::size_t count) {
     const Distinct distinct(points, count);
@@ -173,7 +178,7 @@ class HullTree {
   Applied commit(Threads& threads, Plans plans, bool ignore_missing, std::optional<bool> together, Apply apply) {
     Applied applied{0, -1};
     std::int64_t growth = 0, distinct_growth = 0;
-    std::size_t inserts = 0, changes = 0, extra_leaves = 0;
+    std::size_t inserts = 0, changes = 0, extra_leaves = 0, more_repeated = 0;
     for (const Plan* plan : plans) {
       applied.rows += plan->rows_applied;
       if (plan->first_missing >= 0 && (applied.first_missing < 0 || plan->first_missing < applied.first_missing))
@@ -183,19 +188,15 @@ class HullTree {
       inserts += plan->inserts;
       changes += plan->changes().size();
       extra_leaves += plan->extra_leaves;
+      for (const Recount& entry : plan->recounts) more_repeated += entry.before < 2;
     }
     if (applied.first_missing >= 0 && !ignore_missing) return {0, applied.first_missing};
     const bool anew = nodes_.root == NONE || (inserts >= distinct_ && together.value_or(true));
-    make_room_for_copies(plans);
-    try {
-      if (changes == 0)
-        recount(plans);
-      else if (anew ? rebuild(threads, plans) : apply(extra_leaves))
-        changed();
-    } catch (...) {
-      drop_room_for_copies();
-      throw;
-    }
+    copies_.reserve(more_repeated);
+    if (changes == 0)
+      recount(plans);
+    else if (anew ? rebuild(threads, plans) : apply(extra_leaves))
+      changed();
     size_ += growth;
     distinct_ += distinct_growth;
     for (const Plan* plan : plans)
@@ -273,40 +274,27 @@ class HullTree {
     for (Side side : SIDES) collect(fresh, fresh.root, side, LOWEST, HIGHEST, after[side]);
     recount(plans);
     nodes_ = std::move(fresh);
-    for (const auto& [p, copies] : copies_) {
-      const Place place = find(nodes_, p);
-      if (copies > 1 && place.there) mark(place, true);
-    }
+    copies_.for_each([&](Point p) { mark(find(nodes_, p), true); });
     return before[UPPER] != after[UPPER] || before[LOWER] != after[LOWER];
   }
 
-  // Allocates entries so that recount() cannot fail. An entry of one is only room.
-  void make_room_for_copies(Plans plans) {
-    try {
-      for (Plan* plan : plans)
-        for (Recount& entry : plan->recounts)
-          if (entry.copies == nullptr) entry.copies = &copies_.try_emplace(entry.p, 1).first->second;
-    } catch (...) {
-      drop_room_for_copies();
-      throw;
-    }
-  }
-  void drop_room_for_copies() {
-    std::erase_if(copies_, [](const auto& entry) { return entry.second == 1; });
-  }
-
-  // Updates the numbers of copies. To be called before the changes are applied, once nothing can fail any more; new
-  // points are marked afterwards.
+  // Updates the numbers of copies, for which there is room. To be called before the changes are applied, once nothing
+  // can fail any more; new points are marked afterwards.
   void recount(Plans plans) {
     for (const Plan* plan : plans) {
-      for (const Recount& entry : plan->recounts) {
-        if (entry.after > 1)
-          *entry.copies = entry.after;
-        else
-          copies_.erase(entry.p);
+      const std::vector<Recount>& recounts = plan->recounts;
+      for (std::size_t i = 0; i < recounts.size(); ++i) {
+        if (i + LOOKAHEAD < recounts.size()) copies_.fetch(recounts[i + LOOKAHEAD].p);
+        const Recount& entry = recounts[i];
+        copies_.set(entry.p, entry.before, entry.after);
         if (entry.before > 0 && entry.after > 0) mark(entry.place, entry.after > 1);
       }
     }
+  }
+
+  // The number of copies of a point that is there.
+  std::uint64_t count(Point p, const Place& place) const {
+    return nodes_.leaf(place.leaf).repeated & bit(place.entry) ? copies_[p] : 1;
   }
 
   template <class Visit>
@@ -318,7 +306,7 @@ class HullTree {
     }
     const Leaf& leaf = nodes_.leaf(tree);
     for (unsigned i = 0; i < leaf.size; ++i)
-      visit(leaf[i], leaf.repeated & bit(i) ? copies_.find(leaf[i])->second : std::uint64_t{1});
+      visit(leaf[i], leaf.repeated & bit(i) ? copies_[leaf[i]] : std::uint64_t{1});
   }
 
   Nodes nodes_;

@@ -23,7 +23,7 @@ namespace dynhull {
 class BatchInParts {
  public:
   // Plans the batch. Changes nothing but `nodes.root`, later. If `together` is not given, each part decides.
-  BatchInParts(Threads& threads, const std::vector<Point>& cuts, Nodes& nodes, Copies& copies, Ops ops,
+  BatchInParts(Threads& threads, const std::vector<Point>& cuts, Nodes& nodes, const Copies& copies, Ops ops,
                const Point* points, std::size_t count, std::optional<bool> together)
       : threads_(threads), nodes_(nodes), tree_(nodes, cuts), parts_(cuts.size() + 1) {
     std::vector<Scratch<Row>> rows;

@@ -31,7 +31,6 @@ struct Recount {
   Point p;
   Place place;  // before the batch
   std::uint64_t before, after;
-  std::uint64_t* copies;  // the entry of the point in Copies, if it has one
 };
 
 class Plan {
@@ -48,9 +47,10 @@ class Plan {
   std::vector<Recount> recounts;
 
   // Of these rows, which it sorts.
-  Plan(const Nodes& nodes, Copies& copies, Row* rows, std::size_t count)
+  Plan(const Nodes& nodes, const Copies& copies, Row* rows, std::size_t count)
       : Plan(nodes, copies, Groups(nodes, rows, count)) {}
-  Plan(const Nodes& nodes, Copies& copies, Groups&& groups) : changes_(groups.size()), changes_end_(changes_.data()) {
+  Plan(const Nodes& nodes, const Copies& copies, Groups&& groups)
+      : changes_(groups.size()), changes_end_(changes_.data()) {
     for (std::size_t from = 0; from < groups.size(); from += BLOCK)
       read(nodes, copies, groups, from, std::min(from + BLOCK, groups.size()));
     extra_leaves += inserts / (LEAF / 2);
@@ -75,7 +75,7 @@ class Plan {
   static constexpr std::size_t LOOKAHEAD = 12;  // groups whose leaf is being prefetched
 
   // Reads a block of groups. First does all searches in x, which are branch-free, so that they overlap.
-  void read(const Nodes& nodes, Copies& copies, Groups& groups, std::size_t from, std::size_t to) {
+  void read(const Nodes& nodes, const Copies& copies, Groups& groups, std::size_t from, std::size_t to) {
     const bool empty = nodes.root == NONE;
     unsigned entries[BLOCK] = {};
     for (std::size_t i = from; i < to && !empty; ++i) {
@@ -85,21 +85,22 @@ class Plan {
       entries[i - from] = leaf.find_x(groups[i].p.x);
       prefetch(&leaf.y[entries[i - from]]);
     }
+    bool there[BLOCK] = {}, repeated[BLOCK] = {};
+    for (std::size_t i = from; i < to && !empty; ++i) {
+      const Leaf& leaf = nodes.leaf(groups[i].leaf);
+      unsigned& entry = entries[i - from];
+      entry = leaf.find_y(entry, groups[i].p);
+      there[i - from] = leaf.holds(entry, groups[i].p);
+      repeated[i - from] = there[i - from] & (leaf.repeated >> entry & 1);
+      if (repeated[i - from]) copies.fetch(groups[i].p);
+    }
     for (std::size_t i = from; i < to; ++i) {
       const Group& group = groups[i];
-      Place place = {NONE, 0, false};
-      unsigned size = 0;
-      std::uint64_t* repeated = nullptr;
-      if (!empty) {
-        const Leaf& leaf = nodes.leaf(group.leaf);
-        const unsigned entry = leaf.find_y(entries[i - from], group.p);
-        place = {group.leaf, entry, leaf.holds(entry, group.p)};
-        repeated = copies_at(nodes, copies, place);
-        size = leaf.size;
-      }
-      const std::uint64_t before = repeated != nullptr ? *repeated : place.there;
+      const Place place = {group.leaf, entries[i - from], there[i - from]};
+      const unsigned size = empty ? 0 : nodes.leaf(group.leaf).size;
+      const std::uint64_t before = repeated[i - from] ? copies[group.p] : place.there;
       const std::uint64_t after = groups.settle(i, before);
-      if (before != after && (before > 1 || after > 1)) recounts.push_back({group.p, place, before, after, repeated});
+      if (before != after && (before > 1 || after > 1)) recounts.push_back({group.p, place, before, after});
       if ((before == 0) != (after == 0))
         note({group.p, group.leaf, static_cast<std::uint8_t>(place.entry), static_cast<std::uint8_t>(size),
               before == 0});

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "../keyed/hash.hpp"
 #include "../keyed/slot_table.hpp"
+#include "../memory/hash.hpp"
 #include "../memory/pool.hpp"
 #include "../memory/scratch.hpp"
 #include "frame.hpp"

@@ -1,10 +1,10 @@
 // The keys of a batch, integers or packed strings, and how a slot stores them.
 #pragma once
 
+#include "../memory/hash.hpp"
 #include "../memory/scratch.hpp"
 #include "../tree/leaf.hpp"
 #include "arena.hpp"
-#include "hash.hpp"
 
 namespace dynhull {
 

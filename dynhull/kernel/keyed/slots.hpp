@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
+#include "../memory/hash.hpp"
 #include "../memory/pool.hpp"
 #include "arena.hpp"
-#include "hash.hpp"
 
 namespace dynhull {
 

@@ -1,27 +1,55 @@
 // Multiplicities: the number of copies of each point that the tree holds more than once.
 #pragma once
 
-#include <unordered_map>
-
+#include "../memory/hash.hpp"
+#include "../memory/open_table.hpp"
 #include "place.hpp"
 
 namespace dynhull {
 
-struct PointHash {
-  std::size_t operator()(Point p) const {
-    const auto x = std::bit_cast<std::uint64_t>(p.x), y = std::bit_cast<std::uint64_t>(p.y);
-    const std::uint64_t mixed = (x ^ std::rotl(y, 32)) * 0x9e3779b97f4a7c15;
-    return static_cast<std::size_t>(mixed ^ (mixed >> 29));
+class Copies {
+ public:
+  std::size_t size() const { return table_.size(); }  // points
+  std::size_t bytes() const { return table_.bytes(); }
+  void fetch(Point p) const { table_.fetch(Hash::of(p)); }
+
+  // The number of copies of a point that has an entry.
+  std::uint64_t operator[](Point p) const { return table_[find(p)].copies; }
+
+  // Makes room for `extra` more points. Only this function and the copy constructor throw.
+  void reserve(std::size_t extra) { table_.reserve(extra); }
+
+  // Changes a point's number from `before` to `after`; less than two have no entry. Needs room for an entry.
+  void set(Point p, std::uint64_t before, std::uint64_t after) {
+    if (before < 2 && after < 2) return;
+    if (before < 2)
+      table_.insert({p, after});
+    else if (after < 2)
+      table_.erase(find(p));
+    else
+      table_[find(p)].copies = after;
   }
+
+  template <class Visit>
+  void for_each(Visit visit) const {
+    table_.for_each([&](const Entry& entry) { visit(entry.p); });
+  }
+
+ private:
+  struct Entry {
+    Point p;
+    std::uint64_t copies;
+
+    std::uint32_t tag() const { return Hash::of(p); }
+    bool is_free() const { return copies == 0; }
+    void make_free() { copies = 0; }
+  };
+
+  std::uint32_t find(Point p) const {
+    return table_.first(Hash::of(p), [p](const Entry& entry) { return entry.p == p; });
+  }
+
+  OpenTable<Entry> table_;
 };
-
-using Copies = std::unordered_map<Point, std::uint64_t, PointHash>;
-
-// The number of copies of the point at a place, or nullptr if it is not repeated.
-inline std::uint64_t* copies_at(const Nodes& nodes, Copies& copies, const Place& place) {
-  const Leaf& leaf = nodes.leaf(place.leaf);
-  const bool repeated = place.there & (leaf.repeated >> place.entry & 1);
-  return repeated ? &copies.find(leaf[place.entry])->second : nullptr;
-}
 
 }  // namespace dynhull
