@@ -2,7 +2,7 @@
 
     python benchmarks/core.py    everything at 10^4, 10^5 and 10^6: about an hour
     python benchmarks/core.py --sizes 1e6 --inputs uniform circle --works window locate
-    python benchmarks/core.py --sizes 1e4 1e5 1e6 1e7 --works window --chart docs/images/core.png
+    python benchmarks/core.py --sizes 1e4 1e5 1e6 --works window --chart docs/images/core.png
     python benchmarks/core.py --sizes 1e6 --inputs uniform circle ordered grid --works threads
 
 Processor time, medians of --repeat repetitions, everything on one core but `build` and `threads`. An update is one
@@ -383,30 +383,49 @@ def slope(points: list[tuple[int, float]]) -> float:
     return float(np.polyfit(sizes, costs, 1)[0])
 
 
-def growth(results: list[dict]) -> dict[str, list[tuple[int, float]]]:
-    """Cost of an update over the number of points, for the first input, of who was measured at several sizes."""
+def growth(results: list[dict], kind: str) -> dict[str, list[tuple[int, float]]]:
+    """Cost of an update over the number of points, of who was measured at several sizes of this input."""
     lines: dict[str, list[tuple[int, float]]] = {}
     for result in results:
-        if result["work"] == "window" and result["input"] == results[0]["input"]:
+        if result["work"] == "window" and result["input"] == kind:
             lines.setdefault(result["who"], []).append((result["n"], result["median"]))
     return {who: sorted(points) for who, points in lines.items() if len(points) > 1}
 
 
-def chart(results: list[dict], path: Path) -> None:
+def chart(charts: dict[str, dict[str, list[tuple[int, float]]]], path: Path) -> None:
+    """One chart for each input, of all rows, on the same scales."""
     import matplotlib as mpl
 
     mpl.use("svg" if path.suffix == ".svg" else "agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(8, 6), layout="constrained")
-    for who, points in growth(results).items():
-        label = f"{who}: slope {slope(points):.2f}"
-        axes.plot(*zip(*points, strict=True), marker="o", label=label, linewidth=2.5 if "dynhull" in who else 1)
-    axes.set(xscale="log", yscale="log", xlabel="points", ylabel="µs an update")
-    axes.set_title(f"A moving window, {results[0]['input']}")
-    axes.grid(visible=True, which="both", alpha=0.2)
-    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
-    figure.savefig(path, dpi=120)
+    names = dict.fromkeys(who for lines in charts.values() for who in lines)
+    colors = {who: f"C{number}" for number, who in enumerate(names)}
+    columns = min(2, len(charts))
+    rows = -(-len(charts) // columns)
+    size = 5 * columns, 3.4 * rows + 1.2
+    figure, grid = plt.subplots(
+        rows, columns, figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
+    )
+    shown = {}
+    for number, (axes, kind) in enumerate(zip(grid.flat, charts, strict=False)):
+        for who, points in charts[kind].items():
+            line = {"color": colors[who], "linewidth": 2.5 if "dynhull" in who else 1}
+            (shown[who],) = axes.plot(*zip(*points, strict=True), marker="o", markersize=4, **line)
+        axes.set(xscale="log", yscale="log", title=kind)
+        if number % columns == 0:
+            axes.set_ylabel("µs an update")
+        if number + columns >= len(charts):
+            axes.set_xlabel("points")
+            axes.tick_params(labelbottom=True)
+        axes.grid(visible=True, alpha=0.3)
+    for axes in grid.flat[len(charts) :]:
+        axes.remove()
+    shown_up_to = 1000  # µs: one rival would take most of the height
+    grid[0, 0].set_ylim(top=min(grid[0, 0].get_ylim()[1], shown_up_to))
+    figure.suptitle("A moving window: medians by input, up to 1 ms")
+    figure.legend(shown.values(), shown, loc="outside lower center", ncols=2, fontsize=9)
+    figure.savefig(path, dpi=100)
 
 
 def main() -> None:
@@ -417,7 +436,9 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--no-rivals", action="store_true")
     parser.add_argument("--json", type=Path, help="add the results to this file's")
-    parser.add_argument("--chart", type=Path, help="draw cost over size, of all results where they go to a file")
+    parser.add_argument(
+        "--chart", type=Path, help="draw cost over size, a chart for each input, of all results where they go to a file"
+    )
     arguments = parser.parse_args()
     if dynhull.KERNEL != "cpp":
         sys.exit("the kernel is not built")
@@ -431,10 +452,13 @@ def main() -> None:
         if arguments.json.exists():
             results = json.loads(arguments.json.read_text()) + results
         arguments.json.write_text(json.dumps(results, indent=1))
-    for who, points in growth(results).items():
-        print(f"slope of {who}: {slope(points):.2f}")
-    if arguments.chart:
-        chart(results, arguments.chart)
+    charts = {kind: growth(results, kind) for kind in dict.fromkeys(result["input"] for result in results)}
+    charts = {kind: lines for kind, lines in charts.items() if lines}
+    for kind, lines in charts.items():
+        for who, points in lines.items():
+            print(f"slope of {who}, {kind}: {slope(points):.2f}")
+    if charts and arguments.chart:
+        chart(charts, arguments.chart)
 
 
 if __name__ == "__main__":

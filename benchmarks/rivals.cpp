@@ -148,10 +148,13 @@ static void window(const std::vector<Point>& points, std::size_t n, std::size_t 
   std::vector<CgalPoint> start;
   for (std::size_t i = 0; i < n; ++i) start.emplace_back(points[i].first, points[i].second);
   triangulation.insert(start.begin(), start.end());
-  std::vector<decltype(triangulation)::Vertex_handle> handles;
-  for (std::size_t i = 0; i < few; ++i) handles.push_back(triangulation.nearest_vertex(start[i]));
-  report("CGAL Delaunay_triangulation_2", 2 * few, [&] {
-    for (std::size_t i = 0; i < few; ++i) {
+  std::vector<decltype(triangulation)::Vertex_handle> handles;  // of different points: a triangulation has no copies
+  std::set<decltype(triangulation)::Vertex_handle> known;
+  for (std::size_t i = 0; i < few; ++i)
+    if (const auto vertex = triangulation.nearest_vertex(start[i]); known.insert(vertex).second)
+      handles.push_back(vertex);
+  report("CGAL Delaunay_triangulation_2", 2 * handles.size(), [&] {
+    for (std::size_t i = 0; i < handles.size(); ++i) {
       triangulation.insert(CgalPoint(points[n + i].first, points[n + i].second));
       triangulation.remove(handles[i]);
     }
