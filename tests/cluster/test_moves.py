@@ -5,6 +5,7 @@ Whatever ends or stops in between: what is acknowledged stays, nothing is applie
 
 import os
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -19,6 +20,7 @@ from server_process import Server, server_process
 from steady_writer import SteadyWriter
 
 from dynhull_client import HullClient, Quarantine
+from dynhull_cluster.postgres.ownership import LEASE
 
 POINTS = np.random.default_rng(1).normal(size=(5_000, 2))
 OWNER = "SELECT epoch, worker FROM owners WHERE until > '-infinity' AND address <> ''"
@@ -105,12 +107,18 @@ def mortal_pair(mortal: tuple[str, list[Server]], name: str) -> Iterator[Pair]:
 
 
 class Stopped:
-    """A process that stands still within the block, unless it is killed."""
+    """A process that stands still within the block, unless it is killed.
+
+    Attributes:
+        briefly: whether it stood still for so short a time that its lease has not ended.
+    """
 
     def __init__(self, process: int) -> None:
         self._process = process
+        self.briefly = False
 
     def __enter__(self) -> "Stopped":
+        self._since = time.monotonic()
         os.kill(self._process, signal.SIGSTOP)
         return self
 
@@ -118,9 +126,14 @@ class Stopped:
         os.kill(self._process, signal.SIGKILL)
         self._process = 0
 
+    def go_on(self) -> None:
+        os.kill(self._process, signal.SIGCONT)
+        self.briefly = time.monotonic() - self._since < LEASE / 2
+        self._process = 0
+
     def __exit__(self, *_: object) -> None:
         if self._process:
-            os.kill(self._process, signal.SIGCONT)
+            self.go_on()
 
 
 def ready(pair: Pair, worker: str) -> bool:
@@ -159,14 +172,15 @@ def test_the_owner_serves_until_the_next_one_has_read(pair: Pair) -> None:
 
 
 @pytest.mark.one_process("a cluster has a shape of its own")
-def test_an_order_can_be_cancelled(pair: Pair) -> None:
+def test_an_order_can_be_cancelled(mortal_pair: Pair) -> None:
+    pair = mortal_pair
     source, target, epoch = pair.owner(), pair.other(), pair.epoch()
-    with Stopped(pair.process(source)):  # for less than its lease lasts
+    with Stopped(pair.process(source)) as stopped:
         pair.order(target)
         wait_until(lambda: ready(pair, target))
         pair.order(source)
-    wait_until(lambda: not query(pair.url, HEIR))
-    assert (pair.owner(), pair.epoch()) == (source, epoch)
+    wait_until(lambda: not query(pair.url, HEIR) and pair.owner() == source)
+    assert pair.epoch() == epoch or not stopped.briefly
     pair.order(target)
     wait_until(lambda: pair.owner() == target)
     pair.check()
@@ -175,14 +189,14 @@ def test_an_order_can_be_cancelled(pair: Pair) -> None:
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_target_that_is_killed_before_the_owner_lets_go(mortal_pair: Pair) -> None:
     pair = mortal_pair
-    source, target, epoch = pair.owner(), pair.other(), pair.epoch()
+    source, target = pair.owner(), pair.other()
     with Stopped(pair.process(source)):
         pair.order(target)
         wait_until(lambda: ready(pair, target))
         os.kill(pair.process(target), signal.SIGKILL)
     pair.writer.more()
-    wait_until(lambda: pair.owner() == target)  # which is started again, and reads again
-    assert pair.epoch() == epoch + 1
+    # It is started again, and reads again. If the owner has let go before it noticed, it has taken the partition back.
+    wait_until(lambda: pair.owner() == target)
     pair.check()
 
 
@@ -194,7 +208,7 @@ def test_a_target_that_is_killed_when_the_owner_has_let_go(mortal_pair: Pair) ->
         pair.order(target)
         wait_until(lambda: ready(pair, target))
         with Stopped(pair.process(target)) as stopped_target:
-            stopped_source.__exit__()
+            stopped_source.go_on()
             wait_until(lambda: is_free(pair))
             stopped_target.kill()
     pair.writer.more()
@@ -209,13 +223,13 @@ def test_a_source_that_is_killed_when_it_has_let_go(mortal_pair: Pair) -> None:
     with Stopped(pair.process(source)) as stopped_source:
         pair.order(target)
         wait_until(lambda: ready(pair, target))
-        with Stopped(pair.process(target)):
+        with Stopped(pair.process(target)) as stopped_target:
             killed = pair.process(source)
-            stopped_source.__exit__()
+            stopped_source.go_on()
             wait_until(lambda: is_free(pair))
             os.kill(killed, signal.SIGKILL)
     wait_until(lambda: pair.owner() == target)
-    assert pair.epoch() == epoch + 1
+    assert pair.epoch() == epoch + 1 or not stopped_target.briefly
     pair.check()
 
 
@@ -228,8 +242,7 @@ def test_a_source_that_is_killed_while_the_target_follows(mortal_pair: Pair) -> 
         pair.order(target)
         wait_until(lambda: ready(pair, target))
         stopped.kill()
-    wait_until(lambda: pair.epoch() == epoch + 1)
-    wait_until(lambda: pair.owner() == target)
+    wait_until(lambda: pair.epoch() > epoch and pair.owner() == target)
     pair.check()
 
 

@@ -21,6 +21,7 @@ class Proxy:
         self.flowing.set()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._open: set[socket.socket] = set()
+        self._closed = False
         self._threads: list[threading.Thread] = []
         self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
         self._start(self._accept)
@@ -30,6 +31,7 @@ class Proxy:
             shut(each)
 
     def close(self) -> None:
+        self._closed = True
         shut(self._listener)
         self.cut()
         self.flowing.set()
@@ -52,6 +54,9 @@ class Proxy:
     def _connect(self, client: socket.socket) -> None:
         with client, suppress(OSError), connected(self.server) as server:
             self._open |= {client, server}
+            if self._closed:  # too late to be cut
+                shut(client)
+                shut(server)
             back = self._start(self._forward, server, client)
             self._forward(client, server)
             back.join()

@@ -3,7 +3,9 @@
 import asyncio
 import logging
 import time
+from collections.abc import Callable
 from contextlib import suppress
+from typing import NamedTuple
 
 from dynhull_server.app import Server
 from dynhull_server.state.errors import words
@@ -13,8 +15,8 @@ from ..postgres.storage import PostgresStorage
 from .board import Board
 from .entrance import PartitionEntrance
 
-# The reasons for which a partition cannot be read or served at present.
-FAILURES = StorageError, OSError, RuntimeError, MemoryError
+# The reasons for which a partition cannot be read or served at present; ValueError for a file of tokens.
+FAILURES = StorageError, OSError, RuntimeError, MemoryError, ValueError
 # Seconds between two looks at what has come since.
 ROUND = 0.2
 # Rounds are short when the last one took at most so many seconds. Then the other worker may let go; also after so many
@@ -28,40 +30,42 @@ class _NoLongerWantedError(Exception):
     """Some other worker should have the partition."""
 
 
+class Served(NamedTuple):
+    """What serves a partition."""
+
+    server: Server
+    storage: PostgresStorage
+    entrance: PartitionEntrance
+
+
 class Ahead:
     """A server that follows a partition, from now on until `finish` or `give_up`, and says when it is ready to take it.
 
     Args:
         number: the partition.
-        server: the server.
-        storage: its storage.
-        entrance: its entrance.
+        make: makes the server.
         board: where it says so.
 
     Attributes:
-        server, storage, entrance: the same.
         failure: why it cannot follow, if it has failed; then the server ends.
         task: the task that follows.
     """
 
-    def __init__(
-        self, number: int, server: Server, storage: PostgresStorage, entrance: PartitionEntrance, board: Board
-    ) -> None:
+    def __init__(self, number: int, make: Callable[[int], Served], board: Board) -> None:
         self._number = number
-        self.server = server
-        self.storage = storage
-        self.entrance = entrance
+        self._make = make
         self._board = board
+        self._served: Served | None = None
         self._over = asyncio.Event()
         self._unwanted = self._ended = False
         self.failure: BaseException | None = None
         self.task = asyncio.get_running_loop().create_task(self._run())
 
-    async def finish(self) -> bool:
-        """Have what was begun completed. Returns whether the server can be started; little is left to read."""
+    async def finish(self) -> Served | None:
+        """Have what was begun completed. Returns the server, which has little left to read; None if it has ended."""
         self._over.set()
         await asyncio.wait([self.task])
-        return not self._ended and self.task.exception() is None
+        return None if self._ended or self.task.exception() is not None else self._served
 
     def give_up(self) -> None:
         """Have the task end the server, because it is not wanted any more."""
@@ -75,26 +79,28 @@ class Ahead:
 
     async def _run(self) -> None:
         try:
-            await self._follow()
+            self._served = self._make(self._number)
+            await self._follow(*self._served)
         except _NoLongerWantedError:
             log.info("a partition is no longer read ahead", extra={"partition": self._number})
         except FAILURES as error:
             self.failure = error
         if self._unwanted or self.failure is not None:
             self._ended = True
-            await self.server.drain()
+            if self._served is not None:
+                await self._served.server.drain()
             await self._withdraw()
 
-    async def _follow(self) -> None:
+    async def _follow(self, server: Server, storage: PostgresStorage, _: PartitionEntrance) -> None:
         rounds = 0
         offered = False
         while not self._over.is_set():
             begun = time.monotonic()
-            await self.server.read_ahead(self.storage, self._go_on)
+            await server.read_ahead(storage, self._go_on)
             rounds += 1
             seconds = time.monotonic() - begun
             if not offered and (seconds < SHORT or rounds == MOST_ROUNDS):
-                await self._board.offer(self._number, self.storage.followed_epoch)
+                await self._board.offer(self._number, storage.followed_epoch)
                 offered = True
             if offered:
                 with suppress(TimeoutError):

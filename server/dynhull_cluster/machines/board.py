@@ -25,8 +25,8 @@ from ..postgres.schema import hold, partitions_of, prepare
 LOOK, PATIENCE = 0.5, 10.0
 # Seconds between two looks after which it is not known whether leases were renewed in between.
 GAP = 2.0
-# Seconds until something that is to be written is given up.
-SAY_SECONDS = 1.0
+# Seconds that a worker which ends takes to say so.
+LAST_SECONDS = 1.0
 # Seconds after which a worker that does not renew its row is one no longer.
 PRESENT = 5
 
@@ -232,14 +232,15 @@ class Board:
     async def leave(self) -> None:
         """Remove the row of the worker; if the database is away, it expires."""
         try:
-            await self._say(b"DELETE FROM workers WHERE worker = %s", [self._worker])
+            async with asyncio.timeout(LAST_SECONDS):
+                await self._say(b"DELETE FROM workers WHERE worker = %s", [self._worker])
         except (StorageError, OSError) as error:
             log.warning("the worker has not signed off", extra={"reason": words(error)})
 
     async def _say(self, sql: bytes, values: list[object]) -> None:
         """Write into the tables, and have all processes look at them."""
         try:
-            async with asyncio.timeout(SAY_SECONDS), self._connected() as connection:
+            async with asyncio.timeout(PATIENCE), self._connected() as connection:
                 await connection.execute(sql, values)
                 await connection.execute(f"NOTIFY {CHANNEL}".encode())
         except psycopg.Error as error:

@@ -32,7 +32,7 @@ from ..metrics import merged
 from ..postgres.ownership import is_known_dead
 from ..postgres.storage import PostgresStorage
 from ..worker import own_settings
-from .ahead import FAILURES, Ahead
+from .ahead import FAILURES, Ahead, Served
 from .board import Board, Cluster, Tables, join
 from .claims import shares
 from .entrance import PartitionEntrance
@@ -166,7 +166,7 @@ class Member:
         task.add_done_callback(ended)
 
     def _read_ahead(self, number: int) -> None:
-        ahead = self._ahead[number] = Ahead(number, *self._server(number), self._board)
+        ahead = self._ahead[number] = Ahead(number, self._make, self._board)
         log.info("a partition is read ahead", extra={"partition": number})
 
         def ended(_: "asyncio.Task[None]") -> None:
@@ -190,7 +190,7 @@ class Member:
             end_process(words(error))
         log.error(what, extra={"partition": number, "reason": words(error)})
 
-    def _server(self, number: int) -> tuple[Server, PostgresStorage, PartitionEntrance]:
+    def _make(self, number: int) -> Served:
         entrance = PartitionEntrance(self._settings, number, self._cluster.secret)
         storage = PostgresStorage(
             self._database,
@@ -200,27 +200,26 @@ class Member:
             partitions=self._cluster.partitions,
             worker=self._worker,
         )
-        return Server(own_settings(self._settings), entrance, storage), storage, entrance
+        return Served(Server(own_settings(self._settings), entrance, storage), storage, entrance)
 
     async def _take(self, number: int) -> None:
         """Own a partition, and serve it; if that fails, others may, and this worker tries again later."""
         begun = time.monotonic()
         ahead = self._ahead.get(number)
-        if ahead is None or not await ahead.finish():
-            server, storage, entrance = self._server(number)
-        else:
-            server, storage, entrance = ahead.server, ahead.storage, ahead.entrance
-        storage.lapsed = self._board.lapsed(number)
+        served = None if ahead is None else await ahead.finish()
         try:
-            await server.start()
-            await asyncio.to_thread(storage.announce, entrance.address)
+            served = served or self._make(number)
+            served.storage.lapsed = self._board.lapsed(number)
+            await served.server.start()
+            await asyncio.to_thread(served.storage.announce, served.entrance.address)
         except FAILURES as error:
-            await server.drain()
+            if served is not None:
+                await served.server.drain()
             self._note_failure(TAKE, number, error)
             return
         for what in (READ_AHEAD, TAKE):
             self._failed.pop((what, number), None)
-        self._served[number] = server
+        self._served[number] = served.server
         seconds = round(time.monotonic() - begun, 3)
         log.info("a partition is served", extra={"partition": number, "seconds": seconds})
 

@@ -8,7 +8,8 @@ network to it those of postgres_torture.py. The other faults:
 * a worker is killed, or stopped until its partitions are taken over, and then goes on
 * a gateway is killed
 * a machine with its worker and its gateway is killed, or stopped as an operator does it, and started again
-* partitions are moved by hand; or are to be moved when the worker that has one, or is to have it, is killed or stopped
+* partitions are moved by hand; or are to be moved when the worker that has one, or is to have it, is killed or stopped,
+  or PostgreSQL is killed
 """
 
 import os
@@ -127,6 +128,14 @@ class Torture(postgres_torture.Torture):
             os.kill(self._one_of("worker"), signal.SIGKILL)
         self._order("anywhere")
 
+    def _crash_in_move(self) -> None:
+        """PostgreSQL is killed, at any moment of a move."""
+        self._balanced()
+        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
+        time.sleep(self._random.uniform(0.0, 0.6))
+        self._crash()
+        self._order("anywhere")
+
     def _stop_in_move(self) -> None:
         """One of the two is stopped for a while, at any moment, and goes on before it is replaced, or after."""
         self._balanced()
@@ -169,6 +178,7 @@ KINDS = [
     "stop_in_move",
     "hold",
     "kill_in_move",
+    "crash_in_move",
     "freeze",
     "kill_machine",
     "full_disk",
