@@ -130,6 +130,11 @@ def test_a_pipe_that_closes_early_is_success(served, name, command):
 def test_a_hull_over_shards(name):
     assert dynhull("create", name, "--shards", "3").stdout == f"{name}: created\n"
     assert json.loads(dynhull("list", name, "--json").stdout)["shards"] == 3
+    assert dynhull("reshard", name, "1").stdout == f"{name}: 1 shard, revision 1\n"
+    again = json.loads(dynhull("reshard", name, "5", "--json").stdout)
+    assert again == {"name": name, "revision": 2, "shards": 5}
+    refused = dynhull("reshard", name, "2000")
+    assert "SHARDS is 2000: must be at most 1024" in refused.stderr
     refused = dynhull("create", f"{name}-2", "--shards", "2", "--geographic")
     assert (refused.exit_code, "is geographic, so it cannot be divided" in refused.stderr) == (1, True)
     refused = dynhull("create", f"{name}-2", "--shards", "2000")

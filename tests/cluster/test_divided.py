@@ -8,13 +8,13 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from cluster import processes
+from cluster import descendants, processes
 from command_line import dynhull
 from patience import PATIENCE, wait_until
 from server_process import Server, server_process
@@ -24,7 +24,9 @@ from dynhull_client import (
     DynhullError,
     HullClient,
     HullCopy,
+    HullNotFoundError,
     HullUnsuitableError,
+    InvalidRequestError,
     KeyMissingError,
     Quarantine,
     UnavailableError,
@@ -362,6 +364,163 @@ def test_shards_of_a_deleted_hull_do_not_prevent_a_start(tmp_path: Path, options
         wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 3)
 
 
+# Other numbers of shards
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hull_with_other_shards_is_the_same_hull(client: HullClient, name: str, kind: str) -> None:
+    settings = KINDS[kind]
+    one, many = f"{name}-one", f"{name}-many"
+    client.create_hull(one, **settings)
+    client.create_hull(many, shards=SHARDS, **settings)
+    batches = Batches(settings, seed=len(kind))
+    changed = 0
+    for turn in range(24):
+        batch = batches.next()
+        expected, found = (batches.apply(client, each, batch) for each in (one, many))
+        if isinstance(expected, tuple):
+            assert found == expected
+        if turn % 6 == 5:
+            before = client.get_hull(many)
+            info = client.reshard(many, (1, 5, 2, 2)[turn // 6])
+            changed += info.shards != before.info.shards
+            assert (info.revision, info.shards) == (client.get_hull(one).revision + changed, (1, 5, 2, 2)[turn // 6])
+            assert client.get_hull(many).info == info
+            np.testing.assert_array_equal(client.get_hull(many).vertices, before.vertices)
+    assert changed == 3
+    for _ in range(changed):  # so that the revisions are the same
+        empty = {"keys": [], "points": np.empty((0, 2))} if "keyed" in settings else {"insert": np.empty((0, 2))}
+        if "max_age" in settings or "ordering" in settings:
+            empty["times"] = np.empty(0, np.int64)
+        batches.apply(client, one, empty)
+    hull, other = client.get_hull(one), client.get_hull(many)
+    np.testing.assert_array_equal(other.vertices, hull.vertices)
+    assert other.vertex_keys == hull.vertex_keys
+    for attribute in ("revision", "points", "clock", "keyed", "window"):
+        assert getattr(other.info, attribute) == getattr(hull.info, attribute)
+    check_reads(client, one, many, hull.info.keyed)
+
+
+def test_keys_leave_at_their_deadlines_also_from_other_shards(client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str", shards=2)
+    client.put(name, ["stays"], [[0, 0]])
+    client.put(name, [f"k{i}" for i in range(20)], np.random.default_rng(1).normal(size=(20, 2)), ttl=0.7)
+    client.reshard(name, 5)
+    assert client.get_hull(name).info.points == 21
+    wait_until(lambda: client.get_hull(name).info.points == 1)
+    assert list(client.entities(name).keys) == ["stays"]
+
+
+def test_other_shards_are_refused_where_they_cannot_be(client: HullClient, name: str) -> None:
+    client.create_hull(name)
+    with pytest.raises(HullUnsuitableError, match="is not divided among shards"):
+        client.reshard(name, 2)
+    with pytest.raises(HullNotFoundError):
+        client.reshard(f"{name}-nobody", 2)
+    client.create_hull(f"{name}-many", shards=2)
+    with pytest.raises(InvalidRequestError, match="shards is 1025: must be at most 1024"):
+        client.reshard(f"{name}-many", 1025)
+    with pytest.raises(ValueError, match="shards must be at least 1"):
+        client.reshard(f"{name}-many", 0)
+    assert client.get_hull(f"{name}-many").info.shards == 2
+
+
+def test_writers_and_watches_go_on_beside_other_shards(client: HullClient, name: str) -> None:
+    client.create_hull(name, shards=2)
+    copy, seen = HullCopy(), list[Any]()
+    with Marks(client, name) as marks, client.watch(name, copy=copy) as watch:
+        thread = threading.Thread(target=lambda: seen.extend(watch))
+        thread.start()
+        for shards in (5, 1, 3):
+            wait_until(lambda before=marks.acknowledged: marks.acknowledged > before + 20)
+            assert client.reshard(name, shards).shards == shards
+        marks.stop()
+        revision = client.get_hull(name).revision
+        assert revision == marks.acknowledged + 3
+        wait_until(lambda: copy.revision == revision)
+    thread.join()
+    np.testing.assert_array_equal(copy.vertices, client.get_hull(name).vertices)
+    assert in_order(client.sample_points(name, 10**6).points) == in_order(Marks.points(marks.acknowledged))
+    assert client.verify(name).equal
+
+
+def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
+    """Workers are killed at any moment while the shards change, again and again; then the whole server."""
+    options = (*WORKERS, "--data", str(tmp_path), "--snapshot-points", "100")
+    draw = np.random.default_rng(5)
+    points = draw.normal(size=(20_000, 2))
+    asked = 0
+    with (
+        server_process(*options, complaints="is started again") as server,
+        HullClient(server.address, retries=50) as client,
+    ):
+        client.create_hull("fleet", shards=2)
+        client.apply("fleet", insert=points)
+        for kill in range(6):
+            done = threading.Event()
+
+            def change(done: threading.Event = done, shards: int = 3 + kill % 3) -> None:
+                while client.get_hull("fleet").info.shards != shards:
+                    divide(client, shards)
+                done.set()
+
+            thread = threading.Thread(target=change)
+            thread.start()
+            time.sleep(draw.uniform(0, 0.15))
+            os.kill(processes(server.process.pid)[f"worker-{kill % 2}"], signal.SIGKILL)
+            assert done.wait(PATIENCE)
+            thread.join()
+            asked += 1
+            assert client.get_hull("fleet").info.points == len(points)
+            assert client.verify("fleet").equal
+        info = client.get_hull("fleet").info
+        assert info.revision == 1 + asked
+        wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 1 + info.shards)
+    with server_process(*options) as server, HullClient(server.address) as client:
+        assert client.get_hull("fleet").info == info
+        assert in_order(client.sample_points("fleet", 10**6).points) == in_order(points)
+        client.apply("fleet", delete=points[:5])
+        assert client.verify("fleet").equal
+
+
+@pytest.mark.parametrize("options", [(), WORKERS], ids=["process", "workers"])
+def test_a_server_that_is_killed_has_the_old_shards_or_the_new_ones(tmp_path: Path, options: tuple[str, ...]) -> None:
+    points = np.random.default_rng(5).normal(size=(20_000, 2))
+    for life in range(6):
+        with (
+            server_process(*options, "--data", str(tmp_path), killed=True, torn=life > 0) as server,
+            HullClient(server.address, retries=0) as client,
+        ):
+            if not life:
+                client.create_hull("fleet", shards=2)
+                client.apply("fleet", insert=points)
+            info = client.get_hull("fleet").info
+            assert info.points == len(points)
+            assert info.shards in {2, *range(3, 3 + life)}
+            assert client.verify("fleet").equal
+            thread = threading.Thread(target=divide, args=(client, 3 + life))
+            thread.start()
+            time.sleep(0.02 * life)
+            for each in [*descendants(server.process.pid), server.process.pid]:
+                os.kill(each, signal.SIGKILL)
+            server.process.wait(PATIENCE)
+            thread.join()
+    with server_process(*options, "--data", str(tmp_path), torn=True) as server, HullClient(server.address) as client:
+        assert in_order(client.sample_points("fleet", 10**6).points) == in_order(points)
+        assert client.verify("fleet").equal
+        shards = client.get_hull("fleet").info.shards
+        wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 1 + shards)
+    assert dynhull("check", tmp_path).exit_code == 0
+    file = tmp_path / "points.csv"
+    assert dynhull("export", "fleet", file, "--data", tmp_path).exit_code == 0
+    assert in_order(np.loadtxt(file, delimiter=",", skiprows=1)) == in_order(points)
+
+
+def divide(client: HullClient, shards: int) -> None:
+    with suppress(DynhullError):
+        client.reshard("fleet", shards)
+
+
 # Copies
 
 
@@ -394,9 +553,13 @@ class Marks:
         self._thread.start()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def stop(self) -> None:
+        """End with the batch that is under way."""
         self._stop.set()
         self._thread.join()
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
 
 
 def in_order(points: np.ndarray) -> list[list[float]]:

@@ -1,12 +1,17 @@
 """What roots and shards send each other, as bytes: it comes back as it was, and damage is noticed."""
 
+import asyncio
+
 import numpy as np
 import pytest
+from patience import PATIENCE
 
 from dynhull.keys import PackedKeys
 from dynhull_cluster.divisions.letters import Answer, Greeted, Greeting, IsWanted, Letter, Wanted
+from dynhull_cluster.divisions.peers import PeerAwayError, Peers
 from dynhull_cluster.divisions.wire import VERSION, WireError, pack, unpack
 from dynhull_cluster.shards import messages as say
+from dynhull_cluster.sockets import Sockets
 from dynhull_server.state.batch import NO_POINTS, Applied, Batch
 from dynhull_server.state.contents import keyed, windowed
 from dynhull_server.state.errors import KeyMissingError, PointMissingError
@@ -22,15 +27,16 @@ CHANGE = say.Change(say.Corners(NO_POINTS, ()), say.Corners(POINTS, ("a", 2**64 
 MESSAGES = [
     Greeting("fleet/a", "0a", 1.5, HullSettings("str", window=Window(7, clock="data"), shards=3, shard=2)),
     Greeted(2**40),
-    Wanted("fleet", "0a"),
+    Wanted("fleet", "0a", 7),
     IsWanted(wanted=True),
-    Letter("0a", 2, say.Open(1, 1, 9)),
-    Letter("0a", 0, say.Undo(1, 2, 9)),
-    Letter("0a", 0, say.Apply(1, 2, (say.Step(1, Batch(POINTS, NO_POINTS, 0, count_missing=True), None, True),))),
+    Letter("0a", 7, 2, say.Open(1, 1, 9)),
+    Letter("0a", 0, 0, say.Undo(1, 2, 9)),
+    Letter("0a", 0, 0, say.Apply(1, 2, (say.Step(1, Batch(POINTS, NO_POINTS, 0, count_missing=True), None, True),))),
     say.Step(2, windowed.Admitted(Batch(POINTS, NO_POINTS, 0, count_missing=False), TIMES, 5, 0, 0), 5, False),
     say.Step(3, keyed.Admitted(ROWS, None, 1, 0, refuse_missing=True), None, False),
     say.Ask(1, 3, say.FoundOf(NUMBERS)),
     say.Ask(1, 3, say.CountOf(POINTS)),
+    say.Ask(1, 3, say.SlotsOf(5, 1024)),
     Answer(None),
     Answer(say.Opened(1, 1, 0, TOTALS, say.Corners(POINTS, None))),
     Answer(say.Done(1, 2, (say.Effect(1, TOTALS, 1, CHANGE, Applied(1, 2, 0, 0, True, 3, held=[1]), None),))),
@@ -78,3 +84,27 @@ def test_a_message_of_another_version_is_refused() -> None:
 def test_what_no_message_has_is_refused() -> None:
     with pytest.raises(TypeError, match="no message between shards has a dict"):
         pack({})
+
+
+class Dying(Sockets):
+    """A worker that ends just as it is reached."""
+
+    async def connect(self, worker, make):
+        frames = await super().connect(worker, make)
+        frames.abort()
+        while frames.connected:
+            await asyncio.sleep(0)
+        return frames
+
+
+def test_a_worker_that_ends_as_it_is_reached_is_away(tmp_path):
+    async def ask():
+        sockets = Dying(tmp_path)
+        async with await asyncio.start_unix_server(lambda _, writer: writer.close(), sockets.frames(1)):
+            peers = Peers(sockets)
+            for _ in range(3):
+                with pytest.raises(PeerAwayError, match="worker 1"):
+                    await asyncio.wait_for(peers.ask(1, b"letter"), PATIENCE)
+            peers.close()
+
+    asyncio.run(ask())

@@ -411,5 +411,7 @@ def test_a_hull_over_shards(gateway: Gateway, name: str) -> None:
     assert gateway.post("/hulls", {"name": name, "shards": 2}).json["shards"] == 2
     assert gateway.post(f"/hulls/{name}/points", SQUARE).json["revision"] == 1
     assert gateway.post(f"/hulls/{name}/count", {"points": SQUARE[:2]}).json["counts"] == [1, 1]
+    assert gateway.post(f"/hulls/{name}/reshard", {"shards": 3}).json["shards"] == 3
+    assert gateway.post(f"/hulls/{name}/reshard", {"shards": 0}).status == 400
     refused = gateway.post("/hulls", {"name": f"{name}-2", "shards": 2, "geographic": True})
     assert "is geographic, so it cannot be divided" in refused.json["detail"]

@@ -57,6 +57,7 @@ EVERY_CALL = {
     "Stream": lambda stub, name: list(stub.Stream(iter([pb.StreamRequest(name=name)]))),
     "Recenter": lambda stub, name: stub.Recenter(pb.RecenterRequest(name=name)),
     "SetQuarantine": lambda stub, name: stub.SetQuarantine(pb.SetQuarantineRequest(name=name)),
+    "Reshard": lambda stub, name: stub.Reshard(pb.ReshardRequest(name=name, shards=2)),
     "ListHeld": lambda stub, name: stub.ListHeld(pb.ListHeldRequest(name=name)),
     "GetProducer": lambda stub, name: stub.GetProducer(pb.GetProducerRequest(name=name, producer="p")),
     "Locate": lambda stub, name: stub.Locate(pb.LocateRequest(name=name)),
@@ -88,6 +89,7 @@ WRITES = {
     "Stream",
     "Recenter",
     "SetQuarantine",
+    "Reshard",
     "GetProducer",
 }
 

@@ -1,8 +1,11 @@
 """Logs in memory, and a cluster whose messages arrive at once."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from dynhull_cluster.shards.logs import Decided, Decision, FencedError
+from dynhull_cluster.shards.messages import Message
+from dynhull_cluster.shards.placement import Place
 from dynhull_cluster.shards.requests import Request
 from dynhull_cluster.shards.root import Root
 from dynhull_cluster.shards.shard import Shard
@@ -35,15 +38,21 @@ class MemoryRootLog:
         if not self.decisions:
             return Decided()
         last = self.decisions[-1]
-        logged = [each for each in self.decisions if each.shards]
+        division, steps = None, dict[int, int]()
+        for each in self.decisions:
+            if each.division is None:
+                steps |= dict.fromkeys(each.shards, each.number)
+            else:
+                division, steps = each.division, {shard: each.effects[shard].number for shard in each.shards}
         return Decided(
-            logged[-1].number if logged else 0,
+            max(steps.values(), default=0),
             last.revision,
             last.cause,
             last.clock,
             {each.producer: each.sequence for each in self.decisions if each.producer},
             frozenset(each.producer for each in self.decisions if each.may_skip),
-            {shard: each.number for each in self.decisions for shard in each.shards},
+            steps,
+            division,
         )
 
     def decide(self, epoch: int, decisions: Sequence[Decision]) -> None:
@@ -89,24 +98,40 @@ class Cluster:
 
     def __init__(self, settings: HullSettings, limits: Limits, count: int) -> None:
         self._settings, self._limits = settings, limits
-        self.shard_logs = [MemoryShardLog() for _ in range(count)]
+        self._count = count
         self._log = MemoryRootLog()
-        self.shards = [Shard(settings, log) for log in self.shard_logs]
+        self._logs: dict[Place, MemoryShardLog] = {}
+        self._shards: dict[Place, Shard] = {}
         self.restart_root()
 
+    @property
+    def shard_logs(self) -> list[MemoryShardLog]:
+        """The logs of the shards of the present division."""
+        (generation,) = self.root.generations
+        return [log for place, log in sorted(self._logs.items()) if place.generation == generation]
+
     def restart_root(self) -> None:
-        self.root = Root(self._settings, self._limits, len(self.shard_logs), self._log, now=0.0)
+        self.root = Root(self._settings, self._limits, self._count, self._log, now=0.0)
         self.deliver()
 
     def restart_shard(self, shard: int) -> None:
-        self.shards[shard] = Shard(self._settings, self.shard_logs[shard])
+        (generation,) = self.root.generations
+        place = Place(generation, shard)
+        self._shards[place] = Shard(self._settings, self._logs[place])
 
     def deliver(self) -> None:
         while messages := self.root.messages():
-            for shard, message in messages:
-                reply = self.shards[shard].receive(message)
+            for place, message in messages:
+                reply = self.receive(place, message)
                 if reply is not None:
-                    self.root.receive(shard, reply)
+                    self.root.receive(place, reply)
+
+    def receive(self, place: Place, message: Message) -> Any:
+        """What a shard replies, a new one if there is none."""
+        if place not in self._shards:
+            self._logs[place] = MemoryShardLog()
+            self._shards[place] = Shard(self._settings, self._logs[place])
+        return self._shards[place].receive(message)
 
     def serve(self, *requests: Request) -> Request:
         """Have requests answered, those that can be in one round. Returns the last one."""

@@ -13,7 +13,7 @@ from typing import Any
 
 from dynhull_cluster.shards.root import Root
 
-from .simulation import World
+from .simulation import FEW, World
 
 MOST_SCHEDULES = 2000
 
@@ -69,6 +69,23 @@ MUTANTS = {
         "            self._log.decide(self._epoch, decisions)",
         "            pass",
     ),
+    "the root decides about new shards whose last points have not arrived": (
+        "root",
+        "        while left or under_way:",
+        "        while left:",
+    ),
+    "old shards are dropped before the new ones are decided": (
+        "root",
+        "for each in (self._division, self._arising) if each is not None)",
+        "for each in (self._arising or self._division,))",
+    ),
+    "the root goes on with the old shards": (
+        "root",
+        "        self._division, self._arising = arising, None",
+        "        self._arising = None",
+    ),
+    "a new root begins with the first shards": ("root", "decided.division or Division(shards)", "Division(shards)"),
+    "batches go to shards as before": ("root", "        self._planner.shards = arising.shards\n", ""),
     "the root keeps no producers": ("root", "self._producers.applied(", "(lambda *_, **__: None)("),
     "a request is forgotten where a shard restarts": (
         "root",
@@ -77,7 +94,7 @@ MUTANTS = {
     ),
     "a shard without rows keeps what is too old": (
         "planning",
-        "range(self._shards) if clock != self._clock else parts",
+        "range(self.shards) if clock != self._clock else parts",
         "parts",
     ),
     "vertices of what was too old stay": (
@@ -135,6 +152,8 @@ def mutated(name: str) -> dict[str, Any]:
         exec(compile(source.replace(old, new), original.__file__, "exec"), copy.__dict__)
     finally:
         sys.modules[original.__name__] = before
+    if module == "root":
+        copy.PIECE_POINTS = FEW
     if module == "shard":
         return {"shard_type": copy.Shard}
     return {"root_type": copy.Root if module == "root" else partial(with_planner, copy.Planner)}

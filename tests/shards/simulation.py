@@ -18,8 +18,9 @@ import numpy as np
 from dynhull_cluster.shards import root as root_module
 from dynhull_cluster.shards import shard as shard_module
 from dynhull_cluster.shards.logs import FencedError
-from dynhull_cluster.shards.messages import SampleOf, StaticHull
-from dynhull_cluster.shards.requests import Expire, Read, Request, Write
+from dynhull_cluster.shards.messages import Open, SampleOf, StaticHull
+from dynhull_cluster.shards.placement import Place
+from dynhull_cluster.shards.requests import Expire, Read, Request, Reshard, Write
 from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Kept
@@ -28,8 +29,10 @@ from .memory_logs import MemoryRootLog, MemoryShardLog
 from .workload import KINDS, LIMITS, Workload, same_effect
 
 EVERYTHING = 10**6
+# So that even few points go to new shards in several messages.
+root_module.PIECE_POINTS = FEW = 4
 FEW_POINTS = replace(LIMITS, max_points=20)  # so that the limit is met
-STEPS, CLIENTS, AT_A_TIME = 120, 2, 3
+STEPS, MORE_STEPS, CLIENTS, AT_A_TIME = 120, 500, 2, 3
 # Steps without faults within which everything that waits is answered.
 PATIENCE = 400
 
@@ -52,7 +55,7 @@ class InFlight:
     """A message, or a reply if `reply` is set, between a root and a shard."""
 
     root: RootProcess
-    shard: int
+    shard: Place
     message: Any
     reply: bool = False
 
@@ -80,16 +83,19 @@ class World:
         self._workload = Workload(self._settings, seed)
         self._deadly = draw.choice((0.0, 0.01, 0.05))  # that a process dies at a change of its log
         self._lossy = draw.choice((0.0, 0.05, 0.3))
+        self._restless = draw.choice((0.0, 0.05, 0.2))  # that the next request asks for another number of shards
         self._faults = True
         self._log = MemoryRootLog(self._perhaps_die)
-        self._shard_logs = [MemoryShardLog(self._perhaps_die) for _ in range(draw.choice((1, 2, 2, 3)))]
-        self._shards = [shard_type(self._settings, log) for log in self._shard_logs]
+        self._count = draw.choice((1, 2, 2, 3))
+        self._shard_logs: dict[Place, MemoryShardLog] = {}
+        self._shards: dict[Place, Any] = {}
         self._in_flight: list[InFlight] = []
         self._process: RootProcess | None = None
         self._replaced: list[RootProcess] = []
         self._clients = [Client(name) for name in "ab"[:CLIENTS]]
         self._reads: list[Read] = []
         self._expiries: list[Expire] = []
+        self._reshards: list[Reshard] = []
         self._batches: dict[tuple[str, int], WriteBatch] = {}
         self._acknowledged: dict[tuple[str, int], Any] = {}
         self._refused: list[tuple[int, WriteBatch, Exception]] = []
@@ -103,13 +109,16 @@ class World:
 
     def play(self) -> None:
         draw = self._draw
-        actions = [self._send, self._deliver, self._deliver, self._deliver, self._ask]
-        for _ in range(draw.randint(20, STEPS)):
+        # Another division takes many messages, most of which are old ones in a network that is always full.
+        actions = [self._send, *[self._deliver] * (6 if self._restless else 3), self._ask]
+        for _ in range(draw.randint(20, MORE_STEPS if self._restless else STEPS)):
             roll = draw.random()
-            if roll < 0.01:
-                self._kill_shard(draw.randrange(len(self._shards)))
+            if roll < 0.01 and self._shards:
+                self._kill_shard(draw.choice(list(self._shards)))
             elif roll < 0.02:
                 self._replace_root()
+            elif roll < 0.04:
+                self._drop_unneeded()
             else:
                 draw.choice(actions)()
         self._faults = False
@@ -127,13 +136,15 @@ class World:
 
     def _waits(self) -> bool:
         requests = [request for client in self._clients for request in client.waiting]
-        return self._process is None or any(not each.answered for each in (*requests, *self._reads, *self._expiries))
+        return self._process is None or any(
+            not each.answered for each in (*requests, *self._reads, *self._expiries, *self._reshards)
+        )
 
     def _resume(self) -> None:
         """A root is started where there is none, and clients send again what they have no answer to."""
         if self._process is None:
             try:
-                root = self._root_type(self._settings, FEW_POINTS, len(self._shards), self._log, now=0.0)
+                root = self._root_type(self._settings, FEW_POINTS, self._count, self._log, now=0.0)
             except KilledError:
                 return
             self._process = RootProcess(root)
@@ -142,6 +153,9 @@ class World:
                 client.waiting = [Write(request.batch, now=0.0) for request in client.waiting]
                 for request in client.waiting:
                     self._ask_root(request)
+            self._reshards = [Reshard(reshard.shards) for reshard in self._reshards]
+            for reshard in self._reshards:
+                self._ask_root(reshard)
 
     def _ask(self) -> None:
         self._resume()
@@ -158,6 +172,10 @@ class World:
             expiry = Expire(self._workload.time)
             self._expiries.append(expiry)
             self._ask_root(expiry)
+        elif roll > 1 - self._restless and not self._reshards:
+            reshard = Reshard(draw.choice((1, 2, 3, 4)))
+            self._reshards.append(reshard)
+            self._ask_root(reshard)
         else:
             client = draw.choice(self._clients)
             if client.may_send():
@@ -198,6 +216,11 @@ class World:
         if each.reply:
             self._deliver_reply(each)
         else:
+            if each.shard not in self._shards:
+                if not isinstance(each.message, Open):
+                    return
+                self._shard_logs[each.shard] = MemoryShardLog(self._perhaps_die)
+                self._kill_shard(each.shard)
             try:
                 reply = self._shards[each.shard].receive(each.message)
             except KilledError:
@@ -223,8 +246,15 @@ class World:
             self._replaced.remove(each.root)
         self._hear()
 
-    def _kill_shard(self, shard: int) -> None:
+    def _kill_shard(self, shard: Place) -> None:
         self._shards[shard] = self._shard_type(self._settings, self._shard_logs[shard])
+
+    def _drop_unneeded(self) -> None:
+        """Shards ask the root that serves now whether they are needed, and are dropped for good if they are not."""
+        if self._process is not None and self._process not in self._replaced:
+            needed = self._process.root.generations
+            for place in [each for each in self._shards if each.generation not in needed]:
+                del self._shards[place], self._shard_logs[place]
 
     def _lose_root(self) -> None:
         self._process = None
@@ -255,12 +285,16 @@ class World:
                 self._read.append((*read.result, read.question))
         self._reads = [read for read in self._reads if not read.answered]
         self._expiries = [expiry for expiry in self._expiries if not expiry.answered]
+        for reshard in self._reshards:
+            if reshard.answered and reshard.error is not None:
+                raise BrokenPromiseError(f"resharding failed: {reshard.error}")
+        self._reshards = [reshard for reshard in self._reshards if not reshard.answered]
 
     # The end
 
     def _restart_everything(self) -> None:
         self._replaced, self._in_flight, self._process = [], [], None
-        for shard in range(len(self._shards)):
+        for shard in self._shards:
             self._kill_shard(shard)
         self._resume()
         for question in (SampleOf(EVERYTHING), StaticHull()):
@@ -308,7 +342,9 @@ class World:
                 raise BrokenPromiseError(f"another answer to {question} at revision {one.counts.revision}")
 
     def _replay(self, one: HullState, decision: Any) -> None:
-        if decision.cause == "expiry":
+        if decision.division is not None:
+            one.counts.revision += 1  # the hull and its points stay as they are
+        elif decision.cause == "expiry":
             if not one.expire(decision.clock, None):
                 raise BrokenPromiseError("an expiry without points")
         else:

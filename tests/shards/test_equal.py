@@ -9,7 +9,7 @@ from shards.memory_logs import Cluster
 from shards.workload import KINDS, LIMITS, Workload, same_effect
 
 from dynhull_cluster.shards.messages import CountOf, PositionsOf, SampleOf, StaticHull
-from dynhull_cluster.shards.requests import Expire, Read, Write
+from dynhull_cluster.shards.requests import Expire, Read, Reshard, Write
 from dynhull_server.state.batch import NO_POINTS, KeyedBatch
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError
 from dynhull_server.state.events import WriteBatch
@@ -33,7 +33,9 @@ def test_a_hull_over_shards_is_one_hull(kind, shards):
             if draw.random() < 0.03:
                 cluster.restart_root()
             if draw.random() < 0.05:
-                cluster.restart_shard(draw.randrange(shards))
+                cluster.restart_shard(draw.randrange(len(cluster.shard_logs)))
+            if draw.random() < 0.08:
+                met["divided in another way"] += reshard(one, cluster, draw.randint(1, 6))
             if one.contents.clock is not None and one.contents.follows_server and draw.random() < 0.2:
                 workload.time += draw.choice((0, 10**6))
                 assert cluster.serve(Expire(workload.time)).result == one.expire(workload.time, None)
@@ -45,6 +47,19 @@ def test_a_hull_over_shards_is_one_hull(kind, shards):
         check_reads(one, cluster, settings)
     assert met["applied"] > ROUNDS
     assert met["refused"] > ROUNDS / 10
+    assert met["divided in another way"] > 3
+
+
+def reshard(one, cluster, shards):
+    """Divide it among this number of shards. Returns whether that was another one: then it is a revision."""
+    before = len(cluster.shard_logs)
+    request = cluster.serve(Reshard(shards))
+    assert len(cluster.shard_logs) == shards
+    if shards != before:
+        one.counts.revision, one.counts.cause = one.counts.revision + 1, "batch"
+    assert request.result == one.counts.revision
+    check(one, cluster)
+    return shards != before
 
 
 def compare(one, request, workload):

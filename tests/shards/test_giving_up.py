@@ -5,7 +5,7 @@ from shards.memory_logs import Cluster
 from shards.workload import LIMITS
 
 from dynhull_cluster.shards.messages import SampleOf
-from dynhull_cluster.shards.requests import Read, Write
+from dynhull_cluster.shards.requests import Read, Reshard, Write
 from dynhull_server.state.batch import NO_POINTS, Batch
 from dynhull_server.state.errors import ShardAwayError
 from dynhull_server.state.events import Stream, WriteBatch
@@ -26,8 +26,8 @@ def test_what_is_given_up_has_not_happened():
     begun, waiting = write(POINTS), write(POINTS)
     cluster.root.submit(begun)
     cluster.root.submit(waiting)
-    (shard, message), _ = cluster.root.messages()
-    cluster.root.receive(shard, cluster.shards[shard].receive(message))  # the other one is away
+    (place, message), _ = cluster.root.messages()
+    cluster.root.receive(place, cluster.receive(place, message))  # the other one is away
     cluster.root.give_up(ShardAwayError("hull", 1))
     assert [type(each.error) for each in (begun, waiting)] == [ShardAwayError] * 2
     assert not cluster.root.waits
@@ -39,6 +39,27 @@ def test_what_is_given_up_has_not_happened():
     assert cluster.serve(write(POINTS[1:3])).result.revision == 2
     _, points = cluster.serve(Read(SampleOf(100))).result
     assert np.array_equal(points, POINTS[:3])
+
+
+def test_a_division_that_is_given_up_has_not_happened():
+    cluster = Cluster(HullSettings(), LIMITS, 2)
+    cluster.serve(write(POINTS))
+    for rounds in range(1, 9):
+        reshard = Reshard(3)
+        cluster.root.submit(reshard)
+        for _ in range(rounds):
+            for place, message in cluster.root.messages():
+                cluster.root.receive(place, cluster.receive(place, message))
+        if reshard.answered:
+            break
+        cluster.root.give_up(ShardAwayError("hull", 2))
+        assert isinstance(reshard.error, ShardAwayError)
+        cluster.deliver()
+        assert len(cluster.shard_logs) == 2
+        revision, points = cluster.serve(Read(SampleOf(100))).result
+        assert (revision, len(points)) == (1, len(POINTS))
+    assert rounds > 3
+    assert (reshard.result, len(cluster.shard_logs), cluster.root.points) == (2, 3, len(POINTS))
 
 
 def test_a_stream_that_has_stopped_is_not_applied():

@@ -39,6 +39,7 @@ from dynhull_server.state.records import (
     Contents,
     Create,
     Delete,
+    Division,
     Expiry,
     HeldChange,
     HeldRows,
@@ -753,15 +754,18 @@ def test_what_a_root_knows_of_its_shards_comes_back(make):
     decided = [
         Record(1, PointRows(np.eye(2), NOTHING), "ship", 1, shares=Shares({0: Tally(1, 2, 1), 2: Tally(1, 5, 5)})),
         Record(2, PointRows(NOTHING, np.eye(2)), clock=7, shares=Shares({2: Tally(2, 4, 4)}, expiry=True)),
+        Record(3, PointRows(NOTHING, NOTHING), shares=Shares({0: Tally(9, 4, 4)}, division=Division(1, 2**40))),
     ]
     storage.commit([Append(1, decided)])
     same(storage.read(1).records, decided)
     tallies = {0: Tally(1, 2, 1), 1: Tally(), 2: Tally(2, 4, 4)}
-    for step in storage.snapshot(1, Kept(2, Contents(), {"ship": 1}, tallies=tallies)):
+    division = Division(3, 5)
+    for step in storage.snapshot(1, Kept(2, Contents(), {"ship": 1}, tallies=tallies, division=division)):
         storage.commit([step])
     storage.close()
     storage = make()
     (row,) = storage.open(no_progress).hulls
     kept = storage.read(1)
-    assert (row.settings, kept.revision, kept.tallies) == (settings, 2, tallies)
+    assert (row.settings, kept.revision, kept.tallies, kept.division) == (settings, 2, tallies, division)
+    assert kept.divided(settings) == (Division(1, 2**40), {0: Tally(9, 4, 4)})
     storage.close()

@@ -26,6 +26,7 @@ PANELS = {
         "list",
         "create",
         "recenter",
+        "reshard",
         "delete",
         "insert",
         "put",

@@ -15,6 +15,7 @@ FIELDS = {
     "config.window.max_skew": "--max-skew",
     "config.center": "--center",
     "config.shards": "--shards",
+    "shards": "SHARDS",
     "config.quarantine.max_speed": "--max-speed",
     "config.quarantine.max_growth": "--max-growth",
     "config.quarantine.confirmations": "--confirmations",

@@ -215,6 +215,28 @@ def recenter(
         typer.echo(f"{name}: about {_shown_place(info)}, revision {info.revision}")
 
 
+@connected
+def reshard(
+    client: "HullClient",
+    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")],
+    shards: Annotated[
+        int, typer.Argument(metavar="SHARDS", help="The number of shards from now on, 1 to 1024.", min=1)
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Divide the points of a hull over shards among another number of shards.
+
+        dynhull reshard fleet 16
+
+    Batches wait until that is done; watches go on. It is one revision, in which the hull stays as it is.
+    """
+    info = client.reshard(name, shards)
+    if as_json:
+        typer.echo(json_line(name=name, revision=info.revision, shards=info.shards))
+    else:
+        typer.echo(f"{name}: {info.shards} shard{'' if info.shards == 1 else 's'}, revision {info.revision}")
+
+
 def _place(text: str) -> tuple[float, float]:
     """LON,LAT as numbers; ValueError for another text."""
     try:

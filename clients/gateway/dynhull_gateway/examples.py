@@ -36,6 +36,7 @@ TRANSFERS = _named(
         {"batches": {"fleet": {"remove": ["AF006"]}, "last_hour": {"keys": ["AF006"], "points": [[2, 3]]}}},
     ),
 )
+SHARDS = _named(fleet=("Eight shards", {"shards": 8}))
 CENTER = _named(ships=("At a place", {"center": [9, 53]}))
 ABOUT = _named(
     fleet=("Points", {"points": [[1, 1], [9, 9]]}),

@@ -70,6 +70,14 @@ async def recenter(
     )
 
 
+@router.post("/hulls/{name}/reshard")
+async def reshard(
+    client: Caller, name: HullPath, to: Annotated[schemas.Reshard, schemas.body(examples.SHARDS)]
+) -> schemas.HullInfo:
+    """Divide the points of a hull over shards among another number of shards. Batches wait until that is done."""
+    return schemas.HullInfo.model_validate(await client.reshard(name, to.shards))
+
+
 @router.put("/hulls/{name}/quarantine")
 async def set_quarantine(client: Caller, name: HullPath, rules: schemas.QuarantineRules) -> schemas.HullInfo:
     """Replace the rules that hold bad positions out of a keyed hull. What is held stays so."""

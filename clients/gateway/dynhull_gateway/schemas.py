@@ -331,6 +331,12 @@ class Recenter(Request):
     center: Point | None = None
 
 
+class Reshard(Request):
+    """The number of shards from now on."""
+
+    shards: Annotated[int, Field(strict=True, ge=1, le=1024)]
+
+
 class HeldPosition(Response):
     """A position in quarantine. `speed` is null if it is not too fast, or if it moved in no time: see `breaks`."""
 

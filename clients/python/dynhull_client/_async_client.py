@@ -46,6 +46,7 @@ class AsyncHullClient(Client[AsyncConnection]):
 
     create_hull = _answering(calls.create_hull)
     recenter = _answering(calls.recenter)
+    reshard = _answering(calls.reshard)
     wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)

@@ -284,6 +284,22 @@ def recenter(name: str, center: tuple[float, float] | None = None, *, timeout: f
     return Call("Recenter", request, lambda response: messages.decode_info(response.hull), timeout, repeatable=False)
 
 
+def reshard(name: str, shards: int, *, timeout: float | None = None) -> Call[HullInfo]:
+    """Divide the points of a hull over shards among another number of shards, as one revision: the hull stays as it is.
+
+    Batches, and questions about all points, wait until that is done. It is done also if the call ends before, as at its
+    timeout, unless the server ends: then the hull has either its old shards or the new ones.
+
+    Args:
+        name: the hull. HullUnsuitableError if it is not divided.
+        shards: the number of shards, 1 to 1024.
+        timeout: seconds, instead of the client's.
+    """
+    number = _positive("shards", whole("shards", shards, bits=32))
+    request = pb.ReshardRequest(name=name, shards=number)
+    return Call("Reshard", request, lambda response: messages.decode_info(response.hull), timeout, repeatable=False)
+
+
 def wait_for_hull(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[HullInfo]:
     """Wait until there is a hull of that name, and a server if there is none yet.
 

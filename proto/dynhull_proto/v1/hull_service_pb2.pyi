@@ -96,6 +96,20 @@ class SetQuarantineResponse(_message.Message):
     hull: _hull_pb2.Hull
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ...) -> None: ...
 
+class ReshardRequest(_message.Message):
+    __slots__ = ("name", "shards")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    SHARDS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    shards: int
+    def __init__(self, name: _Optional[str] = ..., shards: _Optional[int] = ...) -> None: ...
+
+class ReshardResponse(_message.Message):
+    __slots__ = ("hull",)
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    hull: _hull_pb2.Hull
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ...) -> None: ...
+
 class ListHeldRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "page_size", "page_token")
     NAME_FIELD_NUMBER: _ClassVar[int]

@@ -89,6 +89,11 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineResponse.FromString,
                 _registered_method=True)
+        self.Reshard = channel.unary_unary(
+                '/dynhull.v1.HullService/Reshard',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReshardRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReshardResponse.FromString,
+                _registered_method=True)
         self.ListHeld = channel.unary_unary(
                 '/dynhull.v1.HullService/ListHeld',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ListHeldRequest.SerializeToString,
@@ -282,6 +287,16 @@ class HullServiceServicer(object):
     def SetQuarantine(self, request, context):
         """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
         batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Reshard(self, request, context):
+        """Divides the points of a hull over shards among another number of shards, as a revision in which the hull stays as it
+        is. Batches, and questions about all points, wait until that is done; reads of the hull and watches go on. If the
+        server ends in the middle, the hull has either its old shards or the new ones. Nothing changes if it has this number
+        already. FAILED_PRECONDITION if the hull is not divided.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -520,6 +535,11 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.SetQuarantine,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineResponse.SerializeToString,
+            ),
+            'Reshard': grpc.unary_unary_rpc_method_handler(
+                    servicer.Reshard,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReshardRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReshardResponse.SerializeToString,
             ),
             'ListHeld': grpc.unary_unary_rpc_method_handler(
                     servicer.ListHeld,
@@ -812,6 +832,33 @@ class HullService(object):
             '/dynhull.v1.HullService/SetQuarantine',
             dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.SetQuarantineResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Reshard(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/dynhull.v1.HullService/Reshard',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ReshardRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ReshardResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -78,6 +78,12 @@ class HullServiceStub:
     """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
     batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
     """
+    Reshard: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ReshardRequest, _hull_service_pb2.ReshardResponse]
+    """Divides the points of a hull over shards among another number of shards, as a revision in which the hull stays as it
+    is. Batches, and questions about all points, wait until that is done; reads of the hull and watches go on. If the
+    server ends in the middle, the hull has either its old shards or the new ones. Nothing changes if it has this number
+    already. FAILED_PRECONDITION if the hull is not divided.
+    """
     ListHeld: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]
     """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
     Batch.drops let them in and drop them.
@@ -225,6 +231,12 @@ class HullServiceAsyncStub(HullServiceStub):
     SetQuarantine: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SetQuarantineRequest, _hull_service_pb2.SetQuarantineResponse]  # type: ignore[assignment]
     """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
     batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
+    """
+    Reshard: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ReshardRequest, _hull_service_pb2.ReshardResponse]  # type: ignore[assignment]
+    """Divides the points of a hull over shards among another number of shards, as a revision in which the hull stays as it
+    is. Batches, and questions about all points, wait until that is done; reads of the hull and watches go on. If the
+    server ends in the middle, the hull has either its old shards or the new ones. Nothing changes if it has this number
+    already. FAILED_PRECONDITION if the hull is not divided.
     """
     ListHeld: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]  # type: ignore[assignment]
     """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
@@ -400,6 +412,18 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_hull_service_pb2.SetQuarantineResponse, _abc.Awaitable[_hull_service_pb2.SetQuarantineResponse]]:
         """Replaces the rules of the quarantine of a keyed hull, as a revision. Positions that are held stay so until a put or a
         batch lets them in or drops them. FAILED_PRECONDITION if the hull is not keyed.
+        """
+
+    @_abc_1.abstractmethod
+    def Reshard(
+        self,
+        request: _hull_service_pb2.ReshardRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.ReshardResponse, _abc.Awaitable[_hull_service_pb2.ReshardResponse]]:
+        """Divides the points of a hull over shards among another number of shards, as a revision in which the hull stays as it
+        is. Batches, and questions about all points, wait until that is done; reads of the hull and watches go on. If the
+        server ends in the middle, the hull has either its old shards or the new ones. Nothing changes if it has this number
+        already. FAILED_PRECONDITION if the hull is not divided.
         """
 
     @_abc_1.abstractmethod

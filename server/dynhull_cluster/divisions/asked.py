@@ -1,20 +1,27 @@
 """What callers ask of a root that is served: each request is answered in its thread, and told on the event loop."""
 
 import asyncio
-from typing import Any
+from typing import Any, Protocol
 
 from dynhull_server.state import events
 from dynhull_server.state.hull import Hull
 from dynhull_server.state.trip import refuse
 
 from ..shards import messages as say
-from ..shards.requests import Expire, Read, Write
+from ..shards.requests import Expire, Read, Request, Reshard, Write
+
+
+class Told(Protocol):
+    """Somebody who asked hears of the answer."""
+
+    def tell(self) -> None:
+        """Have them hear of it, on the event loop."""
 
 
 class AskedWrite(Write):
     """A batch of a caller. Its stream stops with it, in the thread of the root, before another one begins."""
 
-    def __init__(self, request: events.WriteBatch, hull: Hull, now: float, answered: "list[Asked]") -> None:
+    def __init__(self, request: events.WriteBatch, hull: Hull, now: float, answered: list[Told]) -> None:
         super().__init__(request, now)
         self._hull = hull
         self._answered = answered
@@ -45,7 +52,7 @@ class AskedWrite(Write):
 class AskedExpiry(Expire):
     """Points that leave by the clock, as the core has noticed."""
 
-    def __init__(self, request: events.Expire, answered: "list[Asked]") -> None:
+    def __init__(self, request: events.Expire, answered: list[Told]) -> None:
         super().__init__(request.time)
         self._request = request
         self._answered = answered
@@ -61,11 +68,15 @@ class AskedExpiry(Expire):
         self._request.to.answer(self._request)
 
 
-class AskedRead(Read):
-    """A question of a reader. The counts are those of its revision: readers see each decision before the next one."""
+class _Awaited(Request):
+    """What a caller waits for. The counts are those of its revision: readers see each decision before the next one.
 
-    def __init__(self, question: say.Question, hull: Hull, answered: "list[Asked]") -> None:
-        super().__init__(question)
+    Attributes:
+        counts: the counts of the hull.
+        asked: is done when the caller has been told.
+    """
+
+    def _await(self, hull: Hull, answered: list[Told]) -> None:
         self.counts = hull.counts
         self.asked: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._hull = hull
@@ -75,13 +86,28 @@ class AskedRead(Read):
         """Answer it."""
         super().answer(result, error)
         self.counts = self._hull.counts
-        assert error is not None or self.counts.revision == result[0]
         self._answered.append(self)
 
     def tell(self) -> None:
-        """Have the reader hear of it."""
+        """Have the caller hear of it."""
         if not self.asked.done():
             self.asked.set_result(None)
 
 
-Asked = AskedWrite | AskedExpiry | AskedRead
+class AskedRead(_Awaited, Read):
+    """A question of a reader."""
+
+    def __init__(self, question: say.Question, hull: Hull, answered: list[Told]) -> None:
+        Read.__init__(self, question)
+        self._await(hull, answered)
+
+
+class AskedReshard(_Awaited, Reshard):
+    """Another number of shards."""
+
+    def __init__(self, shards: int, hull: Hull, answered: list[Told]) -> None:
+        Reshard.__init__(self, shards)
+        self._await(hull, answered)
+
+
+Asked = AskedWrite | AskedExpiry | AskedRead | AskedReshard

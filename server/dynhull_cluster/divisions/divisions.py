@@ -16,6 +16,7 @@ from dynhull_server.state.records import Create, Delete, HullRow, HullSettings
 
 from ..placement import worker_of
 from ..shards import messages as say
+from ..shards.placement import Place
 from .letters import Answer, Greeted, Greeting, IsWanted, Letter, Wanted
 from .local_shard import LocalShard
 from .peers import PeerAwayError, Peers
@@ -32,9 +33,15 @@ SHARDS = "shards"
 MARK = "#"
 
 
-def name_of_shard(name: str, uid: str, shard: int) -> str:
-    """The name of a shard in the storage, where those of a deleted hull of the same name may still be."""
-    return f"{name}{MARK}{uid}.{shard}"
+def name_of_shard(name: str, uid: str, place: Place) -> str:
+    """The name of a shard in the storage: others of the hull, and of a deleted one of its name, may be there."""
+    return f"{name}{MARK}{uid}.{place.generation}.{place.number}"
+
+
+def place_of(settings: HullSettings) -> Place:
+    """The place of a shard with these settings."""
+    assert settings.shard is not None  # they are those of one
+    return Place(settings.generation, settings.shard)
 
 
 def hull_of_shard(name: str) -> str:
@@ -58,7 +65,7 @@ class ServedDivisions:
         self._peers = peers
         self._engine: Engine | None = None
         self._roots: dict[str, ServedRoot] = {}
-        self._shards: dict[tuple[str, int], LocalShard] = {}
+        self._shards: dict[tuple[str, Place], LocalShard] = {}
         self._creating = asyncio.Lock()
         self._ending: set[asyncio.Task[None]] = set()
 
@@ -83,12 +90,11 @@ class ServedDivisions:
         """Begin, with the shards and the roots that the storage has."""
         self._engine = engine
         for row in shards:
-            assert row.settings.shard is not None  # they are shards
-            self._shards[row.uid, row.settings.shard] = LocalShard(engine, row)
+            self._shards[row.uid, place_of(row.settings)] = LocalShard(engine, row)
         for hull in roots:
             self.begin(hull)
         engine.supervisor.every(LOOK_SECONDS, "waiting for shards", self._look)
-        engine.supervisor.every(WANTED_SECONDS, "shards of deleted hulls", self._drop_unwanted)
+        engine.supervisor.every(WANTED_SECONDS, "shards that are not needed", self._drop_unwanted)
 
     def begin(self, hull: Hull) -> None:
         """Begin with the root of a hull, unless it has begun."""
@@ -149,7 +155,7 @@ class ServedDivisions:
                 shard = await self._found(letter)
                 return Greeted(await shard.epoch())
             case Letter():
-                known = self._shards.get((letter.uid, letter.shard))
+                known = self._shards.get((letter.uid, Place(letter.generation, letter.shard)))
                 if known is None:
                     raise PeerAwayError("there is no such shard")
                 return Answer(await known.receive(letter.message))
@@ -160,12 +166,11 @@ class ServedDivisions:
     async def _found(self, greeting: Greeting) -> LocalShard:
         """The shard of a root, a new one if there is none."""
         settings = greeting.settings
-        assert settings.shard is not None  # it is one of a shard
-        key = greeting.uid, settings.shard
+        key = greeting.uid, place_of(settings)
         async with self._creating:
             if key not in self._shards:
                 engine = self._started
-                name = name_of_shard(greeting.name, greeting.uid, settings.shard)
+                name = name_of_shard(greeting.name, *key)
                 row = HullRow(engine.core.number_of_shard(), name, greeting.uid, greeting.created, settings)
                 if engine.keeps:
                     await engine.commit([Create(row)])
@@ -179,21 +184,22 @@ class ServedDivisions:
         assert self._engine is not None  # nothing begins before
         return self._engine
 
-    async def _greet(self, hull: Hull, shard: int) -> int:
+    async def _greet(self, hull: Hull, place: Place) -> int:
         row = hull.row
-        greeting = Greeting(row.name, row.uid, row.created, replace(row.settings, shard=shard))
-        greeted = await self._send(self._place(row.name, shard), greeting)
+        settings = replace(row.settings, shard=place.number, generation=place.generation)
+        greeting = Greeting(row.name, row.uid, row.created, settings)
+        greeted = await self._send(self._worker_of(row.name, place), greeting)
         epoch: int = greeted.epoch
         return epoch
 
-    async def _deliver(self, hull: Hull, shard: int, message: say.Request) -> say.Reply | None:
-        answer = await self._send(self._place(hull.name, shard), Letter(hull.uid, shard, message))
+    async def _deliver(self, hull: Hull, place: Place, message: say.Request) -> say.Reply | None:
+        answer = await self._send(self._worker_of(hull.name, place), Letter(hull.uid, *place, message))
         reply: say.Reply | None = answer.reply
         return reply
 
-    def _place(self, name: str, shard: int) -> int:
+    def _worker_of(self, name: str, place: Place) -> int:
         """The worker that has a shard. Part of the format of data folders: it must not change."""
-        return (worker_of(name, self._workers) + shard) % self._workers
+        return (worker_of(name, self._workers) + place.number) % self._workers
 
     async def _send(self, worker: int, letter: Any) -> Any:
         """The answer to a letter. Raises PeerAwayError if the worker is away."""
@@ -203,7 +209,10 @@ class ServedDivisions:
 
     def _has(self, letter: Wanted) -> bool:
         hull = self._started.core.hulls.get(letter.name)
-        return hull is not None and hull.uid == letter.uid
+        if hull is None or hull.uid != letter.uid:
+            return False
+        root = self._roots.get(hull.uid)
+        return root is None or root.needs(letter.generation)
 
     # Background work
 
@@ -212,11 +221,11 @@ class ServedDivisions:
             root.look()
 
     async def _drop_unwanted(self) -> None:
-        """Delete the shards of hulls that are deleted."""
+        """Delete the shards of hulls that are deleted, or divided in another way."""
         for key, shard in list(self._shards.items()):
             row, name = shard.row, hull_of_shard(shard.row.name)
             try:
-                found = await self._send(worker_of(name, self._workers), Wanted(name, row.uid))
+                found = await self._send(worker_of(name, self._workers), Wanted(name, row.uid, row.settings.generation))
             except PeerAwayError:
                 continue
             if not found.wanted:

@@ -32,9 +32,10 @@ class Greeted:
 
 @dataclass(frozen=True, slots=True)
 class Letter:
-    """A message of a root to a shard. The reply is Answer."""
+    """A message of a root to a shard of a generation. The reply is Answer."""
 
     uid: str
+    generation: int
     shard: int
     message: Any
 
@@ -48,14 +49,15 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A worker asks the one that has the root whether a hull is still there. The reply is IsWanted."""
+    """A worker asks the one that has the root whether the shards of a generation are needed. The reply is IsWanted."""
 
     name: str
     uid: str
+    generation: int
 
 
 @dataclass(frozen=True, slots=True)
 class IsWanted:
-    """Whether the hull is there, so that its shards are needed."""
+    """Whether the hull is there, and may be divided among these shards."""
 
     wanted: bool

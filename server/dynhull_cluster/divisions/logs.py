@@ -68,6 +68,8 @@ class StoredRootLog:
             raise FencedError
         records = [record for decision in decisions for record in self._records(decision)]
         for decision in decisions:
+            if decision.division is not None:
+                self.due = {}
             self.due |= {shard: effect.totals.due for shard, effect in decision.effects.items()}
         self.follow(records)
 
@@ -78,6 +80,10 @@ class StoredRootLog:
 
     def _records(self, decision: Decision) -> list[Record]:
         effects = list(decision.effects.values())
+        if decision.replaced is not None:
+            tallies = {shard: _tally(effect) for shard, effect in decision.effects.items()}
+            shares = Shares(tallies, division=decision.division)
+            return [Record(decision.revision, self._rows([decision.replaced]), clock=decision.clock, shares=shares)]
         tallies = {shard: _tally(decision.effects[shard]) for shard in sorted(decision.shards)}
         left = self._rows([effect.left for effect in effects if effect.left is not None])
         if decision.cause == "expiry":
@@ -214,7 +220,8 @@ def _decided(state: HullState) -> Decided:
     assert isinstance(state, RootState)  # nobody else has a root
     steps = {shard: tally.step for shard, tally in enumerate(state.tallies)}
     counts, number = state.counts, max(steps.values())
-    return Decided(number, counts.revision, counts.cause, counts.clock, state.producers, state.skipping, steps)
+    more = counts.revision, counts.cause, counts.clock, state.producers, state.skipping
+    return Decided(number, *more, steps, state.division)
 
 
 def _tally(effect: Effect) -> Tally:

@@ -34,6 +34,8 @@ class Peers:
         """The answer to a letter. Raises PeerAwayError."""
         try:
             frames = await self._connected(worker)
+            if not frames.connected:  # it is lost, and nobody would say so any more
+                raise PeerAwayError(f"worker {worker} has ended")
             return await frames.ask(PATH, b" ", letter)
         except (OSError, RelayedError) as error:
             raise PeerAwayError(f"worker {worker} is away: {error}") from None

@@ -24,9 +24,10 @@ from dynhull_server.state.hull import Hull
 
 from ..shards import messages as say
 from ..shards.logs import FencedError
+from ..shards.placement import Place
 from ..shards.requests import Request
 from ..shards.root import Root, ShardsDifferError
-from .asked import Asked, AskedExpiry, AskedWrite
+from .asked import Asked, AskedExpiry, AskedWrite, Told
 from .logs import StoredRootLog
 
 if TYPE_CHECKING:
@@ -45,13 +46,15 @@ class Turn:
         waits: whether any other request waits.
         opened: whether all shards are open.
         failure: what has ended the root, so that another one is needed; None for nothing.
+        generations: the generations whose shards are needed; None where that is not known.
     """
 
-    messages: list[tuple[int, say.Request]] | None
-    answered: list[Asked]
+    messages: list[tuple[Place, say.Request]] | None
+    answered: list[Told]
     waits: bool
     opened: bool
     failure: Exception | None
+    generations: frozenset[int] | None
 
 
 class RootThread:
@@ -68,7 +71,7 @@ class RootThread:
     """
 
     def __init__(self, engine: Engine, hull: Hull, took: Callable[[Turn], None]) -> None:
-        self.answered: list[Asked] = []
+        self.answered: list[Told] = []
         self.damage: Exception | None = None
         self._engine = engine
         self._hull = hull
@@ -87,9 +90,9 @@ class RootThread:
         """Serve requests, in this order."""
         self._do(partial(self._submit, requests))
 
-    def receive(self, shard: int, message: say.Request, reply: say.Reply | None) -> None:
+    def receive(self, place: Place, message: say.Request, reply: say.Reply | None) -> None:
         """Handle the reply of a shard to a message; None where the message came too late."""
-        self._do(partial(self._receive, shard, message, reply))
+        self._do(partial(self._receive, place, message, reply))
 
     def give_up(self, error: Exception) -> None:
         """Refuse what waits, none of which has happened; go on with what comes."""
@@ -132,7 +135,9 @@ class RootThread:
         answered, self.answered[:] = list(self.answered), []
         waits = bool(self._backlog) or (root is not None and root.waits)
         opened = root is not None and self._opened
-        self._loop.call_soon_threadsafe(self._took, Turn(messages, answered, waits, opened, ended_by))
+        generations = None if root is None else root.generations
+        turn = Turn(messages, answered, waits, opened, ended_by, generations)
+        self._loop.call_soon_threadsafe(self._took, turn)
         return failure
 
     def _make_root(self, epoch: int) -> None:
@@ -156,11 +161,11 @@ class RootThread:
             else:
                 self._root.submit(request)
 
-    def _receive(self, shard: int, message: say.Request, reply: say.Reply | None) -> None:
+    def _receive(self, place: Place, message: say.Request, reply: say.Reply | None) -> None:
         if self._root is None:
             return
         if reply is not None:
-            self._root.receive(shard, reply)
+            self._root.receive(place, reply)
         elif any(each is message for _, each in self._root.messages()):
             raise FencedError("a shard knows of a later root")
 

@@ -13,17 +13,20 @@ from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.verification import Verification, first_difference
+from dynhull_server.engine.waiter import Waiter
 from dynhull_server.state import events
 from dynhull_server.state.contents.joining import joined
 from dynhull_server.state.contents.keyed import Found
 from dynhull_server.state.errors import HullNotFoundError, ShardAwayError, StoppingError
 from dynhull_server.state.hull import Hull
-from dynhull_server.state.hull_state import Counts
-from dynhull_server.state.records import Contents, Keys
+from dynhull_server.state.hull_state import Counts, HullState
+from dynhull_server.state.records import Contents, Division, Keys
+from dynhull_server.state.root_state import RootState
 from dynhull_server.storage.port import DamagedError
 
 from ..shards import messages as say
-from .asked import Asked, AskedExpiry, AskedRead, AskedWrite
+from ..shards.placement import Place
+from .asked import Asked, AskedExpiry, AskedRead, AskedReshard, AskedWrite
 from .peers import PeerAwayError
 from .root_thread import RootThread, Turn
 
@@ -36,9 +39,9 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 
 Reply = TypeVar("Reply")
 # Brings a message to a shard, and returns its reply. Raises PeerAwayError.
-Deliver = Callable[[int, say.Request], Awaitable[say.Reply | None]]
+Deliver = Callable[[Place, say.Request], Awaitable[say.Reply | None]]
 # Returns the last epoch that a shard knows of; it is created if there is none. Raises PeerAwayError.
-Greet = Callable[[int], Awaitable[int]]
+Greet = Callable[[Place], Awaitable[int]]
 
 
 class ServedRoot:
@@ -61,9 +64,10 @@ class ServedRoot:
         self._work = f"shards of {hull.name}"
         self._thread = RootThread(engine, hull, self._took)
         self._waits = False
-        self._couriers: dict[int, tuple[say.Request, asyncio.Task[None]]] = {}
-        self._unanswered: dict[int, float] = {}  # since when
-        self._away: set[int] = set()
+        self._generations: frozenset[int] | None = None  # those that are needed; None where that is not known
+        self._couriers: dict[Place, tuple[say.Request, asyncio.Task[None]]] = {}
+        self._unanswered: dict[Place, float] = {}  # since when
+        self._away: set[Place] = set()
         self._starting = self._loop.create_task(self._start(FIRST_PAUSE))
 
     # Requests
@@ -130,13 +134,25 @@ class ServedRoot:
 
         return counts, await self._engine.aside(compare)
 
+    async def reshard(self, shards: int) -> Counts:
+        """Divide the points among another number of shards."""
+        asked = AskedReshard(shards, self._hull, self._thread.answered)
+        await self._answered(asked)
+        return asked.counts
+
     async def _ask(self, question: say.Question) -> tuple[Counts, Any]:
         asked = AskedRead(question, self._hull, self._thread.answered)
+        await self._answered(asked)
+        revision, answer = asked.result
+        assert revision == asked.counts.revision
+        return asked.counts, answer
+
+    async def _answered(self, asked: AskedRead | AskedReshard) -> None:
+        """Wait until it is answered, or raise the error; it goes on if the caller does not wait."""
         self._submit([asked])
         await asked.asked
         if asked.error is not None:
             raise asked.error.with_traceback(None)
-        return asked.counts, asked.result[1]
 
     def _submit(self, requests: Sequence[Asked]) -> None:
         self._waits = True
@@ -149,11 +165,15 @@ class ServedRoot:
         if self._thread.damage is not None:
             self._engine.supervisor.failed(self._work, DamagedError(str(self._thread.damage)))
         now = self._clock.monotonic()
-        for shard, since in self._unanswered.items():
-            patience = AWAY_SECONDS if shard in self._away else SILENT_SECONDS
+        for place, since in self._unanswered.items():
+            patience = AWAY_SECONDS if place in self._away else SILENT_SECONDS
             if self._waits and now - since > patience:
-                self._thread.give_up(ShardAwayError(self._hull.name, shard))
+                self._thread.give_up(ShardAwayError(self._hull.name, place.number))
                 return
+
+    def needs(self, generation: int) -> bool:
+        """Whether the shards of a generation may be needed."""
+        return self._generations is None or generation in self._generations
 
     def end(self) -> None:
         """The hull is deleted: refuse what waits."""
@@ -171,23 +191,33 @@ class ServedRoot:
     async def _start(self, pause: float) -> None:
         """Greet the shards, and make a root; try again until that succeeds."""
         while True:
-            greeted = await asyncio.gather(*map(self._greeted, range(self._hull.row.settings.shards)))
-            error = await self._thread.begin(max(greeted) + 1)
-            if error is None or isinstance(error, HullNotFoundError):
+            error = await self._begin()
+            if error is None or isinstance(error, HullNotFoundError | StoppingError):
                 return
             self._engine.supervisor.failed(self._work, error)
             await self._clock.sleep(pause)
             pause = min(2 * pause, LONGEST_PAUSE)
 
-    async def _greeted(self, shard: int) -> int:
-        self._unanswered.setdefault(shard, self._clock.monotonic())
-        return await self._answer_of(shard, lambda: self._greet(shard))
+    async def _begin(self) -> Exception | None:
+        """Greet the shards, and make a root. Returns what prevents that."""
+        try:
+            read = events.ReadHull(Waiter(), self._hull, _division)
+            _, division = await self._engine.ask(read)
+        except Exception as error:  # the storage may have failed
+            return error
+        places = [Place(division.generation, number) for number in range(division.shards)]
+        greeted = await asyncio.gather(*map(self._greeted, places))
+        return await self._thread.begin(max(greeted) + 1)
+
+    async def _greeted(self, place: Place) -> int:
+        self._unanswered.setdefault(place, self._clock.monotonic())
+        return await self._answer_of(place, lambda: self._greet(place))
 
     # Messages
 
     def _took(self, turn: Turn) -> None:
         """What the thread leaves to the event loop."""
-        self._waits = turn.waits
+        self._waits, self._generations = turn.waits, turn.generations
         for each in turn.answered:
             each.tell()
         if turn.opened:
@@ -198,38 +228,49 @@ class ServedRoot:
         if turn.messages is None:  # there is no root, and shards are greeted
             return
         now = self._clock.monotonic()
-        for shard in self._unanswered.keys() - {shard for shard, _ in turn.messages}:
-            self._heard(shard)
-        for shard, message in turn.messages:
-            before = self._couriers.get(shard)
+        for place in self._unanswered.keys() - {place for place, _ in turn.messages}:
+            self._heard(place)
+        for place in self._couriers.keys() - {place for place, _ in turn.messages}:
+            if place.generation not in (turn.generations or ()):
+                self._couriers.pop(place)[1].cancel()
+        for place, message in turn.messages:
+            before = self._couriers.get(place)
             if before is not None:
                 if before[0] is message:
                     continue
                 before[1].cancel()
-            self._unanswered.setdefault(shard, now)
-            self._couriers[shard] = message, self._loop.create_task(self._bring(shard, message))
+            self._unanswered.setdefault(place, now)
+            self._couriers[place] = message, self._loop.create_task(self._bring(place, message))
 
-    async def _bring(self, shard: int, message: say.Request) -> None:
-        """Bring a message to a shard, and the reply to the root."""
-        reply = await self._answer_of(shard, lambda: self._deliver(shard, message))
-        self._thread.receive(shard, message, reply)
+    async def _bring(self, place: Place, message: say.Request) -> None:
+        """Bring a message to a shard, which is created for the first one, and the reply to the root."""
+        if isinstance(message, say.Open):
+            await self._answer_of(place, lambda: self._greet(place))
+            self._unanswered[place] = self._clock.monotonic()
+        reply = await self._answer_of(place, lambda: self._deliver(place, message))
+        self._thread.receive(place, message, reply)
 
-    async def _answer_of(self, shard: int, ask: Callable[[], Awaitable[Reply]]) -> Reply:
+    async def _answer_of(self, place: Place, ask: Callable[[], Awaitable[Reply]]) -> Reply:
         """Ask a shard, again and again until it answers."""
         while True:
             try:
                 answer = await ask()
             except PeerAwayError:
-                self._away.add(shard)
+                self._away.add(place)
                 await self._clock.sleep(AGAIN_SECONDS)
             except Exception as error:  # it has failed, and the next message finds another one
                 self._engine.supervisor.failed(self._work, error)
-                self._away.add(shard)
+                self._away.add(place)
                 await self._clock.sleep(FIRST_PAUSE)
             else:
-                self._heard(shard)
+                self._heard(place)
                 return answer
 
-    def _heard(self, shard: int) -> None:
-        self._unanswered.pop(shard, None)
-        self._away.discard(shard)
+    def _heard(self, place: Place) -> None:
+        self._unanswered.pop(place, None)
+        self._away.discard(place)
+
+
+def _division(state: HullState) -> Division:
+    assert isinstance(state, RootState)  # nobody else has a root
+    return state.division

@@ -24,7 +24,7 @@ from . import letters
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-VERSION = 1
+VERSION = 2
 
 NONE, FALSE, TRUE, INTEGER, FLOAT, TEXT, BYTES, TUPLE, ARRAY, OBJECT, ERROR = range(11)
 LENGTH = struct.Struct("<I")
@@ -75,6 +75,7 @@ CLASSES: tuple[type, ...] = (
     letters.Answer,
     letters.Wanted,
     letters.IsWanted,
+    messages.SlotsOf,
 )
 NUMBER_OF = {kind: number for number, kind in enumerate(CLASSES)}
 FIELDS = {kind: [each.name for each in fields(kind)] for kind in CLASSES if kind is not PackedKeys}

@@ -27,7 +27,10 @@ from .database import SCHEMA, Connection, Database
 
 # The first format in PostgreSQL, and the statements that lead from each format to the next one.
 FIRST_FORMAT = 8
-MIGRATIONS: dict[int, Sequence[str]] = {8: ()}  # it had no hulls over shards
+MIGRATIONS: dict[int, Sequence[str]] = {
+    8: (),  # it had no hulls over shards
+    9: (),  # the number of their shards did not change
+}
 # The number of an advisory lock, held while tables are created, migrated, or filled from a folder: "dynhull".
 PREPARING = 0x64796E68756C6C
 PREPARING_SECONDS = 10

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from dynhull_server.state.hull_state import Cause
-from dynhull_server.state.records import Kept, Record
+from dynhull_server.state.records import Division, Kept, Record
 
-from .messages import Effect
+from .messages import Change, Effect
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +22,7 @@ class Decided:
         producers: the last number of each producer.
         skipping: the producers whose numbers may be skipped.
         steps: the last step in the log of each shard that has any.
+        division: how the points are divided; None for as at the creation of the hull.
     """
 
     number: int = 0
@@ -31,11 +32,12 @@ class Decided:
     producers: Mapping[str, int] = field(default_factory=dict)
     skipping: frozenset[str] = frozenset()
     steps: Mapping[int, int] = field(default_factory=dict)
+    division: Division | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """A step that happened.
+    """A step that happened, or that the points are divided in another way, which changes no points.
 
     Attributes:
         number: the number of the step.
@@ -47,6 +49,8 @@ class Decision:
         sequence: its number.
         may_skip: whether numbers of the producer may be skipped.
         effects: what each shard has done.
+        division: how the points are divided from now on; None for as before. The shards are those of this division.
+        replaced: the vertices of all shards before and after, if they are divided in another way.
     """
 
     number: int
@@ -58,6 +62,8 @@ class Decision:
     sequence: int = 0
     may_skip: bool = False
     effects: Mapping[int, Effect] = field(default_factory=dict)
+    division: Division | None = None
+    replaced: Change | None = None
 
 
 class FencedError(Exception):

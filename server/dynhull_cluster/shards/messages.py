@@ -113,6 +113,14 @@ class AllOf:
 
 
 @dataclass(frozen=True, slots=True)
+class SlotsOf:
+    """The points of the slots from `first` to before `end`, as Contents; of one shard."""
+
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
 class Recompute:
     """The hull by Chan's algorithm on all points, as a Recomputed of each shard."""
 
@@ -134,7 +142,7 @@ class Recomputed:
     keys_equal: bool
 
 
-Question = SampleOf | CountOf | PositionsOf | StaticHull | FoundOf | AllOf | Recompute
+Question = SampleOf | CountOf | PositionsOf | StaticHull | FoundOf | AllOf | Recompute | SlotsOf
 
 
 # From a shard

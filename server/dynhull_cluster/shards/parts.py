@@ -128,9 +128,9 @@ def _points_part(admitted: Batch | windowed.Admitted, inserts: RowNumbers, delet
 def _keyed_part(admitted: keyed.Admitted, puts: RowNumbers, removes: RowNumbers) -> Part:
     rows = admitted.rows
     part = KeyRows(
-        _keys_at(rows.keys, puts),
+        keys_at(rows.keys, puts),
         rows.points[puts],
-        _keys_at(rows.removes, removes),
+        keys_at(rows.removes, removes),
         None if rows.times is None else rows.times[puts],
         None if rows.deadlines is None else rows.deadlines[puts],
         rows.condition,
@@ -138,7 +138,7 @@ def _keyed_part(admitted: keyed.Admitted, puts: RowNumbers, removes: RowNumbers)
     return Part(keyed.Admitted(part, admitted.clock, 0, 0, admitted.refuse_missing), removes)
 
 
-def _keys_at(keys: Keys, rows: RowNumbers) -> Keys:
+def keys_at(keys: Keys, rows: RowNumbers) -> Keys:
     """The keys of some rows. O(the length of these)."""
     if not isinstance(keys, PackedKeys):
         return keys[rows]

@@ -1,5 +1,8 @@
 """Which shard a point belongs to: by its key or, where it has none, by its coordinates."""
 
+from itertools import pairwise
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -9,6 +12,14 @@ from dynhull_server.state.records import Keys
 
 # Points belong to slots, for ever, and slots to shards.
 SLOTS = 1024
+
+
+class Place(NamedTuple):
+    """A shard: its number in a division of a hull. Each division has a generation that no other one of the hull has."""
+
+    generation: int
+    number: int
+
 
 Hashes = npt.NDArray[np.uint64]
 Shards = npt.NDArray[np.uint16]
@@ -41,9 +52,41 @@ def key_hashes(keys: Keys) -> Hashes:
 
 def shards_of(hashes: Hashes, count: int) -> Shards:
     """The shard of each hash: `count` shards have equal numbers of slots, or such that differ by one."""
-    of_slot = (np.arange(SLOTS) * count // SLOTS).astype(np.uint16)
-    shards: Shards = of_slot[hashes % np.uint64(SLOTS)]
+    shards: Shards = _of_slot(count)[slots_of(hashes)]
     return shards
+
+
+def slots_of(hashes: Hashes) -> Shards:
+    """The slot of each hash."""
+    slots: Shards = (hashes % np.uint64(SLOTS)).astype(np.uint16)
+    return slots
+
+
+def _of_slot(count: int) -> Shards:
+    of_slot: Shards = (np.arange(SLOTS) * count // SLOTS).astype(np.uint16)
+    return of_slot
+
+
+class Piece(NamedTuple):
+    """Slots of one shard of a division that belong to one of another division: from `first` to before `end`."""
+
+    source: int
+    target: int
+    first: int
+    end: int
+
+
+def pieces(before: int, after: int, most_slots: int) -> list[Piece]:
+    """All slots, in pieces of at most `most_slots`, for a hull that goes from one number of shards to another."""
+    sources, targets = _of_slot(before), _of_slot(after)
+    ends = np.flatnonzero(np.diff(sources) | np.diff(targets)) + 1
+    found: list[Piece] = []
+    for first, end in pairwise([0, *ends.tolist(), SLOTS]):
+        found.extend(
+            Piece(int(sources[begin]), int(targets[begin]), begin, min(end, begin + most_slots))
+            for begin in range(first, end, most_slots)
+        )
+    return found
 
 
 def _mixed(values: Hashes) -> Hashes:

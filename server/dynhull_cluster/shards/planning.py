@@ -70,13 +70,16 @@ class Planner:
         most_points: the limit on its points.
         producers: those that number their batches.
         shards: the number of shards.
+
+    Attributes:
+        shards: the number of shards.
     """
 
     def __init__(self, settings: HullSettings, most_points: int, producers: Producers, shards: int) -> None:
         self._gate = replayed(Kept(), settings)  # has no points
         self._most_points = most_points
         self._producers = producers
-        self._shards = shards
+        self.shards = shards
         # As they will be after the batches so far, if all are applied; at most this number of points.
         self._number = self._points = self._rows = 0
         self._clock: int | None = None
@@ -112,8 +115,8 @@ class Planner:
         return self._take(request, admitted, clock)
 
     def _take(self, request: Write, admitted: Admitted, clock: int | None) -> Plan:
-        parts = divided(admitted, self._shards)
-        shards: Collection[int] = range(self._shards) if clock != self._clock else parts
+        parts = divided(admitted, self.shards)
+        shards: Collection[int] = range(self.shards) if clock != self._clock else parts
         suspect = self._points + most_growth(admitted) > self._most_points
         undoable = self._doubtful or suspect or (refusable(admitted) and len(shards) > 1)
         self._number += 1

@@ -49,6 +49,13 @@ class Expire(Request):
 
 
 @dataclass(slots=True, eq=False)
+class Reshard(Request):
+    """Divide the points among another number of shards. The result is the revision that did, or has found it so."""
+
+    shards: int
+
+
+@dataclass(slots=True, eq=False)
 class Read(Request):
     """A question about all points. The result is the revision, and the answer.
 

@@ -11,30 +11,38 @@ from dynhull_server.state.batch import NO_POINTS, Applied
 from dynhull_server.state.errors import RefusedError
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.producers import Producers
-from dynhull_server.state.records import HullSettings
+from dynhull_server.state.records import Contents, Division, HullSettings
 from dynhull_server.state.sample import sample
 
 from . import messages as say
 from .logs import Decision, RootLog
-from .messages import Corners, Totals
+from .messages import Change, Corners, Totals
+from .moving import puts
 from .parts import merged
+from .placement import SLOTS, Piece, Place, pieces
 from .planning import Plan, Planner
-from .requests import Expire, Read, Request, Write
+from .requests import Expire, Read, Request, Reshard, Write
 
 if TYPE_CHECKING:
     from dynhull_server.state.hull_state import Cause
 
-Round = dict[int, say.Request]
+Round = dict[Place, say.Request]
 Effects = Mapping[int, say.Effect]
-Replies = dict[int, Any]
+Replies = dict[Place, Any]
 Talk = Generator[Round, Any, Any]
 Names = dict[tuple[float, float], list[Any]]
 
 NOTHING = Corners(NO_POINTS, None)
+# The points that go from shard to shard in one message, about.
+PIECE_POINTS = 65_536
 
 
 class ShardsDifferError(Exception):
     """A shard has not what was decided: data on a disk or in memory are damaged."""
+
+
+class DivisionError(Exception):
+    """The points have not arrived in the new shards as they were: nothing is decided, and the old ones go on."""
 
 
 class Root:
@@ -43,7 +51,7 @@ class Root:
     Args:
         settings: the settings of the hull.
         limits: the limits on it.
-        shards: the number of shards.
+        shards: the number of shards at the creation of the hull.
         log: the decisions.
         now: seconds on a monotonic clock.
 
@@ -70,6 +78,9 @@ class Root:
         self._epoch, decided = log.begin(None)
         most, most_of_one = limits.max_producers, limits.max_producers_per_caller
         self._producers = Producers(most, most_of_one, decided.producers, decided.skipping, now)
+        self._division = decided.division or Division(shards)
+        self._arising: Division | None = None  # what replaces it, once that is decided
+        shards = self._division.shards
         self._planner = Planner(settings, self._most_points, self._producers, shards)
         self._number, self.revision = decided.number, decided.revision
         self.cause: Cause | None = decided.cause
@@ -100,11 +111,16 @@ class Root:
         if self._talk is None:
             self._go_on(self._next(), None)
 
-    def messages(self) -> list[tuple[int, say.Request]]:
+    def messages(self) -> list[tuple[Place, say.Request]]:
         """The messages without a reply, each with its shard: send them, and again after a while."""
-        return [(shard, each) for shard, each in self._sent.items() if shard not in self._replies]
+        return [(place, each) for place, each in self._sent.items() if place not in self._replies]
 
-    def receive(self, shard: int, reply: say.Reply) -> None:
+    @property
+    def generations(self) -> frozenset[int]:
+        """The generations whose shards are needed; the shards of all others are not."""
+        return frozenset(each.generation for each in (self._division, self._arising) if each is not None)
+
+    def receive(self, place: Place, reply: say.Reply) -> None:
         """Handle a reply of a shard.
 
         Raises:
@@ -112,13 +128,13 @@ class Root:
             ShardsDifferError: a shard has lost or changed points.
             Exception: memory or the log failed: this root must be replaced by a new one.
         """
-        sent = self._sent.get(shard)
-        if sent is None or shard in self._replies or (reply.epoch, reply.ticket) != (sent.epoch, sent.ticket):
+        sent = self._sent.get(place)
+        if sent is None or place in self._replies or (reply.epoch, reply.ticket) != (sent.epoch, sent.ticket):
             return
         if isinstance(reply, say.Closed):
             self._begin_again()
             return
-        self._replies[shard] = reply
+        self._replies[place] = reply
         if len(self._replies) == len(self._sent):
             self._go_on(self._talk, self._replies)
 
@@ -152,9 +168,13 @@ class Root:
         """Open all shards in a new epoch, and serve the current requests anew: nothing is decided about them."""
         self._waiting.extendleft(reversed(self._current))
         self._current = []
+        self._arising = None
+        self._begin_epoch()
+        self._go_on(self._open(), None)
+
+    def _begin_epoch(self) -> None:
         self._epoch, _ = self._log.begin(self._epoch)
         self._ticket = 0
-        self._go_on(self._open(), None)
 
     def _go_on(self, talk: Talk | None, replies: Replies | None) -> None:
         """Go on with what is under way, then with what waits, until a round needs replies or nothing waits."""
@@ -182,6 +202,8 @@ class Root:
                 return self._write(request)
             case Expire():
                 return self._expire(request)
+            case Reshard():
+                return self._reshard(request)
             case Read():
                 return self._read(request)
         raise AssertionError(f"not a request: {request}")
@@ -223,8 +245,10 @@ class Root:
         return [min(self._names[x, y]) for x, y in self.hull.vertices().tolist()]
 
     def _read(self, request: Read) -> Talk:
-        everywhere = range(len(self._totals))
-        replies = yield dict.fromkeys(everywhere, say.Ask(self._epoch, self._ticket, request.question))
+        everywhere = range(self._division.shards)
+        replies = yield from self._round(
+            dict.fromkeys(everywhere, say.Ask(self._epoch, self._ticket, request.question))
+        )
         answers = [replies[shard].answer for shard in everywhere]
         self._answer(request, (self.revision, self._composed(request.question, answers)))
 
@@ -244,13 +268,15 @@ class Root:
             case say.FoundOf() | say.AllOf() | say.Recompute():
                 assert self.hull is not None  # likewise
                 return answers, self.hull.vertices()
+            case say.SlotsOf():
+                raise AssertionError("only the root itself asks for slots")
         assert_never(question)
 
     # Changes
 
     def _open(self) -> Talk:
-        everywhere = range(len(self._totals))
-        replies = yield {shard: say.Open(self._epoch, self._ticket, self._number) for shard in everywhere}
+        everywhere = range(self._division.shards)
+        replies = yield from self._round(dict.fromkeys(everywhere, say.Open(self._epoch, self._ticket, self._number)))
         hull = DynamicHull()
         names: Names = {}
         for shard in everywhere:
@@ -280,7 +306,9 @@ class Root:
         for plan in plans:
             for shard in plan.shards:
                 steps.setdefault(shard, []).append(plan.step(shard))
-        replies = yield {shard: say.Apply(self._epoch, self._ticket, tuple(each)) for shard, each in steps.items()}
+        replies = yield from self._round(
+            {shard: say.Apply(self._epoch, self._ticket, tuple(each)) for shard, each in steps.items()}
+        )
         by_shard = {shard: {each.number: each for each in reply.effects} for shard, reply in replies.items()}
         effects = [{shard: own[plan.number] for shard, own in by_shard.items() if plan.number in own} for plan in plans]
         refused, reason = self._first_refused(plans, effects)
@@ -291,11 +319,13 @@ class Root:
             self._current = [request]
             self._waiting.extendleft(reversed(behind))
             undo = say.Undo(self._epoch, self._ticket, number)
-            yield {
-                shard: undo
-                for shard, own in by_shard.items()
-                if any(each >= number and effect.error is None for each, effect in own.items())
-            }
+            yield from self._round(
+                {
+                    shard: undo
+                    for shard, own in by_shard.items()
+                    if any(each >= number and effect.error is None for each, effect in own.items())
+                }
+            )
             self._answer(request, error=reason)
 
     def _joining(self) -> Iterator[Plan]:
@@ -349,8 +379,8 @@ class Root:
         clock = request.clock if self.clock is None else max(request.clock, self.clock)
         number = self._number + 1
         step = say.Step(number, None, clock, undoable=False)
-        everywhere = range(len(self._totals))
-        replies = yield dict.fromkeys(everywhere, say.Apply(self._epoch, self._ticket, (step,)))
+        everywhere = range(self._division.shards)
+        replies = yield from self._round(dict.fromkeys(everywhere, say.Apply(self._epoch, self._ticket, (step,))))
         effects = {shard: replies[shard].effects[0] for shard in everywhere}
         expired = sum(effect.expired for effect in effects.values())
         if expired:
@@ -360,6 +390,83 @@ class Root:
         for shard, effect in effects.items():  # they may know better when points leave next
             self._totals[shard] = effect.totals
         self._answer(request, expired)
+
+    def _round(self, messages: Mapping[int, say.Request]) -> Generator[Round, Any, dict[int, Any]]:
+        """The replies to messages to shards of the present division."""
+        generation = self._division.generation
+        replies = yield {Place(generation, shard): each for shard, each in messages.items()}
+        return {place.number: each for place, each in replies.items()}
+
+    # Another division
+
+    def _reshard(self, request: Reshard) -> Talk:
+        """Have other shards take over all points, and decide that these are the shards from now on.
+
+        Their generation is an epoch of its own, which the old shards know of before any new one does: so shards that a
+        root leaves half-filled, because it dies or gives up, are never taken for those of another attempt.
+        """
+        if request.shards == self._division.shards:
+            self._answer(request, self.revision)
+            return
+        self._begin_epoch()
+        self._ticket = 1
+        yield from self._open()
+        self._arising = arising = Division(request.shards, self._epoch)
+        new = [Place(arising.generation, number) for number in range(arising.shards)]
+        yield dict.fromkeys(new, say.Open(self._epoch, self._ticket, 0))
+        filled = yield from self._fill(arising)
+        assert self.hull is not None  # all shards are open
+        points = sum(each.points for each in filled.totals)
+        if points != self.points or not np.array_equal(filled.hull.vertices(), self.hull.vertices()):
+            raise DivisionError(f"{points} of {self.points} points have arrived, or other vertices")
+        decision = Decision(
+            filled.number,
+            self.revision + 1,
+            "batch",
+            self.clock,
+            frozenset(shard for shard, number in enumerate(filled.numbers) if number),
+            effects={shard: say.Effect(filled.numbers[shard], each) for shard, each in enumerate(filled.totals)},
+            division=arising,
+            replaced=Change(_corners(self.hull, self._names), _corners(filled.hull, filled.names)),
+        )
+        self._log.decide(self._epoch, [decision])
+        self._division, self._arising = arising, None
+        self._planner.shards = arising.shards
+        self._number, self.revision, self.cause = decision.number, decision.revision, decision.cause
+        self._totals, self._numbers = filled.totals, filled.numbers
+        self.hull, self._names = filled.hull, filled.names
+        self._answer(request, self.revision)
+
+    def _fill(self, arising: Division) -> Generator[Round, Any, "_Filled"]:
+        """Bring all points to new shards, a piece to and from each shard at a time."""
+        filled = _Filled(self._number, arising.shards)
+        most_slots = max(1, PIECE_POINTS * SLOTS // max(1, self.points))
+        left: dict[int, deque[Piece]] = {}
+        for piece in pieces(self._division.shards, arising.shards, most_slots):
+            left.setdefault(piece.source, deque()).append(piece)
+        under_way: list[tuple[Piece, Contents]] = []
+        while left or under_way:
+            asked = {source: waiting.popleft() for source, waiting in left.items()}
+            left = {source: waiting for source, waiting in left.items() if waiting}
+            steps: dict[int, list[say.Step]] = {}
+            for piece, contents in under_way:
+                for part in puts(contents, self.clock):
+                    filled.number += 1
+                    steps.setdefault(piece.target, []).append(say.Step(filled.number, part, None, undoable=False))
+            round_of_both: Round = {
+                Place(self._division.generation, source): say.Ask(
+                    self._epoch, self._ticket, say.SlotsOf(piece.first, piece.end)
+                )
+                for source, piece in asked.items()
+            }
+            for target, some in steps.items():
+                apply = say.Apply(self._epoch, self._ticket, tuple(some))
+                round_of_both[Place(arising.generation, target)] = apply
+            replies = yield round_of_both
+            for target in steps:
+                filled.take(target, replies[arising.generation, target].effects)
+            under_way = [(piece, replies[self._division.generation, source].answer) for source, piece in asked.items()]
+        return filled
 
     def _follow(self, decision: Decision, effects: Effects) -> bool:
         """Bring the hull to what was decided. Returns whether it has changed after points had left because of age."""
@@ -380,6 +487,32 @@ class Root:
         return self.hull.changes != before
 
 
+class _Filled:
+    """What has arrived in new shards.
+
+    Attributes:
+        number: the number of the last step.
+        numbers: the last step of each shard, 0 for none.
+        totals: the counts of each shard.
+        hull, names: the hull of their vertices, and the keys at these.
+    """
+
+    def __init__(self, number: int, shards: int) -> None:
+        self.number = number
+        self.numbers = [0] * shards
+        self.totals = [Totals(0, 0, None)] * shards
+        self.hull = DynamicHull()
+        self.names: Names = {}
+
+    def take(self, shard: int, effects: Sequence[say.Effect]) -> None:
+        """Take note of what steps have done in a shard."""
+        for effect in effects:
+            if effect.error is not None:
+                raise DivisionError(f"shard {shard} refuses points: {effect.error}")
+            self.numbers[shard], self.totals[shard] = effect.number, effect.totals
+        _take(self.hull, self.names, [each.changed for each in effects if each.changed is not None])
+
+
 def _logged(effects: Effects) -> frozenset[int]:
     return frozenset(shard for shard, effect in effects.items() if effect.logged)
 
@@ -398,6 +531,14 @@ def _take(hull: DynamicHull, names: Names, changes: Sequence[say.Change]) -> Non
                 del names[place]
         for place, key in _named(each.come):
             names.setdefault(place, []).append(key)
+
+
+def _corners(hull: DynamicHull, names: Names) -> Corners:
+    """The vertices of all shards."""
+    if not names:
+        return Corners(hull.points(), None)
+    rows = [(*place, key) for place, keys in names.items() for key in keys]
+    return Corners(np.array([row[:2] for row in rows], float), tuple(row[2] for row in rows))
 
 
 def _named(corners: Corners) -> Iterable[tuple[tuple[float, float], Any]]:

@@ -16,7 +16,7 @@ from dynhull_server.state.contents.keyed import Keyed, keys_match
 from dynhull_server.state.contents.live import LiveContents
 from dynhull_server.state.errors import RefusedError
 from dynhull_server.state.numbers import as_numbers
-from dynhull_server.state.records import HullSettings, Record
+from dynhull_server.state.records import Contents, HullSettings, Record
 from dynhull_server.state.sample import sample
 
 from .inverse import Inverse, inverse_of
@@ -42,12 +42,14 @@ from .messages import (
     Reply,
     Request,
     SampleOf,
+    SlotsOf,
     StaticHull,
     Step,
     Totals,
     Undo,
     Undone,
 )
+from .moving import Dealt
 
 Rows = npt.NDArray[np.bool_]
 
@@ -87,6 +89,7 @@ class Shard:
         self._uncertain: list[_Uncertain] = []
         self._corners = Corners(NO_POINTS, None)
         self._corners_as_of = -1
+        self._dealt: Dealt | None = None  # while the root asks for one part after the other
 
     def receive(self, message: Request) -> Reply | None:
         """Handle a message of the root. Returns the reply, None for a message that is too late.
@@ -113,6 +116,8 @@ class Shard:
         return None
 
     def _handle(self, message: Request) -> Reply:
+        if not (isinstance(message, Ask) and isinstance(message.question, SlotsOf)):
+            self._dealt = None
         match message:
             case Open():
                 return self._open(message)
@@ -210,7 +215,14 @@ class Shard:
                 return contents.stored()
             case Recompute():
                 return _recomputed(contents)
+            case SlotsOf(first, end):
+                return self._slots(contents, first, end)
         assert_never(question)
+
+    def _slots(self, contents: LiveContents, first: int, end: int) -> Contents:
+        if self._dealt is None:
+            self._dealt = Dealt(contents.stored())
+        return self._dealt.between(first, end)
 
     @property
     def _opened(self) -> LiveContents:

@@ -72,6 +72,10 @@ class DividedHull(LiveHull):
         await self.reached(min_revision)
         return await self.division.verify()
 
+    async def reshard(self, shards: int) -> Counts:
+        """Divide the points among another number of shards."""
+        return await self.division.reshard(shards)
+
     async def set_quarantine(self, rules: QuarantineRules) -> Counts:
         """Raise HullUnsuitableError."""
         del rules

@@ -37,6 +37,9 @@ class Division(Protocol):
     async def contents(self) -> tuple[Counts, Contents]:
         """All points, in the order of their keys if they have any."""
 
+    async def reshard(self, shards: int) -> Counts:
+        """Divide the points among another number of shards. Returns the counts after it."""
+
     async def verify(self) -> "tuple[Counts, Verification]":
         """Compare the hull with Chan's algorithm on the points of all shards."""
 

@@ -350,6 +350,18 @@ class LiveHull:
         )
         return result
 
+    async def reshard(self, shards: int) -> Counts:
+        """Divide the points of a hull over shards among another number of them. Returns the counts after it.
+
+        Raises:
+            HullUnsuitableError: the hull is not divided.
+            ShardAwayError: a shard does not answer; nothing has changed.
+        """
+        del shards
+        raise HullUnsuitableError(
+            self.name, "is not divided among shards: create one that is, and load its points", field="shards"
+        )
+
     async def set_quarantine(self, rules: QuarantineRules) -> Counts:
         """Replace the rules of the quarantine of a keyed hull. Returns the counts after it.
 

@@ -59,11 +59,16 @@ def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
         if identity == "multiset":
             raise InvalidFieldError("config.quarantine", "present", "only a keyed hull has a quarantine")
         quarantine = decode_quarantine(config.quarantine, "config.quarantine")
-    if config.shards > MOST_SHARDS:
-        raise InvalidFieldError("config.shards", config.shards, f"must be at most {MOST_SHARDS}")
-    return HullSettings(
-        identity, config.max_points, window, by_event_time, frame, center, quarantine, shards=config.shards
-    )
+    shards = decode_shards(config.shards, "config.shards") if config.shards else 0
+    return HullSettings(identity, config.max_points, window, by_event_time, frame, center, quarantine, shards=shards)
+
+
+def decode_shards(shards: int, field: str) -> int:
+    """A number of shards."""
+    if not 1 <= shards <= MOST_SHARDS:
+        problem = f"must be at most {MOST_SHARDS}" if shards else "must be at least 1"
+        raise InvalidFieldError(field, shards, problem)
+    return shards
 
 
 def decode_quarantine(message: hull_pb2.Quarantine, field: str) -> QuarantineRules:

@@ -82,15 +82,15 @@ def encode_times(times: Times, encoding: points_pb2.PointEncoding) -> points_pb2
     return message
 
 
-def encode_settings(settings: HullSettings) -> hull_pb2.HullConfig:
-    """The settings of a hull."""
+def encode_settings(settings: HullSettings, shards: int) -> hull_pb2.HullConfig:
+    """The settings of a hull that has this number of shards."""
     config = hull_pb2.HullConfig(
         identity=IDENTITIES[settings.identity],
         max_points=settings.max_points,
         frame=FRAMES[settings.frame],
         center=encode_center(settings.center),
         quarantine=encode_quarantine(settings.quarantine),
-        shards=settings.shards,
+        shards=shards,
     )
     if settings.identity != "multiset":
         by_time = settings.by_event_time
@@ -126,7 +126,7 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     """A hull with its counts at one revision."""
     message = hull_pb2.Hull(
         name=hull.name,
-        config=encode_settings(hull.settings),
+        config=encode_settings(hull.settings, counts.shards),
         revision=counts.revision,
         point_count=counts.points,
         distinct_point_count=counts.distinct,

@@ -24,7 +24,7 @@ from ..state.frames import require_lines, require_reach
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
-from .decode_settings import decode_center, decode_quarantine, decode_settings
+from .decode_settings import decode_center, decode_quarantine, decode_settings, decode_shards
 from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
@@ -86,6 +86,11 @@ class HullService:
         hull = self._engine.get(self._written(call, request.name))
         counts = await hull.set_quarantine(decode_quarantine(request.quarantine, "quarantine"))
         return pb.SetQuarantineResponse(hull=encode.encode_hull(hull, counts))
+
+    async def Reshard(self, request: pb.ReshardRequest, call: Call) -> pb.ReshardResponse:
+        hull = self._engine.get(self._written(call, request.name))
+        counts = await hull.reshard(decode_shards(request.shards, "shards"))
+        return pb.ReshardResponse(hull=encode.encode_hull(hull, counts))
 
     # Writes
 

@@ -37,6 +37,7 @@ FINISHED = {
     "DeleteHull",
     "Recenter",
     "SetQuarantine",
+    "Reshard",
     "ListHulls",
     "Apply",
     "ApplyTogether",

@@ -43,6 +43,7 @@ class Counts:
         outlined: the revision at which the vertices or the centre changed last, or a later one.
         held: the number of keys in quarantine.
         rules: the rules of the quarantine; None for a hull that has never had any.
+        shards: the number of shards that the points are divided among; 0 for a hull that is not divided.
     """
 
     revision: int
@@ -54,6 +55,7 @@ class Counts:
     outlined: int = 0
     held: int = 0
     rules: QuarantineRules | None = None
+    shards: int = 0
 
 
 # The keys of vertices: an array of str, or of uint64.

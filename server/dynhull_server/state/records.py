@@ -70,6 +70,7 @@ class HullSettings:
         quarantine: the rules that a keyed hull begins with, or None.
         shards: the number of shards that the points are divided among; 0 for a hull that is not divided.
         shard: which of them these points belong to; None for a hull as a whole.
+        generation: that of the division that a shard is of.
     """
 
     identity: Identity = "multiset"
@@ -81,6 +82,7 @@ class HullSettings:
     quarantine: QuarantineRules | None = None
     shards: int = 0
     shard: int | None = None
+    generation: int = 0
 
     @property
     def geographic(self) -> bool:
@@ -224,6 +226,19 @@ Rows = PointRows | KeyRows | Expiry
 
 
 @dataclass(frozen=True, slots=True)
+class Division:
+    """How the points of a hull are divided.
+
+    Attributes:
+        shards: the number of shards.
+        generation: a number that no other division of the hull has; 0 for that at its creation.
+    """
+
+    shards: int
+    generation: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Tally:
     """What the root of a hull over shards knows of a shard.
 
@@ -245,10 +260,12 @@ class Shares:
     Attributes:
         tallies: the shards whose logs have it, after it.
         expiry: whether points have left because of their age.
+        division: how the points are divided from this revision on, the tallies being of its shards; None for as before.
     """
 
     tallies: dict[int, Tally]
     expiry: bool = False
+    division: Division | None = None
 
 
 @dataclass(slots=True)
@@ -338,6 +355,7 @@ class Kept:
         skipping: the producers whose numbers may be skipped.
         rules: the rules of the quarantine at that revision; None for those of the settings.
         tallies: what the root of a hull over shards knows of its shards at that revision.
+        division: how its points are divided at that revision; None for as at its creation.
     """
 
     revision: int = 0
@@ -349,8 +367,19 @@ class Kept:
     skipping: frozenset[str] = frozenset()
     rules: QuarantineRules | None = None
     tallies: dict[int, Tally] = field(default_factory=dict)
+    division: Division | None = None
 
     @property
     def last_revision(self) -> int:
         """The revision after the last batch."""
         return self.records[-1].revision if self.records else self.revision
+
+    def divided(self, settings: HullSettings) -> tuple[Division, dict[int, Tally]]:
+        """Of a hull over shards after the last batch, how its points are divided, and what its root knows of shards."""
+        division, tallies = self.division or Division(settings.shards), dict(self.tallies)
+        for record in self.records:
+            if record.shares is not None:
+                if record.shares.division is not None:
+                    division, tallies = record.shares.division, {}
+                tallies |= record.shares.tallies
+        return division, tallies

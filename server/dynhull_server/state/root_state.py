@@ -14,6 +14,7 @@ class RootState(HullState):
     """The vertices of all shards in place of the points of a hull. Questions about all points are for the shards.
 
     Attributes:
+        division: how the points are divided.
         tallies: what is known of each shard.
         due: the time by the server's clock before which no point leaves; None if that clock makes none leave, and
             before the shards have said so.
@@ -21,15 +22,12 @@ class RootState(HullState):
 
     def __init__(self, limits: Limits, settings: HullSettings, kept: Kept, now: float) -> None:
         assert settings.divided
-        self.tallies = [Tally()] * settings.shards
+        self.division, tallies = kept.divided(settings)
+        self.tallies = [tallies.get(shard, Tally()) for shard in range(self.division.shards)]
         self.due: int | None = None
         self._keyed_shards = settings.identity != "multiset"
         self._by_data = settings.window is not None and settings.window.clock == "data"
-        self._clock = kept.clock
-        for shard, tally in kept.tallies.items():
-            self.tallies[shard] = tally
-        for record in kept.records:
-            self._count(record)
+        self._clock = kept.records[-1].clock if kept.records else kept.clock
         super().__init__(limits, settings, kept, now)
         self._max_producers = limits.max_producers
 
@@ -64,8 +62,13 @@ class RootState(HullState):
         for record in decided:
             assert record.revision == self.counts.revision + 1  # the root has numbered them
             assert record.shares is not None
+            divides = record.shares.division is not None
+            if divides:
+                self.vertices()
             changes = self.hull.changes
             self.contents.replay([record])
+            if divides:  # other vertices of shards, but the same hull
+                changes = self._vertices_as_of = self.hull.changes
             self._count(record)
             if record.producer:
                 if self._producers is None:
@@ -89,11 +92,15 @@ class RootState(HullState):
         kept = super().kept()
         kept.clock = self._clock
         kept.tallies = dict(enumerate(self.tallies))
+        kept.division = self.division
         return kept
 
     def _count(self, record: Record) -> None:
         assert record.shares is not None  # it is a revision of a root
         self._clock = record.clock
+        if record.shares.division is not None:
+            self.division = record.shares.division
+            self.tallies = [Tally()] * self.division.shards
         for shard, tally in record.shares.tallies.items():
             self.tallies[shard] = tally
 
@@ -101,7 +108,7 @@ class RootState(HullState):
         """The counts of all points. Keys of two shards may be at one place: how many places there are is not known."""
         points = sum(each.points for each in self.tallies)
         distinct = 0 if self._keyed_shards else sum(each.distinct for each in self.tallies)
-        return Counts(revision, points, distinct, self._clock, cause, outlined=outlined)
+        return Counts(revision, points, distinct, self._clock, cause, outlined=outlined, shards=self.division.shards)
 
 
 def state_of(limits: Limits, settings: HullSettings, kept: Kept, now: float) -> HullState:

@@ -20,11 +20,15 @@ def sample_rows(points: Points, size: int) -> npt.NDArray[np.intp]:
     """The rows of the `size` points of smallest hash, ascending; `points` must have more rows. O(n).
 
     An insert or delete changes at most one point of the sample, so a picture of it does not flicker: bottom-k sampling
-    (Cohen and Kaplan, "Summarizing data using bottom-k sketches", 2007).
+    (Cohen and Kaplan, "Summarizing data using bottom-k sketches", 2007). Of points with equal hashes the first ones are
+    taken, so that a sample of samples of parts is the sample of all, if all are in the same order.
     """
     mixed = np.ascontiguousarray(points).view(np.uint64) * FACTORS
     mixed ^= mixed >> HALF
     hashes = (mixed[:, 0] + mixed[:, 1]) * FACTORS[1]
     hashes ^= hashes >> HALF
     hashes *= FACTORS[0]
-    return np.sort(np.argpartition(hashes, size)[:size])
+    least_left_out = np.partition(hashes, size)[size]
+    below = np.flatnonzero(hashes < least_left_out)
+    equal = np.flatnonzero(hashes == least_left_out)[: size - len(below)]
+    return np.sort(np.concatenate([below, equal]))

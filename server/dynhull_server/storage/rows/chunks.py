@@ -10,7 +10,7 @@ import numpy as np
 
 from dynhull.keys import PackedKeys
 
-from ...state.records import Contents, Kept, Keys, QuarantineRules, Tally, Times
+from ...state.records import Contents, Division, Kept, Keys, QuarantineRules, Tally, Times
 from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
 from .held_rows import held_bytes, held_starts, joined_held, take_held
 
@@ -87,6 +87,8 @@ def state(kept: Kept) -> bytes:
         found["rules"] = asdict(kept.rules)
     if kept.tallies:
         found["tallies"] = {str(shard): astuple(tally) for shard, tally in kept.tallies.items()}
+    if kept.division is not None:
+        found["division"] = asdict(kept.division)
     return json.dumps(found).encode()
 
 
@@ -102,6 +104,8 @@ def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
     if "rules" in found:
         kept.rules = QuarantineRules(**found["rules"])
     kept.tallies = {int(shard): Tally(*numbers) for shard, numbers in found.get("tallies", {}).items()}
+    if "division" in found:
+        kept.division = Division(**found["division"])
     return kept, _decoded
 
 

@@ -61,7 +61,7 @@ def wholes(parts: Sequence[Part], before: Mapping[str, int]) -> Iterator[Whole]:
         DamagedError: a shard does not have what was decided.
     """
     shards = {
-        (hull.row.uid, hull.row.settings.shard): (place, hull)
+        (hull.row.uid, hull.row.settings.generation, hull.row.settings.shard): (place, hull)
         for place, part in enumerate(parts)
         for hull in part.ledger.hulls.values()
         if hull.row.settings.shard is not None
@@ -72,15 +72,18 @@ def wholes(parts: Sequence[Part], before: Mapping[str, int]) -> Iterator[Whole]:
                 continue
             whole = Whole(root.row, place, min(root.last, before.get(root.row.uid, 0)))
             _require_kept(root, whole.revision)
-            steps = _steps(part.reader, root, whole.revision)
-            for shard in range(root.row.settings.shards):
-                found = shards.get((root.row.uid, shard))
-                step = steps.get(shard, 0)
+            kept = read_hull(part.reader, root, whole.revision)
+            division, tallies = kept.divided(root.row.settings)
+            for shard in range(division.shards):
+                found = shards.get((root.row.uid, division.generation, shard))
+                step = tallies[shard].step if shard in tallies else 0
                 if found is not None:
                     of_shard, hull = found
                     last = _last_revision(parts[of_shard].reader, hull, step, shard)
                     whole.shards.append((of_shard, hull.row.number, last))
                 elif step:
+                    if read_hull(part.reader, root, root.last).divided(root.row.settings)[0] != division:
+                        raise NoLongerKeptError(f"hull {root.row.name!r} has other shards than before")
                     raise DamagedError(f"shard {shard} of hull {root.row.name!r} is missing: restore a backup")
             yield whole
 
@@ -110,16 +113,6 @@ def newest_rows(reader: Reader, hull: HullRows, last: int) -> DropNewest | None:
 def _require_kept(hull: HullRows, revision: int) -> None:
     if revision < hull.oldest:
         raise NoLongerKeptError(f"revision {revision} of hull {hull.row.name!r} is no longer kept")
-
-
-def _steps(reader: Reader, root: HullRows, revision: int) -> dict[int, int]:
-    """The last step of each shard that has any, as the root knows it at a revision."""
-    kept = read_hull(reader, root, revision)
-    steps = {shard: tally.step for shard, tally in kept.tallies.items()}
-    for record in kept.records:
-        if record.shares is not None:
-            steps |= {shard: tally.step for shard, tally in record.shares.tallies.items()}
-    return steps
 
 
 def _last_revision(reader: Reader, hull: HullRows, step: int, shard: int) -> int:

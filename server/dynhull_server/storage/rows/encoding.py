@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ...state.records import Condition, Expiry, KeyRows, PointRows, Record, Rows, Shares, Tally
+from ...state.records import Condition, Division, Expiry, KeyRows, PointRows, Record, Rows, Shares, Tally
 from .columns import Cursor, key_bytes, point_bytes, time_bytes
 from .held_rows import change_bytes, take_change
 
@@ -24,13 +24,16 @@ CENTER = struct.Struct("<dd")
 # Whether points have left because of their age, and the number of shards; of each shard its number and its tally.
 SHARES = struct.Struct("<?H")
 TALLY = struct.Struct("<HQQQ")
+# The number of shards from then on, and the generation of this division.
+DIVISION = struct.Struct("<HQ")
 MOST_NUMBERS = 7  # in the key of a row
 NUMBERS = [struct.Struct(f"<{count}q") for count in range(MOST_NUMBERS + 1)]
 
 HAS_CENTER, MAY_SKIP = 1, 2  # further flags
 HAS_HELD = 4  # since format 8
 HAS_SHARES = 8  # since format 9
-FURTHER = HAS_CENTER | MAY_SKIP | HAS_HELD | HAS_SHARES
+HAS_DIVISION = 16  # since format 10
+FURTHER = HAS_CENTER | MAY_SKIP | HAS_HELD | HAS_SHARES | HAS_DIVISION
 LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8
 KINDS = 48  # the flags with the kind of the rows
 POINTS, STRINGS, INTEGERS, EXPIRY = 0, 16, 32, 48
@@ -55,6 +58,9 @@ def encode(records: Iterable[Record]) -> bytes:
         if record.shares is not None:
             further |= HAS_SHARES
             columns.append(_share_bytes(record.shares))
+            if record.shares.division is not None:
+                further |= HAS_DIVISION
+                columns.append(DIVISION.pack(record.shares.division.shards, record.shares.division.generation))
         if record.clock is not None:
             flags |= HAS_CLOCK
             columns.insert(0, TIME.pack(record.clock))
@@ -77,7 +83,7 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
             if not isinstance(rows, KeyRows):
                 raise ValueError("points without keys are in quarantine")
             rows.held = take_change(cursor, strings=flags & KINDS == STRINGS)
-        shares = _shares(cursor) if further & HAS_SHARES else None
+        shares = _shares(cursor, divides=bool(further & HAS_DIVISION)) if further & HAS_SHARES else None
         yield Record(revision, rows, producer, sequence, clock, center, bool(further & MAY_SKIP), shares)
         revision += 1
 
@@ -146,10 +152,11 @@ def _share_bytes(shares: Shares) -> bytes:
     return SHARES.pack(shares.expiry, len(tallies)) + b"".join(tallies)
 
 
-def _shares(cursor: Cursor) -> Shares:
+def _shares(cursor: Cursor, *, divides: bool) -> Shares:
     expiry, count = SHARES.unpack(cursor.take(SHARES.size))
-    tallies = (TALLY.unpack(cursor.take(TALLY.size)) for _ in range(count))
-    return Shares({shard: Tally(*numbers) for shard, *numbers in tallies}, expiry)
+    found = [TALLY.unpack(cursor.take(TALLY.size)) for _ in range(count)]
+    division = Division(*DIVISION.unpack(cursor.take(DIVISION.size))) if divides else None
+    return Shares({shard: Tally(*numbers) for shard, *numbers in found}, expiry, division)
 
 
 def _time(cursor: Cursor) -> int:

@@ -98,6 +98,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     7: ("id, name, uid, created, settings, checksum", _of_format_3),
     8: ("id, name, uid, created, settings, checksum", _of_format_3),
     9: ("id, name, uid, created, settings, checksum", _of_format_3),
+    10: ("id, name, uid, created, settings, checksum", _of_format_3),
 }
 
 

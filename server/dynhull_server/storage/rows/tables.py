@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from array import array
 
 # The present format of rows, and the first ones with fences, delayed events, and events of many fences in a row.
-FORMAT = 9
+FORMAT = 10
 FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE = 4, 6, 7
 
 # The columns of each table in the present format; the first is the number of the row.

@@ -146,6 +146,7 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     6: FORMAT_6,
     7: TABLES,  # it wrote the events of a row in more bytes
     8: TABLES,  # it had no hulls over shards
+    9: TABLES,  # the number of their shards did not change
     FORMAT: TABLES,
 }
 
