@@ -3,6 +3,7 @@
     python benchmarks/shards.py traffic [--points 1000000] [--updates 1000000]
     python benchmarks/shards.py model
     python benchmarks/shards.py served [--shards 2] [--rounds 3]
+    python benchmarks/shards.py pause [--points 1000000] [--rounds 3]
 
 `traffic` measures. Points of a distribution are divided among k shards; an update deletes a random point or inserts
 another one. It counts the updates that change the hull of their shard, which are what the root hears of if each is a
@@ -11,6 +12,8 @@ circle, where all points are vertices, take few points: each batch reads them al
 
 `served` measures real servers: a stream of messages of 10,000 points, inserted and deleted, stored with the durability
 of the default, to one hull and to one over shards, which take turns; and the time of a call with one point.
+
+`pause` measures real servers, too: how long writes wait while a hull gets another number of shards, 2 and 4 in turn.
 
 `model` measures what the root does for a vertex, a message and a row on this machine, and multiplies. Nobody has run a
 thousand shards.
@@ -250,6 +253,28 @@ def timed(client: HullClient, hull: str) -> tuple[float, float]:
     return rate, (time.perf_counter() - begun) / CALLS
 
 
+def pause(points: int, rounds: int) -> None:
+    print(f"| server | {points:,} points from 2 to 4 shards, s | from 4 to 2, s |")
+    print("| --- | ---: | ---: |")
+    for name, options in SERVED.items():
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            serving(["--data", folder, *options]) as address,
+            HullClient(address, timeout=None) as client,
+        ):
+            client.create_hull("many", shards=2)
+            with client.writer("many", batch_points=POINTS) as writer:
+                for rows in np.array_split(random.normal(size=(points, 2)), max(1, points // POINTS)):
+                    writer.put(rows)
+            seconds: dict[int, list[float]] = {4: [], 2: []}
+            for _ in range(rounds):
+                for shards, measured in seconds.items():
+                    begun = time.perf_counter()
+                    client.reshard("many", shards)
+                    measured.append(time.perf_counter() - begun)
+        print(f"| {name} | {median(seconds[4]):.2f} | {median(seconds[2]):.2f} |", flush=True)
+
+
 @contextmanager
 def serving(options: Sequence[str]) -> Iterator[str]:
     command = [sys.executable, "-m", "dynhull_cli", "serve", "--port", "0", "--scrub-cpu", "0", "--log-level", "error"]
@@ -272,8 +297,13 @@ def main() -> None:
     real = commands.add_parser("served")
     real.add_argument("--shards", type=int, default=2)
     real.add_argument("--rounds", type=int, default=3)
+    paused = commands.add_parser("pause")
+    paused.add_argument("--points", type=int, default=1_000_000)
+    paused.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
-    if arguments.command == "traffic":
+    if arguments.command == "pause":
+        pause(arguments.points, arguments.rounds)
+    elif arguments.command == "traffic":
         traffic(arguments.distributions, arguments.points, arguments.updates)
     elif arguments.command == "served":
         served(arguments.shards, arguments.rounds)

@@ -452,7 +452,7 @@ def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
     asked = 0
     with (
         server_process(*options, complaints="is started again") as server,
-        HullClient(server.address, retries=50) as client,
+        HullClient(server.address, retries=50, timeout=PATIENCE) as client,
     ):
         client.create_hull("fleet", shards=2)
         client.apply("fleet", insert=points)
@@ -475,7 +475,7 @@ def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
             assert client.verify("fleet").equal
         info = client.get_hull("fleet").info
         assert info.revision == 1 + asked
-        wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 1 + info.shards)
+        wait_until(lambda: len(rows_of(tmp_path, "SELECT name FROM hulls")) == 1 + client.get_hull("fleet").info.shards)
     with server_process(*options) as server, HullClient(server.address) as client:
         assert client.get_hull("fleet").info == info
         assert in_order(client.sample_points("fleet", 10**6).points) == in_order(points)

@@ -244,6 +244,10 @@ class World:
             if current:
                 raise BrokenPromiseError("the latest root is fenced") from None
             self._replaced.remove(each.root)
+        except root_module.ShardsDifferError:
+            if current:
+                raise
+            self._replaced.remove(each.root)  # the shards that it knows have been dropped: the hull has others
         self._hear()
 
     def _kill_shard(self, shard: Place) -> None:

@@ -231,8 +231,13 @@ class ServedDivisions:
             if not found.wanted:
                 del self._shards[key]
                 await shard.close()
-                if self._started.keeps:
+                if not self._started.keeps:
+                    continue
+                try:
                     await self._started.commit([Delete(row.number)])
+                except Exception:  # it is still there, so it has to be asked about again
+                    self._shards[key] = LocalShard(self._started, row)
+                    raise
 
     async def _end(self, root: ServedRoot) -> None:
         await root.close()
