@@ -5,7 +5,9 @@ import re
 import subprocess
 from pathlib import Path
 
+import kubernetes_validate
 import pytest
+import yaml
 from forked import COMMAND
 from metrics import fetch, measured
 from patience import PATIENCE
@@ -62,6 +64,21 @@ def test_what_is_asked_for_is_there(tmp_path: Path) -> None:
     asked = {*NAME.findall("\n".join(expressions())), *NAME.findall((KIT / "prometheus/alerts.yml").read_text())}
     assert len(asked) > 10
     assert asked <= there
+
+
+def test_kubernetes_takes_the_pods_of_ray() -> None:
+    """The kind itself is KubeRay's; what it makes of the templates is of Kubernetes."""
+    *others, cluster = yaml.safe_load_all((KIT / "kuberay/raycluster.yaml").read_text())
+    groups = [cluster["spec"]["headGroupSpec"], *cluster["spec"]["workerGroupSpecs"]]
+    templates = [
+        {"apiVersion": "v1", "kind": "PodTemplate", "metadata": {"name": "node"}, "template": group["template"]}
+        for group in groups
+    ]
+    for each in (*others, *templates):
+        kubernetes_validate.validate(each, kubernetes_validate.latest_version(), strict=True)
+    templates[1]["template"]["spec"]["container"] = []
+    with pytest.raises(kubernetes_validate.ValidationError, match="container"):
+        kubernetes_validate.validate(templates[1], kubernetes_validate.latest_version(), strict=True)
 
 
 @pytest.mark.parametrize("unit", [*KIT.glob("*.service")], ids=lambda path: path.name)

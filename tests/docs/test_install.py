@@ -9,9 +9,14 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-PAGES = sorted({ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "deploy").glob("*"), *ROOT.glob("docs/**/*.md")})
+PAGES = sorted(
+    {ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("deploy/**/*.yaml")}
+    | {*ROOT.glob("deploy/*"), *ROOT.glob("docs/**/*.md")}
+)
 COMMAND = re.compile(r"pip install[^'\"`\n]*['\"]([^'\"\n\[]*)\[([^\]\n]*)\]['\"]")
 INSTALL = ROOT / "docs/install.md"
+# Extras that an image is built with: by default, and as a page says.
+ARGUMENT = re.compile(r"(?:^ARG |--build-arg )EXTRAS=(\S+)", re.MULTILINE)
 
 
 def commands(page: Path) -> list[tuple[str, str]]:
@@ -24,8 +29,11 @@ def test_pages_install_from_the_source_code(page: Path) -> None:
     if page == INSTALL:
         assert commands(page) == [(".", "server,client"), ("dynhull", "nd")]  # the second one adds to the first
         return
+    arguments = ARGUMENT.findall(page.read_text())
     for source, extras in commands(page):
         assert source == "."
+        assert set(extras.split(",")) <= set(EXTRAS) or (extras == "$EXTRAS" and arguments)
+    for extras in arguments:
         assert set(extras.split(",")) <= set(EXTRAS)
 
 
