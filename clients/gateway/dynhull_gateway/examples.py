@@ -22,6 +22,7 @@ HULLS = _named(
     ships=("Keys on the globe", {"name": "ships", "keyed": "str", "geographic": True}),
     alloy=("Points without keys: compositions and energies", {"name": "alloy"}),
     assets=("Points without keys: risks and returns", {"name": "assets"}),
+    sensors=("Divided among shards", {"name": "sensors", "shards": 2}),
     last_hour=("A sliding window", {"name": "last_hour", "keyed": "str", "max_age": 3600}),
 )
 POINTS = _named(
@@ -36,7 +37,7 @@ TRANSFERS = _named(
         {"batches": {"fleet": {"remove": ["AF006"]}, "last_hour": {"keys": ["AF006"], "points": [[2, 3]]}}},
     ),
 )
-SHARDS = _named(fleet=("Eight shards", {"shards": 8}))
+SHARDS = _named(sensors=("Four shards", {"shards": 4}))
 CENTER = _named(ships=("At a place", {"center": [9, 53]}))
 ABOUT = _named(
     fleet=("Points", {"points": [[1, 1], [9, 9]]}),

@@ -12,7 +12,7 @@ from .bodies import GEOJSON, JsonRoute
 from .callers import Caller
 from .pages import page
 from .problems import ProblemError
-from .schemas import After, GlobePath, HullPath, Limit, MinRevision, Prefix, ProducerPath
+from .schemas import After, DividedPath, GlobePath, HullPath, Limit, MinRevision, Prefix, ProducerPath
 
 router = APIRouter(tags=["hulls"], route_class=JsonRoute)
 Format = Annotated[Literal["json", "geojson"], Query(description="json, or a GeoJSON Feature.")]
@@ -72,7 +72,7 @@ async def recenter(
 
 @router.post("/hulls/{name}/reshard")
 async def reshard(
-    client: Caller, name: HullPath, to: Annotated[schemas.Reshard, schemas.body(examples.SHARDS)]
+    client: Caller, name: DividedPath, to: Annotated[schemas.Reshard, schemas.body(examples.SHARDS)]
 ) -> schemas.HullInfo:
     """Divide the points of a hull over shards among another number of shards. Batches wait until that is done."""
     return schemas.HullInfo.model_validate(await client.reshard(name, to.shards))

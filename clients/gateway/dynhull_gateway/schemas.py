@@ -102,6 +102,7 @@ HullPath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=
 GlobePath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["ships"])]
 AlloyPath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["alloy"])]
 AssetsPath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["assets"])]
+DividedPath = Annotated[Segment, Path(alias="name", description=THE_HULL, examples=["sensors"])]
 AnyHullPath = Annotated[
     Segment,
     Path(
