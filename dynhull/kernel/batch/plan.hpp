@@ -85,20 +85,27 @@ class Plan {
       entries[i - from] = leaf.find_x(groups[i].p.x);
       prefetch(&leaf.y[entries[i - from]]);
     }
-    bool there[BLOCK] = {}, repeated[BLOCK] = {};
-    for (std::size_t i = from; i < to && !empty; ++i) {
-      const Leaf& leaf = nodes.leaf(groups[i].leaf);
-      unsigned& entry = entries[i - from];
-      entry = leaf.find_y(entry, groups[i].p);
-      there[i - from] = leaf.holds(entry, groups[i].p);
-      repeated[i - from] = there[i - from] & (leaf.repeated >> entry & 1);
-      if (repeated[i - from]) copies.fetch(groups[i].p);
+    // Numbers of copies are fetched first. A pass of its own: most hulls have none.
+    if (copies.size() > 0 && !empty) {
+      for (std::size_t i = from; i < to; ++i) {
+        const Leaf& leaf = nodes.leaf(groups[i].leaf);
+        const unsigned entry = leaf.find_y(entries[i - from], groups[i].p);
+        if (leaf.repeated >> entry & 1) copies.fetch(groups[i].p);
+      }
     }
     for (std::size_t i = from; i < to; ++i) {
       const Group& group = groups[i];
-      const Place place = {group.leaf, entries[i - from], there[i - from]};
-      const unsigned size = empty ? 0 : nodes.leaf(group.leaf).size;
-      const std::uint64_t before = repeated[i - from] ? copies[group.p] : place.there;
+      Place place = {NONE, 0, false};
+      unsigned size = 0;
+      bool repeated = false;
+      if (!empty) {
+        const Leaf& leaf = nodes.leaf(group.leaf);
+        const unsigned entry = leaf.find_y(entries[i - from], group.p);
+        place = {group.leaf, entry, leaf.holds(entry, group.p)};
+        repeated = place.there & (leaf.repeated >> entry & 1);
+        size = leaf.size;
+      }
+      const std::uint64_t before = repeated ? copies[group.p] : place.there;
       const std::uint64_t after = groups.settle(i, before);
       if (before != after && (before > 1 || after > 1)) recounts.push_back({group.p, place, before, after});
       if ((before == 0) != (after == 0))
