@@ -38,14 +38,13 @@ class Deciding : public Reports {
                        !change->decided && zone.holds(change->before);
     if (change) change->decided = true;
     if (!known) decide_covering(slot, zone, found);
-    const Box way = Box::of({known ? change->before : p, p});
     for (std::size_t i = 0; i < zone.pieces.size();) {
-      const auto [run, met] = zone.run(i, way);
+      const std::span<const Piece> run = zone.run(i);
       i += run.size();
-      if (known && !met && !run[0].wide) continue;
+      const bool from_before = known && !run[0].wide;
+      if (from_before && !any_meets(run, Box::of({change->before, p}))) continue;
       const std::uint32_t handle = run[0].fence;
       const bool was = members_.has(subjects_[slot].inside, handle);
-      const bool from_before = known && !run[0].wide;
       const bool now =
           from_before ? holds(run, change->before, was, p, was) : holds(run, zone.anchor(), run[0].inside, p, was);
       if (now == was) continue;

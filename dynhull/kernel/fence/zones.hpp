@@ -25,6 +25,11 @@ struct Piece {
   bool inside;  // simple: whether the zone's anchor is
 };
 
+// Whether the box of one of some edges meets another box.
+inline bool any_meets(std::span<const Piece> pieces, const Box& box) {
+  return std::any_of(pieces.begin(), pieces.end(), [&](const Piece& piece) { return Box::of(piece.edge).meets(box); });
+}
+
 // Whether the end of a way in a zone is inside of a polygon, by the edges that the way crosses, if its start is. None
 // where the way is not clear of the ends of an edge, or starts or ends on one. Exact.
 inline std::optional<bool> inside_after(std::span<const Piece> pieces, Point from, bool inside, Point to) {
@@ -78,14 +83,6 @@ struct alignas(LINE) Zone {
     const double to_border =
         std::min({p.x - box.least.x, box.greatest.x - p.x, p.y - box.least.y, box.greatest.y - p.y});
     return nearest < to_border * (1 - NEARNESS_BOUND) ? std::optional(nearest) : std::nullopt;
-  }
-  // The pieces of the fence of piece `first`, and whether the box of one of them meets another box.
-  std::pair<std::span<const Piece>, bool> run(std::size_t first, const Box& box) const {
-    bool met = false;
-    std::size_t end = first;
-    do met |= Box::of(pieces[end].edge).meets(box);
-    while (++end < pieces.size() && pieces[end].fence == pieces[first].fence);
-    return {std::span(pieces).subspan(first, end - first), met};
   }
   // The pieces of the fence of piece `first`.
   std::span<const Piece> run(std::size_t first) const {
