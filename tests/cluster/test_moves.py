@@ -140,6 +140,15 @@ def ready(pair: Pair, worker: str) -> bool:
     return query(pair.url, HEIR) == [(worker,)]
 
 
+@contextmanager
+def standing_until_ready(pair: Pair, source: str, target: str) -> Iterator[Stopped]:
+    """The source stands still within the block, which begins once the target has read as much as there is."""
+    with Stopped(pair.process(source)) as stopped:
+        pair.order(target)
+        wait_until(lambda: ready(pair, target))
+        yield stopped
+
+
 def is_free(pair: Pair) -> bool:
     return query(pair.url, "SELECT until = '-infinity' FROM owners") == [(True,)]
 
@@ -175,9 +184,7 @@ def test_the_owner_serves_until_the_next_one_has_read(pair: Pair) -> None:
 def test_an_order_can_be_cancelled(mortal_pair: Pair) -> None:
     pair = mortal_pair
     source, target, epoch = pair.owner(), pair.other(), pair.epoch()
-    with Stopped(pair.process(source)) as stopped:
-        pair.order(target)
-        wait_until(lambda: ready(pair, target))
+    with standing_until_ready(pair, source, target) as stopped:
         pair.order(source)
     wait_until(lambda: not query(pair.url, HEIR) and pair.owner() == source)
     assert pair.epoch() == epoch or not stopped.briefly
@@ -190,9 +197,7 @@ def test_an_order_can_be_cancelled(mortal_pair: Pair) -> None:
 def test_a_target_that_is_killed_before_the_owner_lets_go(mortal_pair: Pair) -> None:
     pair = mortal_pair
     source, target = pair.owner(), pair.other()
-    with Stopped(pair.process(source)):
-        pair.order(target)
-        wait_until(lambda: ready(pair, target))
+    with standing_until_ready(pair, source, target):
         os.kill(pair.process(target), signal.SIGKILL)
     pair.writer.more()
     # It is started again, and reads again. If the owner has let go before it noticed, it has taken the partition back.
@@ -204,13 +209,13 @@ def test_a_target_that_is_killed_before_the_owner_lets_go(mortal_pair: Pair) -> 
 def test_a_target_that_is_killed_when_the_owner_has_let_go(mortal_pair: Pair) -> None:
     pair = mortal_pair
     source, target = pair.owner(), pair.other()
-    with Stopped(pair.process(source)) as stopped_source:
-        pair.order(target)
-        wait_until(lambda: ready(pair, target))
-        with Stopped(pair.process(target)) as stopped_target:
-            stopped_source.go_on()
-            wait_until(lambda: is_free(pair))
-            stopped_target.kill()
+    with (
+        standing_until_ready(pair, source, target) as stopped_source,
+        Stopped(pair.process(target)) as stopped_target,
+    ):
+        stopped_source.go_on()
+        wait_until(lambda: is_free(pair))
+        stopped_target.kill()
     pair.writer.more()
     wait_until(lambda: pair.owner() == target)
     pair.check()
@@ -220,14 +225,14 @@ def test_a_target_that_is_killed_when_the_owner_has_let_go(mortal_pair: Pair) ->
 def test_a_source_that_is_killed_when_it_has_let_go(mortal_pair: Pair) -> None:
     pair = mortal_pair
     source, target, epoch = pair.owner(), pair.other(), pair.epoch()
-    with Stopped(pair.process(source)) as stopped_source:
-        pair.order(target)
-        wait_until(lambda: ready(pair, target))
-        with Stopped(pair.process(target)) as stopped_target:
-            killed = pair.process(source)
-            stopped_source.go_on()
-            wait_until(lambda: is_free(pair))
-            os.kill(killed, signal.SIGKILL)
+    with (
+        standing_until_ready(pair, source, target) as stopped_source,
+        Stopped(pair.process(target)) as stopped_target,
+    ):
+        killed = pair.process(source)
+        stopped_source.go_on()
+        wait_until(lambda: is_free(pair))
+        os.kill(killed, signal.SIGKILL)
     wait_until(lambda: pair.owner() == target)
     assert pair.epoch() == epoch + 1 or not stopped_target.briefly
     pair.check()
@@ -238,9 +243,7 @@ def test_a_source_that_is_killed_while_the_target_follows(mortal_pair: Pair) -> 
     """The target takes what it has followed, and the writes of the last moments are there, too."""
     pair = mortal_pair
     source, target, epoch = pair.owner(), pair.other(), pair.epoch()
-    with Stopped(pair.process(source)) as stopped:
-        pair.order(target)
-        wait_until(lambda: ready(pair, target))
+    with standing_until_ready(pair, source, target) as stopped:
         stopped.kill()
     wait_until(lambda: pair.epoch() > epoch and pair.owner() == target)
     pair.check()
@@ -280,9 +283,8 @@ def test_all_kinds_of_hulls_are_followed(mortal_pair: Pair) -> None:
             client.create_hull(name, **settings)
         source, target = pair.owner(), pair.other()
         write(client, 1)
-        with Stopped(pair.process(source)):
-            pair.order(target)
-            wait_until(lambda: ready(pair, target))
+        with standing_until_ready(pair, source, target):
+            assert pair.owner() == source
         turn = 2
         client.delete_hull("gone")
         client.create_hull("new")

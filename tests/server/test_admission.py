@@ -178,7 +178,8 @@ def test_a_watcher_that_does_not_read_is_ended_too(tokens: Tokens) -> None:
     with measured(*options) as (server, metrics), ExitStack() as stack:
         two = stub(stack, server, "two")
         two("Apply", pb.ApplyRequest(name="a", batch={"inserts": {"packed": parabola.tobytes()}}))
-        large = [("grpc.max_receive_message_length", -1)]
+        # With a window that grows, the client takes in all of the event before anybody reads it.
+        large = [("grpc.max_receive_message_length", -1), ("grpc.http2.bdp_probe", 0)]
         unread = HullServiceStub(stack.enter_context(grpc.insecure_channel(server.address, options=large)))
         watch = unread.Watch(pb.WatchRequest(name="a"), metadata=[("authorization", "Bearer one")])
         wait_until(lambda: scrape(metrics)["dynhull_watch_lag_seconds"] > 0)
