@@ -1,15 +1,17 @@
 """The storage on PostgreSQL: damage, other servers, lost connections, and databases that it cannot use."""
 
+import re
 import shutil
 import threading
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 
 import folders
 import pytest
 from folders import OLD_FOLDERS, append, fill, fill_fence, no_progress, record, same
 from patience import wait_until
 from postgresql import query
+from proxy import Proxy, shut
 
 from dynhull_cluster.postgres import ownership
 from dynhull_cluster.postgres.database import Database
@@ -42,6 +44,10 @@ def opened(url, lost=None, **more):
     return storage, storage.open(no_progress)
 
 
+def name_in(url):
+    return url.split("?")[0].rpartition("/")[2]
+
+
 @pytest.fixture(scope="module")
 def template(postgres):
     """The name of a database with a hull that has a snapshot and batches, and a fence."""
@@ -53,7 +59,7 @@ def template(postgres):
     append(storage, 4, LAST)
     fill_fence(storage, 3)
     storage.close()
-    return url.split("?")[0].rpartition("/")[2]
+    return name_in(url)
 
 
 @pytest.fixture
@@ -338,8 +344,39 @@ def test_encodings_other_than_utf_8_are_refused(postgres):
         on(postgres.url("latin")).open(no_progress)
 
 
+@pytest.mark.parametrize("setting", ["statement", "lock", "idle_in_transaction_session", "idle_session"])
+def test_timeouts_of_the_database_do_not_end_the_sessions_of_a_server(url, postgres, setting):
+    postgres.query(f"ALTER DATABASE {name_in(url)} SET {setting}_timeout = 1", database="postgres")
+    storage, contents = opened(url)
+    with closing(storage):
+        assert contents.notes == []
+        append(storage, LAST + 1, LAST + 20)
+        assert storage.read(1).last_revision == LAST + 20
+
+
+KEY_DATA = b"K\0\0\0\x0c"  # what comes before the number of the process
+
+
+class Pooler(Proxy):
+    """Gives a connection another number than that of the process of PostgreSQL, as poolers do."""
+
+    def _forward(self, source, sink):
+        with suppress(OSError):
+            while data := source.recv(65536):
+                sink.sendall(re.sub(KEY_DATA + rb"....", KEY_DATA + b"\0\0\0\1", data, flags=re.DOTALL))
+        shut(source)
+        shut(sink)
+
+
+def test_poolers_are_refused(url):
+    home = re.search(r"host=([^&]*)", url).group(1)
+    with closing(Pooler(f"{home}/.s.PGSQL.5432")) as pooler:
+        host, port = pooler.address.split(":")
+        with pytest.raises(FormatError, match="is behind a pooler: connect to PostgreSQL itself"):
+            on(url.replace(f"host={home}", f"host={host}&port={port}")).open(no_progress)
+
+
 def test_standbys_and_read_only_databases_are_refused(url, postgres):
-    name = url.split("?")[0].rpartition("/")[2]
-    postgres.query(f"ALTER DATABASE {name} SET default_transaction_read_only = on", database="postgres")
+    postgres.query(f"ALTER DATABASE {name_in(url)} SET default_transaction_read_only = on", database="postgres")
     with pytest.raises(StorageError, match="cannot connect"):
         on(url).open(no_progress)

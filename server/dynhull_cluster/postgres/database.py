@@ -20,7 +20,14 @@ OLDEST_VERSION = 15
 # Seconds until a connection attempt ends; milliseconds until data that nobody acknowledges ends a connection.
 CONNECT_SECONDS, UNACKNOWLEDGED_MS = 10, 10_000
 # Whatever the defaults of the database are. An epoch that is lost would let two servers own the hulls.
-SETTINGS = f"search_path={SCHEMA}", "synchronous_commit=on", "statement_timeout=0", "idle_session_timeout=0"
+SETTINGS = (
+    f"search_path={SCHEMA}",
+    "synchronous_commit=on",
+    "statement_timeout=0",
+    "lock_timeout=0",
+    "idle_in_transaction_session_timeout=0",
+    "idle_session_timeout=0",
+)
 # What callers get of an error: PostgreSQL's own words are for the log of the server.
 FOR_CALLERS = "the database of the server, PostgreSQL, cannot be used at present"
 # Where the address does not say otherwise.
@@ -69,7 +76,7 @@ class Database:
 
         Raises:
             StorageError: the server cannot be reached, or refuses it.
-            FormatError: the server is too old, or the database has another encoding than UTF-8.
+            FormatError: the server is too old, the database has another encoding than UTF-8, or a pooler is in between.
         """
         try:
             connection = psycopg.connect(self._address, autocommit=True, application_name=name, client_encoding="utf8")
@@ -82,10 +89,18 @@ class Database:
             encoding = connection.info.parameter_status("server_encoding")
             if encoding != "UTF8":
                 raise FormatError(f"{self} has the encoding {encoding}: create one with UTF8")
+            self._require_own_session(connection)
         except BaseException:
             connection.close()
             raise
         return connection
+
+    def _require_own_session(self, connection: Connection) -> None:
+        """Refuse a pooler, which gives the connection a process of PostgreSQL for a while, with settings of its own."""
+        with as_storage_errors():
+            row = connection.execute("SELECT pg_backend_pid()").fetchone()
+        if row != (connection.info.backend_pid,):
+            raise FormatError(f"{self} is behind a pooler: connect to PostgreSQL itself, the server needs own sessions")
 
     async def connect_async(self, name: str) -> "psycopg.AsyncConnection[tuple[Any, ...]]":
         """The same for the event loop, of a database that `connect` has reached before. Raises StorageError."""
