@@ -27,6 +27,7 @@ from dynhull_server.storage.sqlite.folder import Folder
 from dynhull_server.storage.worker_folders import divide, worker_folder, write_manifest
 
 from .child_process import ChildProcess, StartFailedError
+from .machines.entrance import checked_certificate
 from .metrics import registry_of
 from .sockets import socket_folder
 
@@ -54,6 +55,7 @@ async def _serve(settings: Settings) -> None:
     with ExitStack() as opened, stop_signal(again) as stop:
         tokens = token_file(settings)
         tls_context(settings)
+        checked_certificate(settings)
         port = opened.enter_context(_reserved_port(settings.host, settings.port))
         workers, gateways = settings.workers or 1, settings.gateways or 1
         in_folder = not settings.in_memory and settings.journal is None

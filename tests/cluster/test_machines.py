@@ -3,13 +3,16 @@
 import os
 import signal
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
 from struct import pack
 from typing import Any
 
 import grpc
 import pytest
+import trustme
 from cluster import processes
 from command_line import dynhull
 from patience import PATIENCE, wait_until
@@ -158,6 +161,56 @@ def test_only_gateways_may_call_workers(alone: tuple[str, str]) -> None:
     with socket.create_connection((host, int(frames))) as connection:
         connection.sendall(pack("<IIB", len(wrong), 0, 4) + wrong)
         assert connection.recv(1) == b"", "the connection is closed"
+
+
+@pytest.fixture(scope="module")
+def authority() -> trustme.CA:
+    return trustme.CA()
+
+
+@pytest.fixture
+def certified(tmp_path: Path, authority: trustme.CA) -> Callable[..., tuple[str, ...]]:
+    """The options of a server, with a certificate for these names."""
+
+    def issue(*names: str, by: trustme.CA = authority, until: datetime | None = None) -> tuple[str, ...]:
+        issued = by.issue_cert(*names, not_after=until)
+        issued.private_key_and_cert_chain_pem.write_to_path(tmp_path / "cert.pem")
+        authority.cert_pem.write_to_path(tmp_path / "ca.pem")
+        cert = str(tmp_path / "cert.pem")
+        return ("--tls-cert", cert, "--tls-key", cert, "--cluster-ca", str(tmp_path / "ca.pem"))
+
+    return issue
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_servers_of_a_cluster_connect_with_tls(
+    url: str, authority: trustme.CA, certified: Callable[..., tuple[str, ...]]
+) -> None:
+    options = ("--cluster", "--partitions", "4", "--journal", url, *QUIET, *certified("127.0.0.1"))
+    root = grpc.ssl_channel_credentials(authority.cert_pem.bytes())
+    with server_process(*options) as first, server_process(*options) as second:
+        wait_until(lambda: sorted(served(url).values()) == [2, 2])
+        for server in (first, second):
+            with HullClient(server.address, tls=root) as client:
+                assert {client.apply(name, insert=[[0, 0]]).points for name in NAMES} == {1 + (server is second)}
+
+
+OTHERS = trustme.CA()
+UNBELIEVED: dict[str, tuple[str, dict[str, Any], str]] = {
+    "another name": ("127.0.0.2", {}, "IP address mismatch, certificate is not valid for '127.0.0.1'"),
+    "expired": ("127.0.0.1", {"until": datetime(2020, 1, 1, tzinfo=UTC)}, "certificate has expired"),
+    "of somebody": ("127.0.0.1", {"by": OTHERS}, "unable to get local issuer certificate"),
+}
+
+
+@pytest.mark.parametrize(("name", "given", "words"), UNBELIEVED.values(), ids=UNBELIEVED)
+def test_a_server_that_the_others_would_not_believe_does_not_start(
+    certified: Callable[..., tuple[str, ...]], name: str, given: dict[str, Any], words: str
+) -> None:
+    """They could not reach the partitions that it takes, and only its own callers would know."""
+    refused = dynhull("serve", "--cluster", "--journal", "postgresql://x/y", *certified(name, **given))
+    assert refused.exit_code == 2
+    assert "would not accept it at --cluster-host 127.0.0.1: " + words in refused.stderr
 
 
 REFUSED = {

@@ -1,15 +1,18 @@
 """How a gateway reaches the owners of partitions: at the addresses that they have written into the tables."""
 
 import asyncio
+import logging
 import socket
-import ssl
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, cast
 
 import grpc
 
+from dynhull_server.certificates import peer_context
 from dynhull_server.rpc.status import RelayedError
+from dynhull_server.state.errors import words
 
 from ..callers import PROOF, Metadata
 from ..ways import OPTIONS, F
@@ -20,7 +23,10 @@ from .entrance import proof_of
 PATIENCE = 10.0
 # Seconds to connect to an owner.
 CONNECT_SECONDS = 2.0
+# Seconds until the log says why an owner cannot be reached: longer than a lease of one that has died.
+NOTE_SECONDS = 8.0
 
+log = logging.getLogger(__name__)
 
 SOCKET_OPTIONS = [
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
@@ -35,6 +41,14 @@ SOCKET_OPTIONS = [
         if hasattr(socket, name)
     ),
 ]
+
+
+@dataclass(slots=True)
+class _Failed:
+    """Since when an owner cannot be reached, and the last reason that the log has."""
+
+    since: float
+    reason: str = ""
 
 
 class _Greets(Protocol):
@@ -53,10 +67,11 @@ class Addresses:
 
     def __init__(self, secret: str, ca: Path | None) -> None:
         self._secret = secret
-        self._tls = None if ca is None else ssl.create_default_context(cafile=str(ca))
+        self._tls = None if ca is None else peer_context(ca)
         self._credentials = None if ca is None else grpc.ssl_channel_credentials(ca.read_bytes())
         self._known: dict[int, tuple[int, str]] = {}
         self._moved: dict[int, Callable[[], None]] = {}
+        self._failed: dict[int, _Failed] = {}
 
     def learn(self, tables: Tables) -> None:
         """Follow the owners; one that is away for the moment keeps its address, until another one has the partition."""
@@ -70,7 +85,17 @@ class Addresses:
 
     async def connect(self, worker: int, make: Callable[[], F]) -> F:
         """Connect to the owner of a partition, and prove to be a gateway. Raises OSError."""
-        host, port, frames_port = self._at(worker)
+        at = self._at(worker)
+        try:
+            frames = await self._connect(worker, make, *at)
+        except OSError as error:
+            self._note_failure(worker, error)
+            raise
+        if (failed := self._failed.pop(worker, None)) is not None and failed.reason:
+            log.info("the owner of a partition can be reached again", extra={"partition": worker})
+        return frames
+
+    async def _connect(self, worker: int, make: Callable[[], F], host: str, port: int, frames_port: int) -> F:
         name = host if self._tls is not None else None
         async with asyncio.timeout(CONNECT_SECONDS):
             transport, frames = await asyncio.get_running_loop().create_connection(
@@ -88,6 +113,15 @@ class Addresses:
             transport.abort()
             raise OSError(f"partition {worker} has moved meanwhile")
         return frames
+
+    def _note_failure(self, partition: int, error: OSError) -> None:
+        """Say why the owner of a partition cannot be reached, once that is not for a moment."""
+        now = asyncio.get_running_loop().time()
+        failed = self._failed.setdefault(partition, _Failed(now))
+        if now > failed.since + NOTE_SECONDS and words(error) != failed.reason:
+            failed.reason = words(error)
+            extra = {"partition": partition, "address": self._known[partition][1], "reason": failed.reason}
+            log.warning("the owner of a partition cannot be reached", extra=extra)
 
     def channel(self, worker: int) -> Any:
         """A new channel to the owner of a partition."""

@@ -3,10 +3,11 @@
 import hmac
 import socket
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 import grpc
 
-from dynhull_server.certificates import server_context
+from dynhull_server.certificates import require_accepted, server_context
 from dynhull_server.entrance import grpc_credentials
 from dynhull_server.listening import why_not
 from dynhull_server.rpc.access import Caller, TokenFile
@@ -22,6 +23,20 @@ from ..frame_server import FrameContext, FrameServer
 def proof_of(partition: int, secret: str) -> str:
     """What a gateway shows: that it knows the secret, and which partition it means, as ports are used again."""
     return f"{partition}/{secret}"
+
+
+def checked_certificate(settings: Settings) -> tuple[Path, Path] | None:
+    """The certificate and the key of this server for the others of its cluster; None where they do without TLS.
+
+    Raises:
+        ValueError: the others would not connect, so that nobody but callers of this server reached what it has.
+    """
+    if settings.cluster_ca is None:
+        return None
+    assert settings.tls_cert is not None  # the settings require both
+    assert settings.tls_key is not None
+    require_accepted(settings.tls_cert, settings.tls_key, settings.cluster_ca, settings.cluster_host)
+    return settings.tls_cert, settings.tls_key
 
 
 class PartitionEntrance:
@@ -64,11 +79,8 @@ class PartitionEntrance:
         if reason := why_not(host, 0):
             raise OSError(f"cannot listen on --cluster-host {host}: {reason}")
         credentials, tls = None, None
-        if settings.cluster_ca is not None:
-            assert settings.tls_cert is not None  # the settings require both
-            assert settings.tls_key is not None
-            credentials = grpc_credentials(settings.tls_cert, settings.tls_key, None)
-            tls = server_context(settings.tls_cert, settings.tls_key, None)
+        if (files := checked_certificate(settings)) is not None:
+            credentials, tls = grpc_credentials(*files, None), server_context(*files, None)
         place = f"[{host}]:0" if ":" in host else f"{host}:0"
         port = server.add_insecure_port(place) if credentials is None else server.add_secure_port(place, credentials)
         family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
