@@ -25,9 +25,10 @@ HEALTH_CALLS = 1024
 def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
     """The server of a worker."""
     own = own_settings(settings).model_copy(update={"data": worker_folder(settings.data, number)})
-    divisions = ServedDivisions(settings, number, Peers(sockets))
-    letters = peer_handler(divisions.receive)
-    return Server(own, PrivateEntrance(number, sockets, letters), storage_of(settings, number), divisions)
+    peers = Peers(sockets)
+    divisions = ServedDivisions(settings, number, settings.workers or 1, peers)
+    entrance = PrivateEntrance(number, sockets, peer_handler(divisions.receive), peers)
+    return Server(own, entrance, storage_of(settings, number), divisions)
 
 
 def own_settings(settings: Settings) -> Settings:
@@ -45,18 +46,20 @@ def own_settings(settings: Settings) -> Settings:
 
 
 class PrivateEntrance:
-    """The sockets of a worker, which gateways and other workers reach.
+    """The sockets of a worker, which gateways and other workers reach, and its connections to those of other workers.
 
     Args:
         number: the number of the worker.
         sockets: where it listens.
         letters: the handler of what other workers send.
+        peers: the other workers.
     """
 
-    def __init__(self, number: int, sockets: Sockets, letters: grpc.GenericRpcHandler) -> None:
+    def __init__(self, number: int, sockets: Sockets, letters: grpc.GenericRpcHandler, peers: Peers) -> None:
         self._number = number
         self._sockets = sockets
         self._letters = letters
+        self._peers = peers
         self._frames: FrameServer | None = None
 
     def authenticator(self, tokens: TokenFile | None) -> Callable[[Context], Caller]:
@@ -74,6 +77,7 @@ class PrivateEntrance:
         return address
 
     async def close(self) -> None:
-        """Close the socket for frames."""
+        """Close the socket for frames, and the connections."""
+        self._peers.close()
         if self._frames is not None:
             await self._frames.close()

@@ -17,6 +17,7 @@ import pytest
 from cluster import descendants, processes
 from command_line import dynhull
 from patience import PATIENCE, wait_until
+from postgresql import query
 from server_process import Server, server_process
 
 from dynhull_client import (
@@ -34,7 +35,7 @@ from dynhull_client import (
 from dynhull_server.storage.sqlite import copies
 
 WORKERS = ("--workers", "2", "--gateways", "1")
-SHAPES = {"process": (), "workers": WORKERS}
+SHAPES = {"process": (), "workers": WORKERS, "cluster": ("--cluster", "--partitions", "4")}
 KINDS: dict[str, dict[str, Any]] = {
     "points": {},
     "strings": {"keyed": "str"},
@@ -48,7 +49,14 @@ START = 1_700_000_000
 
 @pytest.fixture(scope="module", params=SHAPES)
 def server(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with server_process(*SHAPES[request.param], "--data", str(tmp_path_factory.mktemp("data"))) as server:
+    options = SHAPES[request.param]
+    if request.param != "cluster":
+        with server_process(*options, "--data", str(tmp_path_factory.mktemp("data"))) as server:
+            yield server
+        return
+    url = request.getfixturevalue("postgres").new_database()
+    with server_process(*options, "--journal", url) as server, server_process(*options, "--journal", url):
+        wait_until(lambda: query(url, "SELECT count(DISTINCT worker) FROM owners WHERE address <> ''") == [(2,)])
         yield server
 
 

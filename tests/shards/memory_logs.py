@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from dynhull_cluster.shards.epochs import Epochs
 from dynhull_cluster.shards.logs import Decided, Decision, FencedError
 from dynhull_cluster.shards.messages import Message
 from dynhull_cluster.shards.placement import Place
@@ -20,26 +21,46 @@ def nothing() -> None:
     pass
 
 
+class Decisions:
+    """What is decided, and who owns it: processes that take it over, one after the other."""
+
+    def __init__(self) -> None:
+        self.owner = 0
+        self.made: list[Decision] = []
+
+
 class MemoryRootLog:
-    def __init__(self, hook: Hook = nothing) -> None:
-        self.epoch = 0
-        self.decisions: list[Decision] = []
+    """The log of the roots of a process, from when it takes the decisions over. What it decides is refused once another
+    one has. Of what others have decided since, it knows nothing.
+
+    Attributes:
+        known: the greatest epoch that shards know of, as far as the next root has heard.
+    """
+
+    def __init__(self, decisions: Decisions, epochs: Callable[[int], Epochs] = Epochs, hook: Hook = nothing) -> None:
+        hook()
+        decisions.owner += 1
+        hook()
+        self._decisions = decisions
+        self._owner = decisions.owner
+        self._made = list(decisions.made)
+        self._epochs = epochs(self._owner)
+        self._epoch = 0
+        self.known = 0
         self.hook = hook
 
     def begin(self, epoch: int | None) -> tuple[int, Decided]:
-        if epoch not in (None, self.epoch):
+        if epoch not in (None, self._epoch):
             raise FencedError
-        self.hook()
-        self.epoch += 1
-        self.hook()
-        return self.epoch, self._decided()
+        self._epoch = self._epochs.next(self.known if epoch is None else epoch)
+        return self._epoch, self._decided()
 
     def _decided(self) -> Decided:
-        if not self.decisions:
+        if not self._made:
             return Decided()
-        last = self.decisions[-1]
+        last = self._made[-1]
         division, steps = None, dict[int, int]()
-        for each in self.decisions:
+        for each in self._made:
             if each.division is None:
                 steps |= dict.fromkeys(each.shards, each.number)
             else:
@@ -49,17 +70,18 @@ class MemoryRootLog:
             last.revision,
             last.cause,
             last.clock,
-            {each.producer: each.sequence for each in self.decisions if each.producer},
-            frozenset(each.producer for each in self.decisions if each.may_skip),
+            {each.producer: each.sequence for each in self._made if each.producer},
+            frozenset(each.producer for each in self._made if each.may_skip),
             steps,
             division,
         )
 
     def decide(self, epoch: int, decisions: Sequence[Decision]) -> None:
-        if epoch != self.epoch:
+        if epoch != self._epoch or self._owner != self._decisions.owner:
             raise FencedError
         self.hook()
-        self.decisions += decisions
+        self._decisions.made += decisions
+        self._made += decisions
         self.hook()
 
 
@@ -99,7 +121,7 @@ class Cluster:
     def __init__(self, settings: HullSettings, limits: Limits, count: int) -> None:
         self._settings, self._limits = settings, limits
         self._count = count
-        self._log = MemoryRootLog()
+        self._decisions = Decisions()
         self._logs: dict[Place, MemoryShardLog] = {}
         self._shards: dict[Place, Shard] = {}
         self.restart_root()
@@ -111,7 +133,8 @@ class Cluster:
         return [log for place, log in sorted(self._logs.items()) if place.generation == generation]
 
     def restart_root(self) -> None:
-        self.root = Root(self._settings, self._limits, self._count, self._log, now=0.0)
+        log = MemoryRootLog(self._decisions)
+        self.root = Root(self._settings, self._limits, self._count, log, now=0.0)
         self.deliver()
 
     def restart_shard(self, shard: int) -> None:

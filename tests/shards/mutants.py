@@ -19,6 +19,17 @@ MOST_SCHEDULES = 2000
 
 # Name: the module, what stands there once, and what stands there instead.
 MUTANTS = {
+    "a root chooses its epoch alone, above those that shards know of": (
+        "epochs",
+        "self._last = owner << OWNER_BITS",
+        "self._last = 0",
+    ),
+    "a process that was replaced begins a root above the next one": (
+        "epochs",
+        "if self._owner and owner_of(last) > self._owner:",
+        "if False:",
+    ),
+    "a process begins two roots in one epoch": ("epochs", "self._last = last + 1", "self._last = last"),
     "a shard replies before it has the step in its log": ("shard", "self._log.add(log)", "pass"),
     "an uncertain step stays after a root was lost": (
         "shard",
@@ -154,6 +165,8 @@ def mutated(name: str) -> dict[str, Any]:
         sys.modules[original.__name__] = before
     if module == "root":
         copy.PIECE_POINTS = FEW
+    if module == "epochs":
+        return {"epochs_type": copy.Epochs}
     if module == "shard":
         return {"shard_type": copy.Shard}
     return {"root_type": copy.Root if module == "root" else partial(with_planner, copy.Planner)}

@@ -2,9 +2,10 @@
 
     PYTHONPATH=tests python -m shards.simulation --schedules 100000 [--first 0]
 
-A schedule follows from its seed. Processes die between two messages or at a change of their log, before or after it;
-a root that was replaced may go on for a while. Clients number their batches and send them again until they are
-answered. In the end the decisions are replayed on one hull, which must agree with every answer that anybody got.
+A schedule follows from its seed. Processes die between two messages or at a change of their log, before or after it.
+One that was replaced may go on for a while, with one root after the other, as in a cluster; or never does, as where
+only one process can open a folder. Clients number their batches and send them again until they are answered. In the
+end the decisions are replayed on one hull, which must agree with every answer that anybody got.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import numpy as np
 
 from dynhull_cluster.shards import root as root_module
 from dynhull_cluster.shards import shard as shard_module
+from dynhull_cluster.shards.epochs import Epochs
 from dynhull_cluster.shards.logs import FencedError
 from dynhull_cluster.shards.messages import Open, SampleOf, StaticHull
 from dynhull_cluster.shards.placement import Place
@@ -25,7 +27,7 @@ from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Kept
 
-from .memory_logs import MemoryRootLog, MemoryShardLog
+from .memory_logs import Decisions, MemoryRootLog, MemoryShardLog
 from .workload import KINDS, LIMITS, Workload, same_effect
 
 EVERYTHING = 10**6
@@ -47,17 +49,19 @@ class KilledError(Exception):
 
 @dataclass(eq=False)
 class RootProcess:
+    log: MemoryRootLog
     root: Any
 
 
 @dataclass
 class InFlight:
-    """A message, or a reply if `reply` is set, between a root and a shard."""
+    """A message between a root and a shard, or the reply to it; None says that it came too late."""
 
     root: RootProcess
     shard: Place
     message: Any
-    reply: bool = False
+    replied: bool = False
+    reply: Any = None
 
 
 class Client:
@@ -74,18 +78,25 @@ class Client:
 
 
 class World:
-    """One schedule. `root_type` and `shard_type` may have faults that it must find."""
+    """One schedule. The three types may have faults that it must find."""
 
-    def __init__(self, seed: int, root_type: Any = root_module.Root, shard_type: Any = shard_module.Shard) -> None:
+    def __init__(
+        self,
+        seed: int,
+        root_type: Any = root_module.Root,
+        shard_type: Any = shard_module.Shard,
+        epochs_type: Any = Epochs,
+    ) -> None:
         self._draw = draw = random.Random(seed)
-        self._root_type, self._shard_type = root_type, shard_type
+        self._root_type, self._shard_type, self._epochs_type = root_type, shard_type, epochs_type
+        self._in_folder = draw.random() < 0.3
         self._settings = KINDS[draw.choice(list(KINDS))]
         self._workload = Workload(self._settings, seed)
         self._deadly = draw.choice((0.0, 0.01, 0.05))  # that a process dies at a change of its log
         self._lossy = draw.choice((0.0, 0.05, 0.3))
         self._restless = draw.choice((0.0, 0.05, 0.2))  # that the next request asks for another number of shards
         self._faults = True
-        self._log = MemoryRootLog(self._perhaps_die)
+        self._decisions = Decisions()
         self._count = draw.choice((1, 2, 2, 3))
         self._shard_logs: dict[Place, MemoryShardLog] = {}
         self._shards: dict[Place, Any] = {}
@@ -117,7 +128,9 @@ class World:
                 self._kill_shard(draw.choice(list(self._shards)))
             elif roll < 0.02:
                 self._replace_root()
-            elif roll < 0.04:
+            elif roll < 0.03:
+                self._fail_root()
+            elif roll < 0.05:
                 self._drop_unneeded()
             else:
                 draw.choice(actions)()
@@ -144,18 +157,30 @@ class World:
         """A root is started where there is none, and clients send again what they have no answer to."""
         if self._process is None:
             try:
-                root = self._root_type(self._settings, FEW_POINTS, self._count, self._log, now=0.0)
+                log = MemoryRootLog(self._decisions, self._epochs, self._perhaps_die)
+                self._process = RootProcess(log, self._new_root(log))
             except KilledError:
                 return
-            self._process = RootProcess(root)
-            self._reads, self._expiries = [], []
-            for client in self._clients:
-                client.waiting = [Write(request.batch, now=0.0) for request in client.waiting]
-                for request in client.waiting:
-                    self._ask_root(request)
-            self._reshards = [Reshard(reshard.shards) for reshard in self._reshards]
-            for reshard in self._reshards:
-                self._ask_root(reshard)
+            self._ask_again()
+
+    def _ask_again(self) -> None:
+        """Clients send again what they have no answer to."""
+        self._reads, self._expiries = [], []
+        for client in self._clients:
+            client.waiting = [Write(request.batch, now=0.0) for request in client.waiting]
+            for request in client.waiting:
+                self._ask_root(request)
+        self._reshards = [Reshard(reshard.shards) for reshard in self._reshards]
+        for reshard in self._reshards:
+            self._ask_root(reshard)
+
+    def _epochs(self, owner: int) -> Any:
+        return self._epochs_type(0 if self._in_folder else owner)
+
+    def _new_root(self, log: MemoryRootLog) -> Any:
+        """A root, after all shards have said which epochs they know; others may begin between that and its own."""
+        log.known = max((each.epoch for each in self._shard_logs.values()), default=0)
+        return self._root_type(self._settings, FEW_POINTS, self._count, log, now=0.0)
 
     def _ask(self) -> None:
         self._resume()
@@ -213,7 +238,7 @@ class World:
             self._in_flight.pop()
         if self._faults and draw.random() < self._lossy:
             return
-        if each.reply:
+        if each.replied:
             self._deliver_reply(each)
         else:
             if each.shard not in self._shards:
@@ -226,15 +251,20 @@ class World:
             except KilledError:
                 self._kill_shard(each.shard)
                 return
-            if reply is not None:
-                self._in_flight.append(InFlight(each.root, each.shard, reply, reply=True))
+            self._in_flight.append(InFlight(each.root, each.shard, each.message, True, reply))
 
     def _deliver_reply(self, each: InFlight) -> None:
         current = each.root is self._process
         if not current and each.root not in self._replaced:
             return
+        if each.reply is None:
+            if any(message is each.message for _, message in each.root.root.messages()):
+                if current and not self._in_folder:  # in a folder, messages of a dead process may still arrive
+                    raise BrokenPromiseError("the latest root is fenced")
+                self._begin_root(each.root)
+            return
         try:
-            each.root.root.receive(each.shard, each.message)
+            each.root.root.receive(each.shard, each.reply)
         except KilledError:
             if current:
                 self._lose_root()
@@ -264,10 +294,26 @@ class World:
         self._process = None
 
     def _replace_root(self) -> None:
-        """Another root takes over; the old one may go on, unaware of that."""
-        if self._process is not None and self._draw.random() < 0.5:
+        """Another process takes over; the old one may go on, unaware of that."""
+        if self._process is not None and not self._in_folder and self._draw.random() < 0.5:
             self._replaced.append(self._process)
         self._lose_root()
+
+    def _fail_root(self) -> None:
+        """A process, which may have been replaced, begins another root, as after an error."""
+        processes = [each for each in (self._process, *self._replaced) if each is not None]
+        if processes:
+            self._begin_root(self._draw.choice(processes))
+
+    def _begin_root(self, process: RootProcess) -> None:
+        try:
+            process.root = self._new_root(process.log)
+        except FencedError:
+            if process is self._process:
+                raise BrokenPromiseError("the latest root is fenced") from None
+            self._replaced.remove(process)
+        if process is self._process:
+            self._ask_again()
 
     # Answers
 
@@ -283,7 +329,7 @@ class World:
                     self._acknowledged[client.name, write.sequence] = request.result
                 else:  # its number is free again
                     client.refused = True
-                    self._refused.append((len(self._log.decisions), write, request.error))
+                    self._refused.append((len(self._decisions.made), write, request.error))
         for read in self._reads:
             if read.answered:
                 self._read.append((*read.result, read.question))
@@ -320,12 +366,12 @@ class World:
         refused: dict[int, list[tuple[WriteBatch, Exception]]] = {}
         for position, write, error in self._refused:
             refused.setdefault(position, []).append((write, error))
-        for position in range(len(self._log.decisions) + 1):
+        for position in range(len(self._decisions.made) + 1):
             self._check_reads(one, reads.pop(one.counts.revision, []))
             for write, error in refused.get(position, []):
                 check_refused(one, write, error)
-            if position < len(self._log.decisions):
-                self._replay(one, self._log.decisions[position])
+            if position < len(self._decisions.made):
+                self._replay(one, self._decisions.made[position])
         if reads:
             raise BrokenPromiseError(f"reads of the revisions {sorted(reads)}, which never were")
         if self._acknowledged:

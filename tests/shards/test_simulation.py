@@ -9,6 +9,9 @@ SCHEDULES = 200
 FIRST = 5 * 10**6
 # Found within a few schedules.
 QUICK = {
+    "a process begins two roots in one epoch",
+    "a process that was replaced begins a root above the next one",
+    "a root chooses its epoch alone, above those that shards know of",
     "a refused batch is not undone",
     "a request is forgotten where a shard restarts",
     "a shard listens to a root that was replaced",

@@ -31,6 +31,7 @@ class FaultyStorage:
     def __init__(self, inner: Storage, model: Model, faults: Sequence[dict[str, Any]], *, immediate: bool) -> None:
         self.immediate = immediate
         self.keeps = True
+        self.epoch = 0
         self.calm = self.dead = False
         self.give_way: Callable[[], None] = lambda: None
         self._inner = inner

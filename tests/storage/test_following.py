@@ -3,6 +3,7 @@
 import asyncio
 import random
 import time
+from typing import Any
 
 import pytest
 from folders import append, appended, events, fence_row, no_progress, record, same
@@ -16,7 +17,7 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.state.fences.records import AddFence, DropFence, Inside
-from dynhull_server.state.records import Contents, Create, Delete, HullRow, Kept
+from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept
 from dynhull_server.storage.port import DamagedError, StorageError
 
 
@@ -37,6 +38,7 @@ class Owner:
         self.storage.open(no_progress)
         self._random = random.Random(seed)
         self._revisions: dict[int, int] = {}
+        self._decided: dict[int, int] = {}  # of each shard, the revision before which nothing is undone
         self._numbers = iter(range(1, 10_000))
         self._fences: dict[int, int] = {}
         self._work = []
@@ -47,6 +49,7 @@ class Owner:
             self._create: 1,
             self._append: 8,
             self._delete: 0.3,
+            self._undo: 2 if self._decided else 0,
             self._snapshot: 1,
             self._sweep: 0.5,
             self._go_on: 4,
@@ -61,8 +64,12 @@ class Owner:
         later = next(self._numbers)
         for each in (later, number) if self._random.random() < 0.5 else (number,):  # in any order
             name = f"hull-{each}" if self._revisions else "fleet"
-            self.storage.commit([Create(HullRow(each, name, f"uid-{each}", 1.5))])
+            shard = self._random.choice((None, 0)) if self._revisions else None
+            settings = HullSettings(shards=1, shard=0) if shard == 0 else HullSettings()
+            self.storage.commit([Create(HullRow(each, name, f"uid-{each}", 1.5, settings))])
             self._revisions[each] = 0
+            if shard == 0:
+                self._decided[each] = 0
 
     def _append(self) -> None:
         for number in self._random.sample(sorted(self._revisions), min(2, len(self._revisions))):
@@ -75,9 +82,23 @@ class Owner:
         if number != next(iter(self._revisions)):  # fences need that one
             self.storage.commit([Delete(number)])
             del self._revisions[number]
+            self._decided.pop(number, None)
+
+    def _undo(self) -> None:
+        """Drop the newest batches of a shard, and perhaps add others in the same commit."""
+        number = self._random.choice(sorted(self._decided))
+        last = self._random.randint(self._decided[number], self._revisions[number])
+        step = self.storage.cut(number, last)
+        if step is not None:
+            others = self._random.randint(0, 2)
+            added = [Append(number, [record(last + 1 + each, n=7)]) for each in range(others)]
+            self.storage.commit([step, *added])
+            self._revisions[number] = last + others
 
     def _snapshot(self) -> None:
         number = self._random.choice(sorted(self._revisions))
+        if number in self._decided:
+            self._decided[number] = self._revisions[number]
         kept = Kept(self._revisions[number], Contents(record(1, n=self._random.choice((3, 50_000))).rows.inserts))
         self._work.append(self.storage.snapshot(number, kept))
 
@@ -114,7 +135,10 @@ class Owner:
             del self._fences[number]
 
     def hulls(self) -> dict[int, int]:
-        return dict(self._revisions)
+        return {number: last for number, last in self._revisions.items() if number not in self._decided}
+
+    def shards(self) -> dict[int, int]:
+        return {number: self._revisions[number] for number in self._decided}
 
 
 class Reader:
@@ -135,7 +159,12 @@ class Reader:
         self.hulls.update(zip(new, self.storage.read_each(new), strict=True))
 
 
-@pytest.mark.parametrize("seed", range(6))
+def loaded(contents: Any) -> list[int]:
+    """The hulls that an engine loads ahead: of shards it reads nothing but which rows there are."""
+    return [row.number for row in contents.hulls if row.settings.shard is None]
+
+
+@pytest.mark.parametrize("seed", range(8))
 def test_what_is_read_ahead_is_what_is_there(url, seed):
     fenced = seed % 2 == 1
     owner = Owner(url, seed)
@@ -147,16 +176,18 @@ def test_what_is_read_ahead_is_what_is_there(url, seed):
     for _ in range(150):
         owner.step()
         if dice.random() < 0.2:
-            reader.adopt([row.number for row in reader.storage.follow(no_progress).hulls])
-    reader.adopt([row.number for row in reader.storage.follow(no_progress).hulls])
+            reader.adopt(loaded(reader.storage.follow(no_progress)))
+    reader.adopt(loaded(reader.storage.follow(no_progress)))
     for _ in range(dice.randint(0, 5)):
         owner.step()
-    expected = owner.hulls()
+    expected, shards = owner.hulls(), owner.shards()
     owner.storage.close()
     contents = reader.storage.open(no_progress)
-    assert {row.number for row in contents.hulls} == expected.keys()
+    assert {row.number for row in contents.hulls} == expected.keys() | shards.keys()
     reader.adopt(sorted(expected))
     assert {number: kept.last_revision for number, kept in reader.hulls.items()} == expected
+    expected |= shards
+    assert {number: reader.storage.read(number).last_revision for number in expected} == expected
     # It goes on as an owner: commits, snapshots, and sweeps of what is left behind.
     for number, last in expected.items():
         append(reader.storage, last + 1, last + 2, number)

@@ -12,7 +12,7 @@ from dynhull_server.settings import Settings
 from dynhull_server.state.errors import HullNotFoundError
 from dynhull_server.state.events import Expire, WriteBatch
 from dynhull_server.state.hull import Hull
-from dynhull_server.state.records import Create, Delete, HullRow, HullSettings
+from dynhull_server.state.records import HullRow, HullSettings
 
 from ..placement import worker_of
 from ..shards import messages as say
@@ -25,7 +25,8 @@ from .wire import pack, unpack
 
 # Seconds between looks at what waits, and between looks whether the hulls of shards are still there.
 LOOK_SECONDS, WANTED_SECONDS = 0.25, 5.0
-
+# Seconds that requests wait for a shard whose worker is away, where no other one takes its place.
+AWAY_SECONDS = 3.0
 
 # The name of the work that other processes ask for.
 SHARDS = "shards"
@@ -54,19 +55,22 @@ class ServedDivisions:
 
     Args:
         settings: the settings of the server.
-        worker: the number of this process among the workers.
-        peers: the way to the other workers; None in a server of one process.
+        worker: the number of the worker that has them; in a cluster, of the partition.
+        workers: the number of all workers, or partitions.
+        peers: the way to the others; None in a server of one process.
     """
 
-    def __init__(self, settings: Settings, worker: int = 0, peers: Peers | None = None) -> None:
+    def __init__(self, settings: Settings, worker: int = 0, workers: int = 1, peers: Peers | None = None) -> None:
         self._in_memory = settings.in_memory
-        self._workers = settings.workers or 1
+        self._workers = workers
         self._worker = worker
         self._peers = peers
+        self._patience = (0.0 if peers is None else peers.patience) or AWAY_SECONDS
         self._engine: Engine | None = None
         self._roots: dict[str, ServedRoot] = {}
         self._shards: dict[tuple[str, Place], LocalShard] = {}
         self._creating = asyncio.Lock()
+        self._new: dict[tuple[str, Place], HullRow] = {}  # whose creation has begun
         self._ending: set[asyncio.Task[None]] = set()
 
     # What the engine asks
@@ -100,7 +104,7 @@ class ServedDivisions:
         """Begin with the root of a hull, unless it has begun."""
         if hull.uid not in self._roots:
             greet, deliver = partial(self._greet, hull), partial(self._deliver, hull)
-            self._roots[hull.uid] = ServedRoot(self._started, hull, greet, deliver)
+            self._roots[hull.uid] = ServedRoot(self._started, hull, greet, deliver, self._patience)
 
     def end(self, hull: Hull) -> None:
         """The hull is deleted: end its root. Its shards notice."""
@@ -131,8 +135,6 @@ class ServedDivisions:
         roots, self._roots = self._roots, {}
         await asyncio.gather(*(root.close() for root in roots.values()), *self._ending)
         await asyncio.gather(*(shard.close() for shard in self._shards.values()))
-        if self._peers is not None:
-            self._peers.close()
 
     # What other processes ask
 
@@ -160,7 +162,10 @@ class ServedDivisions:
                     raise PeerAwayError("there is no such shard")
                 return Answer(await known.receive(letter.message))
             case Wanted():
-                return IsWanted(self._has(letter))
+                wanted = self._has(letter)
+                if not self._engine.entitled():  # another one may have the hull, and the shard is deleted if nobody has
+                    raise PeerAwayError("this worker may not own the partition any more")
+                return IsWanted(wanted)
         raise TypeError(f"not a letter: {letter}")
 
     async def _found(self, greeting: Greeting) -> LocalShard:
@@ -170,11 +175,12 @@ class ServedDivisions:
         async with self._creating:
             if key not in self._shards:
                 engine = self._started
-                name = name_of_shard(greeting.name, *key)
-                row = HullRow(engine.core.number_of_shard(), name, greeting.uid, greeting.created, settings)
-                if engine.keeps:
-                    await engine.commit([Create(row)])
-                self._shards[key] = LocalShard(engine, row)
+                if key not in self._new:  # a caller that goes away, or a failure, leaves it to the next greeting
+                    name = name_of_shard(greeting.name, *key)
+                    number = engine.core.number_of_shard()
+                    self._new[key] = HullRow(number, name, greeting.uid, greeting.created, settings)
+                await engine.add_shard(self._new[key])
+                self._shards[key] = LocalShard(engine, self._new.pop(key))
         return self._shards[key]
 
     # What roots and shards ask of each other
@@ -231,10 +237,8 @@ class ServedDivisions:
             if not found.wanted:
                 del self._shards[key]
                 await shard.close()
-                if not self._started.keeps:
-                    continue
                 try:
-                    await self._started.commit([Delete(row.number)])
+                    await self._started.drop_shard(row.number)
                 except Exception:  # it is still there, so it has to be asked about again
                     self._shards[key] = LocalShard(self._started, row)
                     raise

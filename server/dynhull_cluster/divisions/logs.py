@@ -31,6 +31,7 @@ from dynhull_server.state.records import (
 from dynhull_server.state.root_state import RootState
 from dynhull_server.storage.port import DamagedError
 
+from ..shards.epochs import Epochs
 from ..shards.logs import Decided, Decision, FencedError
 from ..shards.messages import Change, Corners, Effect
 
@@ -41,16 +42,18 @@ class StoredRootLog:
     Args:
         engine: the hulls.
         hull: the hull.
-        epoch: an epoch that no root had before. The storage has only one owner, so there is only one root.
+        epochs: those of the roots of this process.
+        known: the greatest epoch that its shards know of.
 
     Attributes:
         due: of each shard, the time by the server's clock before which none of its points leaves.
     """
 
-    def __init__(self, engine: Engine, hull: Hull, epoch: int) -> None:
+    def __init__(self, engine: Engine, hull: Hull, epochs: Epochs, known: int) -> None:
         self._engine = engine
         self._hull = hull
-        self._epoch = epoch - 1
+        self._epochs = epochs
+        self._epoch = known
         self._settings = hull.row.settings
         self.due: dict[int, int | None] = {}
 
@@ -58,7 +61,7 @@ class StoredRootLog:
         """Begin an epoch that no root had before."""
         if epoch not in (None, self._epoch):
             raise FencedError
-        self._epoch += 1
+        self._epoch = self._epochs.next(self._epoch)
         _, decided = self._engine.ask_from_thread(ReadHull(Waiter(), self._hull, _decided))
         return self._epoch, decided
 
@@ -133,7 +136,7 @@ class StoredShardLog:
         self._keeps = engine.keeps
         self._kept: Kept | None = engine.read_from_thread(row.number) if self._keeps else Kept()
         kept = self._kept
-        last = kept.producers | {record.producer: record.sequence for record in kept.records if record.producer}
+        last = kept.sequences
         self.epoch, self.step = last.get(EPOCHS, 0), last.get(STEPS, 0)
         self.revision = kept.last_revision
         self.added = sum(len(record.rows) for record in kept.records)

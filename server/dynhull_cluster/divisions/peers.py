@@ -8,7 +8,7 @@ import grpc
 
 from dynhull_server.rpc.status import RelayedError
 
-from ..sockets import Sockets
+from ..ways import Ways
 from ..worker_link import AskingFrames
 
 SERVICE, METHOD = "dynhull.Shards", "Send"
@@ -23,12 +23,17 @@ class Peers:
     """Connections to the other workers, made when they are needed.
 
     Args:
-        sockets: where the workers listen.
+        ways: where the workers are.
     """
 
-    def __init__(self, sockets: Sockets) -> None:
-        self._sockets = sockets
+    def __init__(self, ways: Ways) -> None:
+        self._ways = ways
         self._connections: dict[int, asyncio.Future[AskingFrames]] = {}
+
+    @property
+    def patience(self) -> float:
+        """The seconds in which a worker that has ended is replaced by another one; 0 where there is no other."""
+        return self._ways.patience
 
     async def ask(self, worker: int, letter: bytes) -> bytes:
         """The answer to a letter. Raises PeerAwayError."""
@@ -43,18 +48,25 @@ class Peers:
     async def _connected(self, worker: int) -> AskingFrames:
         connecting = self._connections.get(worker)
         if connecting is None:
-            connecting = self._connections[worker] = asyncio.ensure_future(self._connect(worker))
-            connecting.add_done_callback(lambda done: self._forget(worker, done) if _failed(done) else None)
+            self._ways.when_moved(worker, partial(self._leave, worker))
+            loop = asyncio.get_running_loop()
+            lost: asyncio.Future[None] = loop.create_future()
+            connecting = loop.create_task(self._ways.connect(worker, partial(AskingFrames, lost)))
+            self._connections[worker] = connecting
+            ended = partial(self._forget, worker, connecting)
+            lost.add_done_callback(ended)
+            connecting.add_done_callback(lambda done: ended(done) if _failed(done) else None)
         return await asyncio.shield(connecting)
 
-    async def _connect(self, worker: int) -> AskingFrames:
-        lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        lost.add_done_callback(lambda _: self._forget(worker))
-        return await self._sockets.connect(worker, partial(AskingFrames, lost))
+    def _leave(self, worker: int) -> None:
+        """End the connection: the worker is elsewhere, and who was it before may not answer any more."""
+        connected = self._connections.get(worker)
+        if connected is not None and connected.done() and not _failed(connected):
+            connected.result().abort()
 
-    def _forget(self, worker: int, which: Any = None) -> None:
-        if which is None or self._connections.get(worker) is which:
-            self._connections.pop(worker, None)
+    def _forget(self, worker: int, which: "asyncio.Future[AskingFrames]", _: object) -> None:
+        if self._connections.get(worker) is which:
+            del self._connections[worker]
 
     def close(self) -> None:
         """Close the connections."""
@@ -70,7 +82,7 @@ def _failed(done: "asyncio.Future[AskingFrames]") -> bool:
 
 
 def peer_handler(receive: Any) -> grpc.GenericRpcHandler:
-    """The handler of letters, for the socket that only processes of this server reach.
+    """The handler of letters, for frames that only processes of this server send.
 
     Args:
         receive: returns the answer to a letter.

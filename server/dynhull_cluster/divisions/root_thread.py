@@ -21,8 +21,10 @@ from dynhull_server.state.errors import (
     words,
 )
 from dynhull_server.state.hull import Hull
+from dynhull_server.storage.port import StorageError
 
 from ..shards import messages as say
+from ..shards.epochs import Epochs
 from ..shards.logs import FencedError
 from ..shards.placement import Place
 from ..shards.requests import Request
@@ -78,6 +80,7 @@ class RootThread:
         self._took = took
         self._loop = asyncio.get_running_loop()
         self._pool = engine.machine.threads.pool("root", 1)
+        self._epochs = Epochs(engine.epoch)
         self._root: Root | None = None
         self._log: StoredRootLog | None = None
         self._backlog: list[Request] = []
@@ -102,9 +105,9 @@ class RootThread:
         """Refuse what waits and what comes."""
         self._do(partial(self._refuse_all, error))
 
-    async def begin(self, epoch: int) -> Exception | None:
-        """Make a root, in an epoch that none had before. Returns what prevents that."""
-        return await asyncio.wrap_future(self._call(partial(self._make_root, epoch)))
+    async def begin(self, known: int) -> Exception | None:
+        """Make a root; `known` is the greatest epoch that its shards know of. Returns what prevents that."""
+        return await asyncio.wrap_future(self._call(partial(self._make_root, known)))
 
     async def close(self) -> None:
         """Complete what was called."""
@@ -123,10 +126,14 @@ class RootThread:
 
     def _run(self, function: Callable[[], None]) -> Exception | None:
         """Call a function; if it fails, the root has ended. Returns the error."""
-        failure = ended_by = None
+        failure: Exception | None = None
+        ended_by: Exception | None = None
         try:
             function()
             self._notice_opened()
+        except FencedError as error:
+            failure = StorageError(str(error))
+            ended_by = self._fail(failure)
         except Exception as error:  # a commit, memory, or damage
             failure = error
             ended_by = self._fail(error)
@@ -140,8 +147,8 @@ class RootThread:
         self._loop.call_soon_threadsafe(self._took, turn)
         return failure
 
-    def _make_root(self, epoch: int) -> None:
-        self._log = StoredRootLog(self._engine, self._hull, epoch)
+    def _make_root(self, known: int) -> None:
+        self._log = StoredRootLog(self._engine, self._hull, self._epochs, known)
         settings = self._hull.row.settings
         self._opened = False
         now = self._engine.machine.clock.monotonic()

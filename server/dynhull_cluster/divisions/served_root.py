@@ -30,8 +30,8 @@ from .asked import Asked, AskedExpiry, AskedRead, AskedReshard, AskedWrite
 from .peers import PeerAwayError
 from .root_thread import RootThread, Turn
 
-# Seconds that requests wait for a shard whose worker cannot be reached, and for one that does not answer.
-AWAY_SECONDS, SILENT_SECONDS = 3.0, 30.0
+# Seconds that requests wait for a shard that does not answer, though its worker can be reached.
+SILENT_SECONDS = 30.0
 # Seconds before a message to a worker that is away is sent again.
 AGAIN_SECONDS = 0.05
 # Seconds before a root that has failed is replaced: at first, and at most.
@@ -52,13 +52,15 @@ class ServedRoot:
         hull: the hull that its readers see.
         greet: looks for a shard.
         deliver: brings a message to a shard.
+        patience: the seconds that requests wait for a shard whose worker cannot be reached.
     """
 
-    def __init__(self, engine: Engine, hull: Hull, greet: Greet, deliver: Deliver) -> None:
+    def __init__(self, engine: Engine, hull: Hull, greet: Greet, deliver: Deliver, patience: float) -> None:
         self._engine = engine
         self._hull = hull
         self._greet = greet
         self._deliver = deliver
+        self._patience = patience
         self._loop = asyncio.get_running_loop()
         self._clock = engine.machine.clock
         self._work = f"shards of {hull.name}"
@@ -166,7 +168,7 @@ class ServedRoot:
             self._engine.supervisor.failed(self._work, DamagedError(str(self._thread.damage)))
         now = self._clock.monotonic()
         for place, since in self._unanswered.items():
-            patience = AWAY_SECONDS if place in self._away else SILENT_SECONDS
+            patience = self._patience if place in self._away else SILENT_SECONDS
             if self._waits and now - since > patience:
                 self._thread.give_up(ShardAwayError(self._hull.name, place.number))
                 return
@@ -207,7 +209,7 @@ class ServedRoot:
             return error
         places = [Place(division.generation, number) for number in range(division.shards)]
         greeted = await asyncio.gather(*map(self._greeted, places))
-        return await self._thread.begin(max(greeted) + 1)
+        return await self._thread.begin(max(greeted))
 
     async def _greeted(self, place: Place) -> int:
         self._unanswered.setdefault(place, self._clock.monotonic())

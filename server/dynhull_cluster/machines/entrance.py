@@ -1,4 +1,4 @@
-"""How gateways of other processes and machines reach the owner of a partition."""
+"""How gateways and the owners of other partitions reach the owner of a partition."""
 
 import hmac
 import socket
@@ -21,7 +21,7 @@ from ..frame_server import FrameContext, FrameServer
 
 
 def proof_of(partition: int, secret: str) -> str:
-    """What a gateway shows: that it knows the secret, and which partition it means, as ports are used again."""
+    """What a connection begins with: who knows the secret, and means this partition, as ports are used again."""
     return f"{partition}/{secret}"
 
 
@@ -46,13 +46,15 @@ class PartitionEntrance:
         settings: the settings.
         partition: the partition.
         secret: what processes of the cluster know each other by.
+        letters: the handler of what other partitions send.
 
     Attributes:
         address: the host, the port for gRPC and that for frames, once it listens.
     """
 
-    def __init__(self, settings: Settings, partition: int, secret: str) -> None:
+    def __init__(self, settings: Settings, partition: int, secret: str, letters: grpc.GenericRpcHandler) -> None:
         self._settings = settings
+        self._letters = letters
         self._proof = proof_of(partition, secret)
         self._frames: FrameServer | None = None
         self.address = ""
@@ -86,7 +88,7 @@ class PartitionEntrance:
         family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
         bound = socket.socket(family, kind, protocol)
         bound.bind(address)
-        self._frames = FrameServer(handlers, runs, self._proof.encode())
+        self._frames = FrameServer((self._letters, *handlers), runs, self._proof.encode())
         await self._frames.listen_on(bound, tls)
         self.address = f"{host} {port} {bound.getsockname()[1]}"
         return self.address

@@ -27,11 +27,14 @@ from dynhull_server.settings import Settings
 from dynhull_server.state.errors import words
 from dynhull_server.storage.port import TakenOverError
 
+from ..divisions.divisions import ServedDivisions
+from ..divisions.peers import Peers, peer_handler
 from ..journal import database_of
 from ..metrics import merged
 from ..postgres.ownership import is_known_dead
 from ..postgres.storage import PostgresStorage
 from ..worker import own_settings
+from .addresses import Addresses
 from .ahead import FAILURES, Ahead, Served
 from .board import Board, Cluster, Tables, join
 from .claims import shares
@@ -66,6 +69,8 @@ class Member:
         self._board = Board(self._database, self._decide, worker)
         self._supervisor = Supervisor(Clock(), lambda _: None, end_process)
         self._cluster = Cluster(0, "")
+        self._addresses = Addresses("", None)
+        self._peers = Peers(self._addresses)
         self._served: dict[int, Server] = {}
         self._busy: dict[int, asyncio.Task[None]] = {}
         self._ahead: dict[int, Ahead] = {}
@@ -83,6 +88,8 @@ class Member:
             StorageError: the database cannot be used.
         """
         self._cluster = await asyncio.to_thread(join, self._database, self._settings.partitions)
+        self._addresses = Addresses(self._cluster.secret, self._settings.cluster_ca)
+        self._peers = Peers(self._addresses)
         self._supervisor.every(0.0, "board", self._board.run)
         await self._looked.wait()
         while self._busy:  # what was free
@@ -105,6 +112,7 @@ class Member:
         await asyncio.gather(*(each.drop() for each in self._ahead.values()))
         await asyncio.gather(*self._busy.values(), return_exceptions=True)
         await asyncio.gather(*(server.drain() for server in self._served.values()))
+        self._peers.close()
         if self._looked.is_set():
             await self._board.leave()
 
@@ -115,6 +123,7 @@ class Member:
 
     def _decide(self, tables: Tables) -> None:
         """Begin to take, to read ahead and to let go, after each look at the tables."""
+        self._addresses.learn(tables)
         count = self._cluster.partitions
         holders = self._board.holders(count)
         own = tables.workers.get(self._worker)
@@ -191,7 +200,8 @@ class Member:
         log.error(what, extra={"partition": number, "reason": words(error)})
 
     def _make(self, number: int) -> Served:
-        entrance = PartitionEntrance(self._settings, number, self._cluster.secret)
+        divisions = ServedDivisions(self._settings, number, self._cluster.partitions, self._peers)
+        entrance = PartitionEntrance(self._settings, number, self._cluster.secret, peer_handler(divisions.receive))
         storage = PostgresStorage(
             self._database,
             end_process,
@@ -200,7 +210,7 @@ class Member:
             partitions=self._cluster.partitions,
             worker=self._worker,
         )
-        return Served(Server(own_settings(self._settings), entrance, storage), storage, entrance)
+        return Served(Server(own_settings(self._settings), entrance, storage, divisions), storage, entrance)
 
     async def _take(self, number: int) -> None:
         """Own a partition, and serve it; if that fails, others may, and this worker tries again later."""

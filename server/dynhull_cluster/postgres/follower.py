@@ -1,9 +1,9 @@
 """Follows a partition that another server owns: the ledger as of ever later moments, without a look at every row again.
 
 Rows that are added have greater numbers, for as long as the partition has the same owner. Rows that are dropped are
-looked for where they can be: batches and snapshots that a newer snapshot has superseded, and whatever a deleted hull
-had. In the end the rows must agree with the totals, as in an examination. If they do not, something else has happened,
-and what was read before is void.
+looked for where they can be: batches and snapshots that a newer snapshot has superseded, the newest batches of a shard,
+which its root may undo, and whatever a deleted hull had. In the end the rows must agree with the totals, as in an
+examination. If they do not, something else has happened, and what was read before is void.
 """
 
 from array import array
@@ -111,6 +111,8 @@ class Follower:
             self._snapshots = snapshots
         if self._hulls.batches > totals.batches:
             self._drop_superfluous()
+        if self._hulls.batches > totals.batches:
+            self._drop_ends()
         fences = FoundFences()
         if totals.fence_rows or self.ledger.fences:
             fences = self._examine_fences()
@@ -165,7 +167,7 @@ class Follower:
                 ledger.dead["batches"].append(place)
                 continue
             if first != hull.last + 1:
-                raise self._void(f"revision {first} of hull {hull.row.name!r} follows {hull.last}")
+                self._drop_undone(hull, first - 1)
             each = weight(stored, number, first, last)
             hull.append(first, last, place, each)
             self._weights[number].append(each)
@@ -221,6 +223,25 @@ class Follower:
             hull.drop(gone, weights)
             del self._weights[number][:gone]
             self._hulls = self._hulls.plus(0, -gone, -weights)
+
+    def _drop_ends(self) -> None:
+        """Find the newest rows of shards that were dropped, and not followed by others."""
+        for hull in self.ledger.hulls.values():
+            if hull.row.settings.shard is not None and hull.ids:
+                there = sum(1 for _ in self._reader.some("batches", "batches.rowid", hull.ids))
+                if there < len(hull.ids):
+                    self._drop_undone(hull, hull.firsts[there] - 1)
+
+    def _drop_undone(self, hull: HullRows, last: int) -> None:
+        """Drop the rows of a shard after a revision."""
+        gone = hull.after(last)
+        if hull.row.settings.shard is None or not gone or hull.firsts[-len(gone)] != last + 1:
+            raise self._void(f"revision {last + 1} of hull {hull.row.name!r} follows {hull.last}")
+        each = self._weights[hull.row.number]
+        weights = sum(each[-len(gone) :])
+        hull.drop_newest(len(gone), weights, last)
+        del each[-len(gone) :]
+        self._hulls = self._hulls.plus(0, -len(gone), -weights)
 
     def _forget_swept(self) -> None:
         """Leave out what the owner has swept of deleted hulls: a sweep takes longest for what is not there."""

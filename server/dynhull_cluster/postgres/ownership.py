@@ -306,6 +306,11 @@ class Ownership:
             self._connection = None
 
 
+def follow_owner(connection: Connection, partition: int, epoch: int) -> None:
+    """Have the first owner of a partition follow an epoch that an owner had in another database."""
+    connection.execute("INSERT INTO owners VALUES (%s, %s, '', '', '', '-infinity')", [partition, epoch])
+
+
 def taken_over(database: Database, partition: int) -> TakenOverError:
     """The error of an owner that is no longer one."""
     return TakenOverError(f"another server has taken over partition {partition} of {database}")

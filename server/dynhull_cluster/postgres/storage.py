@@ -140,6 +140,7 @@ class PostgresStorage(RowStorage):
             if findings.fatal:
                 raise DamagedError(f"{self._place}: {'; '.join(findings.fatal)}: restore a backup")
             stack.callback(self._disconnect)
+            self.epoch = self._owner.epoch
             self._ledger = findings.ledger
             if not findings.both_totals:
                 self._restore_totals()

@@ -11,14 +11,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dynhull_server.storage.port import DamagedError, Progress, StorageError
+from dynhull_server.storage.rows.divided import Part, latest_epoch
 from dynhull_server.storage.rows.examine import Findings
 from dynhull_server.storage.rows.tables import COLUMNS, Insert, Reader
 from dynhull_server.storage.rows.totals import STOPPED
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.worker_folders import parts_of, worker_folder, write_manifest
 
+from ..shards.epochs import owner_of
 from .database import Connection, Database, as_storage_errors
-from .ownership import Ownership
+from .ownership import Ownership, follow_owner
 from .reader import PostgresReader
 from .schema import INSERTED_BYTES, hold, partitions_of, prepare, put_totals, queries_of
 from .storage import examined
@@ -73,6 +75,7 @@ def to_database(folder: Path, database: Database, progress: Progress) -> Moved:
         if partitions_of(connection, database) is not None:
             raise StorageError(f"{database} has tables of dynhull: create another database")
         prepare(connection, database, len(parts))
+        epoch = 0
         for partition, part in enumerate(parts):
             with copies.reading(part, lambda *_: None) as (reader, findings):
                 for rows in _together(_rows(reader, progress)):
@@ -83,6 +86,9 @@ def to_database(folder: Path, database: Database, progress: Progress) -> Moved:
             copy = examined(connection, partition, lambda *_: None)
             _require_same(findings, copy, str(database))
             moved.add(findings)
+            epoch = max(epoch, latest_epoch(Part(PostgresReader(connection, partition), copy.ledger)))
+        for partition in range(len(parts)):
+            follow_owner(connection, partition, owner_of(epoch))
     return moved
 
 

@@ -40,10 +40,10 @@ from ..state.events import (
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
-from ..state.records import DEFAULT, HullRow, HullSettings, Kept
+from ..state.records import DEFAULT, Create, Delete, HullRow, HullSettings, Kept
 from ..state.root_state import state_of
 from ..state.trip import Trip, unsaved_of
-from ..storage.port import Contents, FollowedStorage, Progress, Storage, StorageError
+from ..storage.port import Contents, FollowedStorage, NotCommittedError, Progress, Storage, StorageError
 from .batch_stream import BatchStream
 from .divided_hull import DividedHull
 from .division import Divisions
@@ -498,8 +498,28 @@ class Engine:
         return asyncio.run_coroutine_threadsafe(self.ask(request), self._loop).result()
 
     def read_from_thread(self, number: int) -> Kept:
-        """A shard as it is stored, from another thread."""
+        """A shard as it is stored, after the outcomes of all commits are decided; from another thread."""
+        self.commit_from_thread([])
         return self._storage.read(number)
+
+    async def add_shard(self, row: HullRow) -> None:
+        """Create a shard, unless an earlier attempt has, whose outcome was not known."""
+        await self._commit_unless([Create(row)], row.number, there=True)
+
+    async def drop_shard(self, number: int) -> None:
+        """Delete a shard, unless an earlier attempt has."""
+        await self._commit_unless([Delete(number)], number, there=False)
+
+    async def _commit_unless(self, changes: list[Any], number: int, *, there: bool) -> None:
+        """Commit changes of which shards there are; what does not take effect may have done so before."""
+        if not self.keeps:
+            return
+        try:
+            await self.commit(changes)
+        except NotCommittedError:
+            row = await self.run(self.disk, partial(self._storage.row, number))
+            if (row is not None) != there:
+                raise
 
     def cut_from_thread(self, number: int, last: int) -> Any:
         """What drops the revisions of a shard after `last`, from another thread; None for nothing."""
@@ -509,6 +529,15 @@ class Engine:
     def keeps(self) -> bool:
         """Whether the storage keeps batches."""
         return self._storage.keeps
+
+    @property
+    def epoch(self) -> int:
+        """The epoch of this server as the owner of its storage; 0 where it has none."""
+        return self._storage.epoch
+
+    def entitled(self) -> bool:
+        """Whether no other server may have other hulls."""
+        return self._storage.entitled()
 
     def _carry_out(self, effect: Effect) -> None:
         match effect:

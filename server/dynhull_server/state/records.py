@@ -374,6 +374,11 @@ class Kept:
         """The revision after the last batch."""
         return self.records[-1].revision if self.records else self.revision
 
+    @property
+    def sequences(self) -> dict[str, int]:
+        """The last sequence number of each producer after the last batch."""
+        return self.producers | {each.producer: each.sequence for each in self.records if each.producer}
+
     def divided(self, settings: HullSettings) -> tuple[Division, dict[int, Tally]]:
         """Of a hull over shards after the last batch, how its points are divided, and what its root knows of shards."""
         division, tallies = self.division or Division(settings.shards), dict(self.tallies)

@@ -65,6 +65,7 @@ class MemoryStorage:
     """
 
     immediate = True
+    epoch = 0
 
     def __init__(self, *, keeps: bool = True) -> None:
         self.keeps = keeps

@@ -86,10 +86,13 @@ class Storage(Protocol):
     Attributes:
         immediate: whether commits take no time and cannot fail, and so need no thread.
         keeps: whether it keeps batches; if not, it is given none. It keeps events in any case.
+        epoch: once it is open, a number greater than those of all processes that owned it before; 0 for a storage that
+            no process can own while another one may take itself for the owner.
     """
 
     immediate: bool
     keeps: bool
+    epoch: int
 
     def open(self, progress: Progress) -> Contents:
         """Examine the data, repair what can be repaired, and load it. Called once, before all other methods.

@@ -37,7 +37,9 @@ SERVED = "SELECT worker FROM owners WHERE until > '-infinity' AND address <> ''"
 
 
 class Torture(postgres_torture.Torture):
-    """Two servers; the clients use one of them, by turns."""
+    """Two servers; the clients use one of them, by turns. Hulls are divided among shards, those that can be."""
+
+    shards = 3
 
     def __init__(self, folder: Path, seed: int) -> None:
         self._other: torture.Server | None = None

@@ -116,7 +116,9 @@ def killed_at_the_end(server: Server) -> Iterator[None]:
 
 
 class Torture:
-    """A server, its clients, the model, and the faults."""
+    """A server, its clients, the model, and the faults. Subclasses may have hulls divided among `shards`, if they can."""
+
+    shards = 0
 
     def __init__(self, folder: Path, seed: int, writers: int, options: Sequence[str] = (), journal: str = "") -> None:
         self._folder = folder
@@ -127,9 +129,12 @@ class Torture:
         self._proxy = Proxy(self.server.address)
         self.shared = Shared(self._proxy.address)
         self._channel, self._stub = self.shared.stub()
-        persist(self._stub.CreateHull, pb.CreateHullRequest(name=HULL))
+        persist(self._stub.CreateHull, pb.CreateHullRequest(name=HULL, config={"shards": self.shards}))
         for kind in (*TIMED, *FLEETS):
-            persist(self._stub.CreateHull, pb.CreateHullRequest(name=kind.name, config=kind.config()))
+            config = kind.config()
+            if kind in TIMED and not kind.geographic and not kind.max_points:
+                config.shards = self.shards
+            persist(self._stub.CreateHull, pb.CreateHullRequest(name=kind.name, config=config))
         points = [PointWriter(self.shared, i, HULL, seed + i) for i in range(writers)]
         timed = [TimedWriter(self.shared, kind, seed + i) for i, kind in enumerate(TIMED)]
         shuttles = [Shuttle(self.shared, i, seed + i) for i in range(2)]

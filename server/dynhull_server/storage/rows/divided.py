@@ -9,7 +9,7 @@ from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ...state.records import STEPS, HullRow, Record
+from ...state.records import EPOCHS, STEPS, HullRow, Record
 from ..port import DamagedError, StorageError
 from .encoding import checksum, decode, weight
 from .ledger import DropNewest, DropSnapshot, HullRows, Ledger
@@ -86,6 +86,13 @@ def wholes(parts: Sequence[Part], before: Mapping[str, int]) -> Iterator[Whole]:
                         raise NoLongerKeptError(f"hull {root.row.name!r} has other shards than before")
                     raise DamagedError(f"shard {shard} of hull {root.row.name!r} is missing: restore a backup")
             yield whole
+
+
+def latest_epoch(part: Part) -> int:
+    """The latest epoch of a root that the shards in a database know of; 0 for none. O(their points)."""
+    shards = [hull for hull in part.ledger.hulls.values() if hull.row.settings.shard is not None]
+    known = (read_hull(part.reader, hull, hull.last).sequences.get(EPOCHS, 0) for hull in shards)
+    return max(known, default=0)
 
 
 def dropping(reader: Reader, hull: HullRows, last: int) -> list[DropSnapshot | DropNewest]:

@@ -55,6 +55,7 @@ class RowStorage(ABC):
 
     immediate = False
     keeps = True
+    epoch = 0
 
     def __init__(self) -> None:
         self._ledger = Ledger()
