@@ -1,12 +1,13 @@
 """How long a hull of a cluster is away: when its partition is moved, and when its worker or its node is killed.
 
     python benchmarks/cluster_pauses.py --points 1000000
+    python benchmarks/cluster_pauses.py --points 1000000 --shards 4
     python benchmarks/cluster_pauses.py --points 1000000 --ray
 
-Two servers on this machine share a PostgreSQL of their own, and one partition. A caller writes numbered batches of one
-point to one hull, each as soon as the one before is acknowledged. Prints the longest wait around each event, and the
-median of all waits. With --ray, Ray has started the servers, each on a node of its own, and the raylet of the one that
-has the partition is killed; callers use the other one.
+Two servers on this machine share a PostgreSQL of their own, and one partition, or as many as the hull has shards. A
+caller writes numbered batches of one point to one hull, each as soon as the one before is acknowledged. Prints the
+longest wait around each event, and the median of all waits. With --ray, Ray has started the servers, each on a node of
+its own, and the raylet of the one that has the partition is killed; callers use the other one.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,60 +32,74 @@ from server_process import run, server_process
 from steady_writer import SteadyWriter
 
 from dynhull_client import HullClient
+from dynhull_cluster.placement import worker_of
 
 HULL = "hull"
 CHUNK = 100_000
-OWNER = "SELECT epoch, worker FROM owners WHERE until > '-infinity' AND address <> ''"
+OWNER = "SELECT epoch, worker FROM owners WHERE partition = %s AND until > '-infinity' AND address <> ''"
 # Seconds of writing before and after each event.
 BEFORE, AFTER = 1.0, 0.5
 
 
-OPTIONS = ("--partitions", "1", "--scrub-cpu", "0", "--log-level", "error")
+def options(partitions: int) -> tuple[str, ...]:
+    """Those of a server."""
+    return ("--partitions", str(partitions), "--scrub-cpu", "0", "--log-level", "error")
 
 
-def fill(address: str, points: int) -> None:
+def fill(address: str, points: int, shards: int) -> None:
     """A hull of that many points."""
     with HullClient(address, retries=1000) as client:
-        client.create_hull(HULL)
+        client.create_hull(HULL, shards=shards)
         random = np.random.default_rng(1)
-        for first in range(0, points, CHUNK):
-            client.apply(HULL, insert=random.normal(size=(min(CHUNK, points - first), 2)))
+        for number, first in enumerate(range(0, points, CHUNK), 1):
+            some = random.normal(size=(min(CHUNK, points - first), 2))
+            client.apply(HULL, insert=some, producer="first", sequence=number)
 
 
 class Cluster:
     """Two servers."""
 
-    def __init__(self, stack: ExitStack, url: str, points: int) -> None:
+    def __init__(self, stack: ExitStack, url: str, points: int, shards: int) -> None:
         self.url = url
-        options = ("--cluster", "--journal", url, *OPTIONS)
-        self.servers = [stack.enter_context(server_process(*options, complaints=None, killed=True)) for _ in range(2)]
-        fill(self.address, points)
+        partitions = max(1, shards)
+        serve = ("--cluster", "--journal", url, *options(partitions))
+        self.servers = [stack.enter_context(server_process(*serve, complaints=None, killed=True)) for _ in range(2)]
+        fill(self.address, points, shards)
+        self.partition = worker_of(HULL, partitions)  # of the hull, or of its root and the first shard
+        self.beside = (self.partition + 1) % partitions  # of another shard
 
     @property
     def address(self) -> str:
         return self.servers[0].address
 
-    def move(self) -> None:
-        """The partition, to the worker that does not have it."""
-        epoch, before = owner(self.url)
+    def move(self, partition: int) -> None:
+        """A partition, to the worker that does not have it."""
+        epoch, before = owner(self.url, partition)
         workers = [name for (name,) in query(self.url, "SELECT worker FROM workers")]
-        run("cluster", "move", 0, next(each for each in workers if each != before), "--journal", self.url)
-        wait_until(lambda: owner(self.url)[0] > epoch)
+        run("cluster", "move", partition, next(each for each in workers if each != before), "--journal", self.url)
+        wait_until(lambda: owner(self.url, partition)[0] > epoch)
 
     def kill(self) -> None:
         """The worker that has the partition. Its server starts it again."""
-        epoch, name = owner(self.url)
+        epoch, name = owner(self.url, self.partition)
         server = next(each for each in self.servers if name.partition("/")[0].endswith(f"-{each.process.pid}"))
         os.kill(processes(server.process.pid)["worker-0"], signal.SIGKILL)
-        wait_until(lambda: owner(self.url)[0] > epoch)
+        wait_until(lambda: owner(self.url, self.partition)[0] > epoch)
+
+    def events(self) -> dict[str, Callable[[], None]]:
+        """What is measured."""
+        found = {"the partition is moved": partial(self.move, self.partition), "its worker is killed": self.kill}
+        if self.beside != self.partition:
+            found["the partition of another shard is moved"] = partial(self.move, self.beside)
+        return found
 
 
-def owner(url: str) -> tuple[int, str]:
-    """The epoch and the name of the worker that serves the partition."""
+def owner(url: str, partition: int = 0) -> tuple[int, str]:
+    """The epoch and the name of the worker that serves a partition."""
     rows: list[tuple[int, str]] = []
 
     def found() -> bool:
-        rows[:] = query(url, OWNER)
+        rows[:] = query(url, OWNER, partition)
         return bool(rows)
 
     wait_until(found)
@@ -113,11 +129,11 @@ def killed_node(url: str, points: int) -> tuple[float, float]:
         from dynhull_cluster.machines import launcher
 
         launcher.start_ray()
-        launcher.scale(2, ["--port", "0", "--insecure", *OPTIONS], {"DYNHULL_JOURNAL": url}, "")
+        launcher.scale(2, ["--port", "0", "--insecure", *options(1)], {"DYNHULL_JOURNAL": url}, "")
         actors = list(launcher.servers().values())
         addresses = [said.split()[-1] for said in ray.get([each.serving.remote() for each in actors])]
         processes = [server for _, server in ray.get([each.processes.remote() for each in actors])]
-        fill(addresses[0], points)
+        fill(addresses[0], points, shards=0)
         epoch, name = owner(url)
         which = next(i for i, each in enumerate(processes) if name.partition("/")[0].endswith(f"-{each}"))
         node = next(each for each in nodes if processes[which] in each.servers())
@@ -143,17 +159,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure how long a hull is away.")
     parser.add_argument("--points", type=int, default=1_000_000)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--shards", type=int, default=0, help="divide the hull among shards, each in a partition")
     parser.add_argument("--ray", action="store_true", help="kill nodes of Ray, which take long to start")
-    options = parser.parse_args()
-    print(f"{options.points:,} points; milliseconds until a batch is acknowledged", flush=True)
+    given = parser.parse_args()
+    print(f"{given.points:,} points; milliseconds until a batch is acknowledged", flush=True)
     with postgresql("shared_buffers=256MB", "autovacuum=off") as database, ExitStack() as stack:
-        if options.ray:
-            pauses = [killed_node(database.new_database(), options.points) for _ in range(options.rounds)]
+        if given.ray:
+            pauses = [killed_node(database.new_database(), given.points) for _ in range(given.rounds)]
             show("its node is killed", pauses)
             return
-        cluster = Cluster(stack, database.new_database(), options.points)
-        for what, event in {"the partition is moved": cluster.move, "its worker is killed": cluster.kill}.items():
-            show(what, [measured(cluster.address, event) for _ in range(options.rounds)])
+        cluster = Cluster(stack, database.new_database(), given.points, given.shards)
+        for what, event in cluster.events().items():
+            show(what, [measured(cluster.address, event) for _ in range(given.rounds)])
         for server in cluster.servers:
             server.process.kill()
 

@@ -116,7 +116,7 @@ def killed_at_the_end(server: Server) -> Iterator[None]:
 
 
 class Torture:
-    """A server, its clients, the model, and the faults. Subclasses may have hulls divided among `shards`, if they can."""
+    """A server, its clients, the model, and the faults. Of a subclass with `shards`, hulls that can be divided are."""
 
     shards = 0
 
