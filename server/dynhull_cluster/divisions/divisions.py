@@ -69,8 +69,6 @@ class ServedDivisions:
         self._engine: Engine | None = None
         self._roots: dict[str, ServedRoot] = {}
         self._shards: dict[tuple[str, Place], LocalShard] = {}
-        self._creating = asyncio.Lock()
-        self._new: dict[tuple[str, Place], HullRow] = {}  # whose creation has begun
         self._ending: set[asyncio.Task[None]] = set()
 
     # What the engine asks
@@ -158,7 +156,7 @@ class ServedDivisions:
                 return Greeted(await shard.epoch())
             case Letter():
                 known = self._shards.get((letter.uid, Place(letter.generation, letter.shard)))
-                if known is None:
+                if known is None or not known.stored:
                     raise PeerAwayError("there is no such shard")
                 return Answer(await known.receive(letter.message))
             case Wanted():
@@ -172,16 +170,14 @@ class ServedDivisions:
         """The shard of a root, a new one if there is none."""
         settings = greeting.settings
         key = greeting.uid, place_of(settings)
-        async with self._creating:
-            if key not in self._shards:
-                engine = self._started
-                if key not in self._new:  # a caller that goes away, or a failure, leaves it to the next greeting
-                    name = name_of_shard(greeting.name, *key)
-                    number = engine.core.number_of_shard()
-                    self._new[key] = HullRow(number, name, greeting.uid, greeting.created, settings)
-                await engine.add_shard(self._new[key])
-                self._shards[key] = LocalShard(engine, self._new.pop(key))
-        return self._shards[key]
+        shard = self._shards.get(key)
+        if shard is None:
+            engine = self._started
+            name, number = name_of_shard(greeting.name, *key), engine.core.number_of_shard()
+            row = HullRow(number, name, greeting.uid, greeting.created, settings)
+            shard = self._shards[key] = LocalShard(engine, row, stored=False)
+        await shard.store()
+        return shard
 
     # What roots and shards ask of each other
 

@@ -18,16 +18,19 @@ class LocalShard:
     Args:
         engine: has the storage.
         row: the row of the shard.
+        stored: whether it is certain that the storage has it.
 
     Attributes:
         row: the row of the shard.
+        stored: the same.
         number: its number in the storage.
         points: the number of its points.
         unsaved: the number of points in steps since the last snapshot.
     """
 
-    def __init__(self, engine: Engine, row: HullRow) -> None:
+    def __init__(self, engine: Engine, row: HullRow, *, stored: bool = True) -> None:
         self.row = row
+        self.stored = stored
         self.number = row.number
         self.points = self.unsaved = 0
         self._engine = engine
@@ -37,6 +40,12 @@ class LocalShard:
         self._saved = 0
         self._snapshot_wanted = False
         self._taken: tuple[Kept, int] | None = None
+
+    async def store(self) -> None:
+        """Put it into the storage; again where an earlier attempt has failed, or its caller has gone."""
+        if not self.stored:
+            await self._engine.add_shard(self.row)
+            self.stored = True
 
     async def epoch(self) -> int:
         """The last epoch that was begun."""
