@@ -16,7 +16,7 @@ READS = {
     f"/{service.full_name}/{method.name}"
     for service in (DESCRIPTOR, FENCES)
     for method in service.methods
-    if method.name not in FINISHED - LISTS and not method.client_streaming
+    if method.name not in FINISHED - LISTS and (not method.client_streaming or method.name == "Query")
 }
 
 

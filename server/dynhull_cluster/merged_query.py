@@ -140,16 +140,24 @@ def _waits(read: pb.Read) -> bool:
 
 
 class _WorkerAnswers:
-    """The call of one worker."""
+    """The answers of one worker, or of those that replace it: reads that it leaves unanswered are asked again."""
 
     def __init__(self, link: WorkerLink, call: Call) -> None:
-        self._stream: Upstream | None = None
+        self._link = link
+        self._call = call
+        self._writing = asyncio.Lock()
+        self._unanswered: deque[pb.Read] = deque()
         self._answers: deque[pb.ReadAnswer] = deque()
+        self._stream: Upstream | None = None
         self._failure: RelayedError | WorkerAwayError | None = None
+        self._until: float | None = None  # when waiting for another worker is in vain
+        self._connect()
+
+    def _connect(self) -> None:
         try:
-            self._stream = link.stream(QUERY, metadata_of(call))
+            self._stream, self._failure = self._link.stream(QUERY, metadata_of(self._call)), None
         except WorkerAwayError as error:
-            self._failure = error
+            self._stream, self._failure = None, error
 
     @property
     def over(self) -> bool:
@@ -158,28 +166,43 @@ class _WorkerAnswers:
 
     async def send(self, part: pb.QueryRequest) -> None:
         """Send reads. An error is that of their answers."""
-        if self._stream is not None:
-            await self._stream.write(part.SerializeToString())
+        async with self._writing:
+            self._unanswered.extend(part.reads)
+            if self._stream is not None:
+                await self._stream.write(part.SerializeToString())
 
     async def next(self) -> pb.ReadAnswer:
         """The next answer. Raises RelayedError if the call ends for another reason than that the worker does."""
         while not self._answers:
             if self._failure is None:
-                assert self._stream is not None  # otherwise there is a failure
-                try:
-                    response = await self._stream.read()
-                except RelayedError as error:
-                    if error.status.code != grpc.StatusCode.UNAVAILABLE.value[0]:
-                        raise
-                    self._failure = error
-                else:
-                    assert response is not None  # it reads for as long as it is sent reads
-                    self._answers.extend(pb.QueryResponse.FromString(response).answers)
-                    continue
-            answer = pb.ReadAnswer()
-            answer.error.MergeFromString(error_status(self._failure).SerializeToString())
-            return answer
+                await self._read()
+                continue
+            try:
+                self._until = await self._link.again(QUERY, b"", self._failure, self._until)
+            except (RelayedError, WorkerAwayError) as error:
+                answer = pb.ReadAnswer()
+                answer.error.MergeFromString(error_status(error).SerializeToString())
+                return answer
+            await self._link.arrive()
+            async with self._writing:
+                self._connect()
+                if self._stream is not None and self._unanswered:
+                    await self._stream.write(pb.QueryRequest(reads=self._unanswered).SerializeToString())
+        self._unanswered.popleft()
         return self._answers.popleft()
+
+    async def _read(self) -> None:
+        assert self._stream is not None  # otherwise there is a failure
+        try:
+            response = await self._stream.read()
+        except RelayedError as error:
+            if error.status.code != grpc.StatusCode.UNAVAILABLE.value[0]:
+                raise
+            self._failure = error
+        else:
+            assert response is not None  # it reads for as long as it is sent reads
+            self._answers.extend(pb.QueryResponse.FromString(response).answers)
+            self._until = None
 
     def close(self) -> None:
         """End the call."""

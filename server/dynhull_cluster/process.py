@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from secrets import token_hex
 
 from dynhull_server import logs
 from dynhull_server.app import metrics_page, token_file
@@ -68,7 +69,8 @@ async def _serve(settings: Settings) -> None:
         sockets = socket_folder(settings.data if in_folder else None)
         opened.callback(shutil.rmtree, sockets, ignore_errors=True)
         own = settings.model_copy(update={"port": port})
-        site = f"{socket.gethostname()}-{os.getpid()}"  # what the processes of this server have in common
+        # Copies of a machine and containers have the same names and numbers.
+        site = f"{socket.gethostname()}-{os.getpid()}-{token_hex(2)}"
         begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets), "site": site}
         processes = Processes(
             [ChildProcess(f"worker-{i}", begin, settings.grace) for i in range(workers)],

@@ -117,21 +117,33 @@ class WorkerLink:
             WorkerAwayError: the worker is away; it has not seen the request.
             RelayedError: the worker refuses it, or has ended meanwhile.
         """
-        if not self._ways.patience:
-            return await self._ask(method, call, message)
-        loop = asyncio.get_running_loop()
-        until = loop.time() + self._ways.patience
+        until: float | None = None
         while True:
             try:
                 await self.arrive()
                 return await self._ask(method, call, message)
-            except WorkerAwayError:
-                if loop.time() > until:
-                    raise
-            except RelayedError as error:
-                if loop.time() > until or not may_repeat(method, message, error.status):
-                    raise
-            await _until(self._again)
+            except (WorkerAwayError, RelayedError) as error:
+                until = await self.again(method, message, error, until)
+
+    async def again(
+        self, method: str, message: bytes, error: WorkerAwayError | RelayedError, until: float | None
+    ) -> float:
+        """Wait until a request that has failed may succeed; raises its error if that is in vain or not allowed.
+
+        Args:
+            method: the path of the method.
+            message: the request.
+            error: the error.
+            until: what this returned for the error before it, None for the first: when it is in vain.
+        """
+        now = asyncio.get_running_loop().time()
+        if until is None:
+            until = now + self._ways.patience
+        repeatable = isinstance(error, WorkerAwayError) or may_repeat(method, message, error.status)
+        if not self._ways.patience or now > until or not repeatable:
+            raise error
+        await _until(self._again)
+        return until
 
     async def _ask(self, method: str, call: Call, message: bytes) -> bytes:
         frames = self._present().frames

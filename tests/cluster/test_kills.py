@@ -11,6 +11,7 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
+from client_kinds import CLIENTS
 from cluster import descendants, processes
 from command_line import dynhull
 from forked import COMMAND
@@ -54,6 +55,25 @@ def forking(server: Server) -> int:
 def again(name: str, server: Server, killed: int) -> None:
     """Wait until a process is there again, as another one."""
     wait_until(lambda: processes(server.process.pid).get(name, killed) != killed)
+
+
+@pytest.mark.parametrize("connect", CLIENTS.values(), ids=CLIENTS)
+def test_reads_of_a_pipeline_wait_for_a_killed_worker_and_stay_in_order(
+    server: Server, connect: type[HullClient]
+) -> None:
+    worker = processes(server.process.pid)["worker-0"]
+    with connect(server.address, retries=1000) as client, client.pipeline(batch_reads=4) as pipeline:
+        asked = [pipeline.get_hull(name) for name in NAMES * 10]
+        os.kill(worker, signal.SIGKILL)
+        asked += [pipeline.get_hull(name) for name in NAMES * 10]
+        client.apply(NAMES[1], insert=[[0, 0]])
+        asked += [pipeline.get_hull(name) for name in NAMES * 10]
+        found = [each.result() for each in asked]
+        assert [each.info.name for each in found] == list(NAMES * 30)
+        for first in range(2):
+            revisions = [each.revision for each in found[first::2]]
+            assert revisions == sorted(revisions)
+    again("worker-0", server, worker)
 
 
 def test_a_killed_worker_comes_back_and_the_others_go_on(server: Server) -> None:

@@ -1,6 +1,7 @@
 """`dynhull serve --cluster`: servers that share a database serve all of its hulls together, and replace each other."""
 
 import os
+import re
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -74,7 +75,22 @@ def test_machines_come_and_go_and_callers_notice_only_that_some_calls_take_longe
         assert apply_all(other, sequence) == [sequence] * len(NAMES)
         (left,) = served(url)
         assert left in before
+        # Two servers may have the same host name and number, in containers or on copies of a machine.
+        assert all(re.fullmatch(rf"{re.escape(socket.gethostname())}-\d+-[0-9a-f]{{4}}/0", each) for each in before)
         assert all(other.verify(name).equal for name in NAMES)
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_reads_of_a_pipeline_wait_while_partitions_move(url: str) -> None:
+    with machine(url) as first, machine(url) as second, HullClient(second.address, retries=0) as client:
+        assert apply_all(client, 1) == [1] * len(NAMES)
+        wait_until(lambda: sorted(served(url).values()) == [2, 2])
+        with client.pipeline(batch_reads=4) as pipeline:
+            first.process.terminate()
+            asked = [pipeline.get_hull(name) for name in NAMES]
+            while first.process.poll() is None:
+                asked += [pipeline.get_hull(name) for name in NAMES]
+        assert [each.result().info.name for each in asked] == NAMES * (len(asked) // len(NAMES))
 
 
 @pytest.mark.one_process("a cluster has a shape of its own")

@@ -57,7 +57,7 @@ class Pair:
 
     def process(self, worker: str) -> int:
         """The number of its process."""
-        server = next(each for each in self.servers if worker.partition("/")[0].endswith(f"-{each.process.pid}"))
+        server = next(each for each in self.servers if f"-{each.process.pid}-" in worker)
         return processes(server.process.pid)["worker-0"]
 
     def order(self, worker: str) -> None:

@@ -153,6 +153,8 @@ class AsyncPipeline:
         try:
             async for response in call:  # `read` leaves out answers that are there when a write has failed
                 self._settle(self._questions.answer(response))
+                if self._questions.refusal is not None:
+                    return self._questions.refusal
         except grpc.RpcError as failure:
             return error_of(failure)
         finally:

@@ -51,7 +51,7 @@ class Pipeline:
 
     A context manager for one use: leaving it waits for all answers; leaving it with an exception cancels the reads that
     are not answered. After a lost connection, the reads that are not answered are sent again, as often as the client
-    repeats calls. Threads may share a pipeline.
+    repeats calls; so are a read whose hull is away for the moment, and those after it. Threads may share a pipeline.
     """
 
     def __init__(self, connection: BlockingConnection, piping: Piping) -> None:
@@ -160,6 +160,9 @@ class Pipeline:
                 with self._turn:
                     answered = self._questions.answer(response)
                 self._settle(answered)
+                if self._questions.refusal is not None:
+                    call.cancel()
+                    return self._questions.refusal
         except DynhullError as error:
             return error
         except grpc.RpcError as failure:

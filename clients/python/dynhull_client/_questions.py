@@ -52,10 +52,13 @@ class Questions(Generic[Future]):
     Attributes:
         added: the number of reads added.
         settled: the number of reads whose futures have a result; its owner counts them.
+        refusal: the error of a read whose hull is away for the moment: its owner ends the connection with it. So the
+            read and those after it are sent again, and answers stay in order.
     """
 
     def __init__(self, piping: Piping, retries: int, new_outcome: Callable[[], Future]) -> None:
         self.added = self.settled = 0
+        self.refusal: DynhullError | None = None
         self._piping = piping
         self._retries = retries
         self._new_outcome = new_outcome
@@ -63,6 +66,7 @@ class Questions(Generic[Future]):
         self._under_way: deque[Question[Future]] = deque()
         self._alone = 0  # the number of reads to send one a message, because one of them was refused with its message
         self._lost = 0
+        self._away = ""  # the hull that has the connections end, if it is one
         self._pauses = pauses()
 
     @property
@@ -108,16 +112,24 @@ class Questions(Generic[Future]):
         for answer in response.answers:
             if not self._under_way:  # given up while the response was on its way
                 break
-            question = self._under_way.popleft()
-            answered.append((question.outcome, _decoded(question, answer)))
-        if answered:
-            self._alone = max(self._alone - len(answered), 0)
-            if self._lost:
-                self._lost, self._pauses = 0, pauses()
+            question = self._under_way[0]
+            name, found = getattr(question.call.request, "name", ""), _decoded(question, answer)
+            if isinstance(found, DynhullError) and passes(found):
+                if self._lost < self._retries:
+                    self.refusal, self._away = found, name
+                    break
+            elif self._away in ("", name):
+                self._begin_anew()
+            self._under_way.popleft()
+            answered.append((question.outcome, found))
+        self._alone = max(self._alone - len(answered), 0)
         return answered
 
     def lost(self, error: DynhullError) -> tuple[Answered, float]:
         """Handle the end of a connection: which reads it settles, and the seconds until the next connection."""
+        if self.refusal is None and self._away:
+            self._begin_anew()
+        self.refusal = None
         if (passes(error) or _unexplained(error)) and self._lost < self._retries:
             self._lost += 1
             if _unexplained(error):  # sending one read a message finds out which is at fault
@@ -126,7 +138,7 @@ class Questions(Generic[Future]):
             return [], next(self._pauses)
         if self._under_way and (_too_large(error) or (_unexplained(error) and self._alone)):
             return self._refuse(error), 0.0
-        self._lost, self._pauses = 0, pauses()
+        self._begin_anew()
         return self.give_up(error), 0.0
 
     def give_up(self, error: DynhullError) -> Answered:
@@ -136,6 +148,11 @@ class Questions(Generic[Future]):
         self._waiting.clear()
         self._alone = 0
         return left
+
+    def _begin_anew(self) -> None:
+        """Count from 0 how often connections have ended in a row."""
+        if self._lost:
+            self._lost, self._away, self._pauses = 0, "", pauses()
 
     def _refuse(self, error: DynhullError) -> Answered:
         """The first message under way is too large: the only read of it is at fault, or each must be tried."""
