@@ -82,7 +82,7 @@ class Cluster:
     def kill(self) -> None:
         """The worker that has the partition. Its server starts it again."""
         epoch, name = owner(self.url, self.partition)
-        server = next(each for each in self.servers if name.partition("/")[0].endswith(f"-{each.process.pid}"))
+        server = next(each for each in self.servers if f"-{each.process.pid}-" in name)
         os.kill(processes(server.process.pid)["worker-0"], signal.SIGKILL)
         wait_until(lambda: owner(self.url, self.partition)[0] > epoch)
 
@@ -135,7 +135,7 @@ def killed_node(url: str, points: int) -> tuple[float, float]:
         processes = [server for _, server in ray.get([each.processes.remote() for each in actors])]
         fill(addresses[0], points, shards=0)
         epoch, name = owner(url)
-        which = next(i for i, each in enumerate(processes) if name.partition("/")[0].endswith(f"-{each}"))
+        which = next(i for i, each in enumerate(processes) if f"-{each}-" in name)
         node = next(each for each in nodes if processes[which] in each.servers())
 
         def kill() -> None:

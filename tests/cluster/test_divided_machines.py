@@ -70,7 +70,7 @@ class Fleet:
 
     def process(self, worker: str) -> int:
         """The number of the process of a worker; 0 while there is none."""
-        server = next(each for each in self.servers if worker.partition("/")[0].endswith(f"-{each.process.pid}"))
+        server = next(each for each in self.servers if f"-{each.process.pid}-" in worker)
         return processes(server.process.pid).get("worker-0", 0)
 
     def move(self, partition: int, worker: str) -> None:
@@ -114,7 +114,7 @@ def fleet(postgres: PostgreSQL) -> Iterator[Fleet]:
 
 def test_every_partition_moves_to_and_fro_and_nobody_complains(postgres: PostgreSQL) -> None:
     url = postgres.new_database()
-    with two_servers(url, "") as servers, HullClient(servers[0].address) as client:
+    with two_servers(url, "") as servers, HullClient(servers[0].address, retries=1000) as client:
         fleet, copy = Fleet(url, servers, "fleet"), HullCopy()
         over = threading.Event()
 
@@ -183,7 +183,7 @@ def test_servers_come_and_go(postgres: PostgreSQL) -> None:
         fleet = Fleet(url, [left], "fleet")
         wait_until(lambda: len(set(fleet.owners())) == 4)
         fleet.writer.more()
-        name = next(each for each in fleet.owners() if each.partition("/")[0].endswith(f"-{drained.process.pid}"))
+        name = next(each for each in fleet.owners() if f"-{drained.process.pid}-" in each)
         assert dynhull("cluster", "drain", name, "--journal", url).exit_code == 0
         wait_until(lambda: len(set(fleet.owners())) == 3)
         stopped.process.terminate()
@@ -226,6 +226,22 @@ def test_the_shards_of_a_deleted_hull_are_deleted(fleet: Fleet) -> None:
         client.create_hull(fleet.hull, shards=2)
         client.apply(fleet.hull, insert=[[3, 4]])
         assert client.sample_points(fleet.hull, 9).points.tolist() == [[3, 4]]
+
+
+def test_a_dump_beside_writes_is_of_one_revision(fleet: Fleet, postgres: PostgreSQL, tmp_path: Path) -> None:
+    fleet.writer.more()
+    before = len(fleet.writer.revisions)
+    copy = postgres.restored_copy(fleet.url, tmp_path)
+    fleet.writer.more()
+    with server_process(*machine(copy)) as server, HullClient(server.address, retries=1000) as client:
+        info = client.get_hull(fleet.hull).info
+        written = info.revision - 1
+        assert before <= written <= len(fleet.writer.revisions)
+        assert info.points == len(POINTS) + written
+        assert client.verify(fleet.hull).equal
+        counts = client.count(fleet.hull, [SteadyWriter.point(each) for each in range(1, written + 2)]).counts
+        assert counts.tolist() == [1] * written + [0]
+        assert client.apply(fleet.hull, insert=[[1, 1]]).revision == info.revision + 1
 
 
 def test_machines_with_addresses_of_their_own_use_tls(postgres: PostgreSQL, tmp_path: Path) -> None:
@@ -273,8 +289,7 @@ def test_a_database_goes_from_workers_to_a_cluster_into_a_folder_and_back(postgr
         assert done.exit_code == 0, done.stderr
 
     grow(*workers, "--journal", first)
-    for _ in range(3):  # so that its owners have greater numbers than those of the next database would have
-        grow(*machine(first))
+    grow(*machine(first))  # its owners have greater numbers now than those of the next database would have
     move(first, folder)
     grow(*workers, "--data", str(folder))
     move(folder, second)

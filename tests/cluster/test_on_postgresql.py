@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from cluster import processes
 from command_line import dynhull
 from metrics import scrape
 from patience import PATIENCE, wait_until
-from postgresql import PostgreSQL, postgres_program, query
+from postgresql import PostgreSQL, query
 from proxy import proxy
 from psycopg.conninfo import conninfo_to_dict
 from server_process import run, server_process
@@ -81,22 +80,12 @@ def test_a_killed_server_its_backup_and_the_next_one_have_the_same(
         server.process.kill()
     with server_process("--journal", url, *QUIET) as server, HullClient(server.address) as client:
         assert state(client) == before
-    restored = restored_copy(postgres, url, tmp_path)
+    restored = postgres.restored_copy(url, tmp_path)
     with server_process("--journal", restored, *QUIET) as server, HullClient(server.address) as client:
         assert state(client) == before
         assert client.apply("points", insert=[[9, 9]], producer="p", sequence=1).duplicate
         assert client.apply("points", insert=[[9, 9]], producer="p", sequence=2).revision == 2
         assert client.verify("points").equal
-
-
-def restored_copy(postgres: PostgreSQL, url: str, folder: Path) -> str:
-    """A backup as the page makes it, in a database of its own."""
-    file = folder / "hulls.dump"
-    dump = ["--format", "custom", "--schema", "dynhull", "--file", file, url]
-    subprocess.run([postgres_program("pg_dump"), *dump], check=True)
-    copy = postgres.new_database()
-    subprocess.run([postgres_program("pg_restore"), "--dbname", copy, file], check=True)
-    return copy
 
 
 def test_workers_are_killed_and_have_their_partitions_again(url: str) -> None:

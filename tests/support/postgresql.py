@@ -95,6 +95,15 @@ class PostgreSQL:
         self.query(f"CREATE DATABASE {name} TEMPLATE {template}", database="postgres")
         return self.url(name)
 
+    def restored_copy(self, url: str, folder: Path) -> str:
+        """A backup as the page makes it, in a database of its own."""
+        file = folder / "hulls.dump"
+        dump = ["--format", "custom", "--schema", "dynhull", "--file", file, url]
+        subprocess.run([postgres_program("pg_dump"), *dump], check=True)
+        copy = self.new_database()
+        subprocess.run([postgres_program("pg_restore"), "--dbname", copy, file], check=True)
+        return copy
+
     def query(self, sql: str, *values: object, database: str) -> list[Any]:
         """The rows of a query, in a connection of its own."""
         return query(self.url(database), sql, *values)

@@ -72,7 +72,10 @@ class LocalShard:
         await asyncio.to_thread(self._pool.shutdown)
 
     async def _run(self, function: Any) -> Any:
-        return await asyncio.shield(asyncio.wrap_future(self._pool.submit(function)))
+        """Call a function in the thread of the shard. It goes on without its caller, who asks again."""
+        running = asyncio.wrap_future(self._pool.submit(function))
+        running.add_done_callback(lambda done: done.cancelled() or done.exception())
+        return await asyncio.shield(running)
 
     def _loaded(self) -> tuple[StoredShardLog, Shard]:
         if self._log is None or self._shard is None:

@@ -1,4 +1,4 @@
-"""How a gateway reaches the owners of partitions: at the addresses that they have written into the tables."""
+"""How the owners of partitions are reached, by gateways and by each other: at the addresses that the tables have."""
 
 import asyncio
 import logging
@@ -84,7 +84,7 @@ class Addresses:
                 self._moved[partition]()
 
     async def connect(self, worker: int, make: Callable[[], F]) -> F:
-        """Connect to the owner of a partition, and prove to be a gateway. Raises OSError."""
+        """Connect to the owner of a partition, and prove to be of the cluster. Raises OSError."""
         at = self._at(worker)
         try:
             frames = await self._connect(worker, make, *at)

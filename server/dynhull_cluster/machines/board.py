@@ -34,9 +34,14 @@ log = logging.getLogger(__name__)
 
 TABLES = (
     "CREATE TABLE IF NOT EXISTS cluster (secret text NOT NULL)",
+    "ALTER TABLE cluster ADD COLUMN IF NOT EXISTS database text",
     "CREATE TABLE IF NOT EXISTS workers (worker text PRIMARY KEY, draining boolean, process text, seen timestamptz)",
     "CREATE TABLE IF NOT EXISTS heirs (partition integer PRIMARY KEY, worker text, process text, epoch bigint)",
     "CREATE TABLE IF NOT EXISTS wishes (partition integer PRIMARY KEY, worker text NOT NULL)",
+)
+# Those of a standby are the same, those of what pg_restore has filled are not.
+IDENTITY = (
+    b"SELECT system_identifier || '/' || oid FROM pg_control_system(), pg_database WHERE datname = current_database()"
 )
 OWNERS = b"SELECT partition, epoch, worker, process, address, until::text, until = '-infinity' FROM owners"
 WORKERS = (
@@ -127,11 +132,24 @@ def join(database: Database, partitions: int) -> Cluster:
         for each in TABLES:
             connection.execute(each.encode())
         connection.execute(GONE)
-        found = connection.execute("SELECT secret FROM cluster").fetchone()
-        if found is None:
-            found = (secrets.token_hex(32),)
-            connection.execute("INSERT INTO cluster VALUES (%s)", found)
-    return Cluster(there, found[0])
+        secret = _secret(connection)
+    return Cluster(there, secret)
+
+
+def _secret(connection: Connection) -> str:
+    """The secret of the cluster.
+
+    A copy of a database gets one of its own: its tables name workers of the original, which would take calls for it.
+    """
+    ((database,),) = connection.execute(IDENTITY).fetchall()
+    found = connection.execute("SELECT secret, database FROM cluster").fetchone()
+    secret, known = found or ("", "")
+    if known not in (None, database):
+        secret = secrets.token_hex(32)
+    if known != database:
+        connection.execute("DELETE FROM cluster")
+        connection.execute("INSERT INTO cluster VALUES (%s, %s)", [secret, database])
+    return str(secret)
 
 
 def read(connection: Connection) -> Tables:

@@ -122,7 +122,7 @@ class Torture:
 
     def __init__(self, folder: Path, seed: int, writers: int, options: Sequence[str] = (), journal: str = "") -> None:
         self._folder = folder
-        self._random = random.Random(seed)
+        self._seed, self._random = seed, random.Random(seed)
         self.server = Server(folder, options, journal)
         self.server.start()
         self._started = wall(), time.monotonic()
@@ -399,7 +399,7 @@ class Torture:
         try:
             for i in range(faults):
                 self.round(kinds[i % len(kinds)])
-                print(f"\r{i + 1}/{faults} faults", end="", file=sys.stderr, flush=True)
+                print(f"\rseed {self._seed}, {i + 1}/{faults} faults", end="", file=sys.stderr, flush=True)
         finally:
             self.finish()
 
