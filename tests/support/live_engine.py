@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynhull_server.engine.division import Divisions
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
@@ -20,11 +21,13 @@ NONE = np.empty((0, 2))
 
 
 @asynccontextmanager
-async def engine_in_memory(history_bytes: int = LIMITS.history_bytes) -> AsyncIterator[Engine]:
+async def engine_in_memory(
+    history_bytes: int = LIMITS.history_bytes, divisions: Divisions | None = None
+) -> AsyncIterator[Engine]:
     """An engine whose background work must not fail."""
     machine = Machine()
     supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
-    engine = Engine(replace(LIMITS, history_bytes=history_bytes), MemoryStorage(), supervisor, machine)
+    engine = Engine(replace(LIMITS, history_bytes=history_bytes), MemoryStorage(), supervisor, machine, divisions)
     await engine.start(lambda *_: None)
     yield engine
     await supervisor.stop()

@@ -70,6 +70,7 @@ class ServedDivisions:
         self._roots: dict[str, ServedRoot] = {}
         self._shards: dict[tuple[str, Place], LocalShard] = {}
         self._ending: set[asyncio.Task[None]] = set()
+        self._closed = False
 
     # What the engine asks
 
@@ -102,16 +103,16 @@ class ServedDivisions:
         """Begin with the root of a hull, unless it has begun."""
         if hull.uid not in self._roots:
             greet, deliver = partial(self._greet, hull), partial(self._deliver, hull)
-            self._roots[hull.uid] = ServedRoot(self._started, hull, greet, deliver, self._patience)
+            root = self._roots[hull.uid] = ServedRoot(self._started, hull, greet, deliver, self._patience)
+            if self._closed:  # its creation has just been committed
+                self._end(root)
 
     def end(self, hull: Hull) -> None:
         """The hull is deleted: end its root. Its shards notice."""
         root = self._roots.pop(hull.uid, None)
         if root is not None:
             root.end()
-            task = asyncio.create_task(self._end(root))
-            self._ending.add(task)
-            task.add_done_callback(self._ending.discard)
+            self._end(root)
 
     def carry_out(self, hull: Hull, requests: Sequence[WriteBatch | Expire]) -> None:
         """Carry out requests in this order, and answer them."""
@@ -130,8 +131,8 @@ class ServedDivisions:
 
     async def close(self) -> None:
         """Refuse what waits, and stop."""
-        roots, self._roots = self._roots, {}
-        await asyncio.gather(*(root.close() for root in roots.values()), *self._ending)
+        self._closed = True
+        await asyncio.gather(*(root.close() for root in self._roots.values()), *self._ending)
         await asyncio.gather(*(shard.close() for shard in self._shards.values()))
 
     # What other processes ask
@@ -148,8 +149,8 @@ class ServedDivisions:
             raise
 
     async def _answer(self, letter: Any) -> Any:
-        if self._engine is None:
-            raise PeerAwayError("this worker is starting")
+        if self._engine is None or self._closed:
+            raise PeerAwayError("this worker is starting or stopping")
         match letter:
             case Greeting():
                 shard = await self._found(letter)
@@ -239,5 +240,7 @@ class ServedDivisions:
                     self._shards[key] = LocalShard(self._started, row)
                     raise
 
-    async def _end(self, root: ServedRoot) -> None:
-        await root.close()
+    def _end(self, root: ServedRoot) -> None:
+        task = asyncio.create_task(root.close())
+        self._ending.add(task)
+        task.add_done_callback(self._ending.discard)

@@ -10,6 +10,7 @@ from dynhull_server.state.records import HullRow, Kept
 
 from ..shards.shard import Shard
 from .logs import StoredShardLog
+from .peers import PeerAwayError
 
 
 class LocalShard:
@@ -73,7 +74,11 @@ class LocalShard:
 
     async def _run(self, function: Any) -> Any:
         """Call a function in the thread of the shard. It goes on without its caller, who asks again."""
-        running = asyncio.wrap_future(self._pool.submit(function))
+        try:
+            submitted = self._pool.submit(function)
+        except RuntimeError:  # it is closed
+            raise PeerAwayError("the shard has been ended") from None
+        running = asyncio.wrap_future(submitted)
         running.add_done_callback(lambda done: done.cancelled() or done.exception())
         return await asyncio.shield(running)
 

@@ -91,7 +91,12 @@ class RootThread:
 
     def submit(self, requests: Sequence[Asked]) -> None:
         """Serve requests, in this order."""
-        self._do(partial(self._submit, requests))
+        try:
+            self._call(partial(self._submit, requests))
+        except RuntimeError:  # it is closed
+            _refuse(requests, HullNotFoundError(self._hull.name) if self._hull.ended else StoppingError())
+            for each in requests:
+                each.tell()
 
     def receive(self, place: Place, message: say.Request, reply: say.Reply | None) -> None:
         """Handle the reply of a shard to a message; None where the message came too late."""

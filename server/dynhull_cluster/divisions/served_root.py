@@ -70,6 +70,7 @@ class ServedRoot:
         self._couriers: dict[Place, tuple[say.Request, asyncio.Task[None]]] = {}
         self._unanswered: dict[Place, float] = {}  # since when
         self._away: set[Place] = set()
+        self._closed = False
         self._starting = self._loop.create_task(self._start(FIRST_PAUSE))
 
     # Requests
@@ -183,6 +184,7 @@ class ServedRoot:
 
     async def close(self) -> None:
         """Refuse what waits, and stop."""
+        self._closed = True  # what the thread still completes begins nothing
         self._thread.refuse_all(StoppingError())
         self._starting.cancel()
         for _, courier in self._couriers.values():
@@ -222,6 +224,8 @@ class ServedRoot:
         self._waits, self._generations = turn.waits, turn.generations
         for each in turn.answered:
             each.tell()
+        if self._closed:
+            return
         if turn.opened:
             self._engine.supervisor.succeeded(self._work)
         if turn.failure is not None and self._starting.done():
