@@ -326,7 +326,7 @@ class Fences : public OwnHull {
           if (is_crowded(zone)) crowded_.push_back(number);
           for (const std::uint32_t slot : zone.subjects) {
             const Point p = (*slots_)[slot].place;
-            for (const Edge& edge : near) subjects_.box(slot).keep_off(dynhull::strip_of(area, edge), p);
+            keep_off(slot, area, near);
             if (inside || !(touching.empty() || area.holds(p))) continue;
             members_.add(subjects_[slot].inside, handle);
             ++fence.count;
@@ -334,6 +334,12 @@ class Fences : public OwnHull {
         });
     if (inside)
       for (const std::uint32_t slot : *inside) wait_for(handle, subjects_[slot].zone);
+  }
+  // Makes the box of a subject smaller, so that it keeps off some edges of an area.
+  void keep_off(std::uint32_t slot, const Area& area, std::span<const Edge> edges) {
+    Clearance clearance(subjects_.box(slot), (*slots_)[slot].place);
+    for (const Edge& edge : edges) clearance.keep_off(dynhull::strip_of(area, edge));
+    subjects_.box(slot) = clearance.box();
   }
   // Replaces an area. Edges that stay need no visit, unless several polygons make one of them lie inside of another.
   void replace(std::uint32_t handle, std::shared_ptr<const Area> area) {
@@ -380,11 +386,10 @@ class Fences : public OwnHull {
             append_pieces(zone, handle, *area, near, inside_at(*area, zone.anchor()));
           }
           if (is_crowded(zone)) crowded_.push_back(number);
-          for (const std::uint32_t id : touching) {
-            if (!is_added(id)) continue;
-            const Strip strip = dynhull::strip_of(*area, added[id]);
-            for (const std::uint32_t slot : zone.subjects) subjects_.box(slot).keep_off(strip, (*slots_)[slot].place);
-          }
+          near.clear();
+          for (const std::uint32_t id : touching)
+            if (is_added(id)) near.push_back(added[id]);
+          for (const std::uint32_t slot : zone.subjects) keep_off(slot, *area, near);
         });
     fence.area = std::move(area);
   }

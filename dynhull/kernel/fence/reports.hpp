@@ -203,8 +203,9 @@ class Reports : protected Zoning {
   void settle_strayed(Look look, Then then) {
     if (!zoned_) return;
     strays_.clear();
+    const bool one_batch = batches_ < 2 && gone_.empty();  // then all of them are there, each once
     for (const std::uint32_t number : strayed_)
-      if (current(number)) strays_.push_back({changes_[number].slot});
+      if (one_batch || current(number)) strays_.push_back({changes_[number].slot});
     for (std::size_t from = 0; from < strays_.size(); from += AT_ONCE) {
       const std::size_t count = std::min(AT_ONCE, strays_.size() - from);
       Threads threads(count / STRAYS_A_THREAD);

@@ -10,17 +10,16 @@ namespace dynhull {
 
 constexpr float INFINITE_FLOAT = std::numeric_limits<float>::infinity();
 
-// The floats next to one that is not infinite, or in between.
-inline float next_above(float value) {
+// The next float beyond one that is not infinite, if `moves`. Without a branch, which nothing could predict.
+inline float next_above(float value, bool moves = true) {
   const auto bits = std::bit_cast<std::int32_t>(value + 0.0f);  // of zeros, the positive one
-  return std::bit_cast<float>(bits + (bits < 0 ? -1 : 1));
+  return std::bit_cast<float>(bits + (bits < 0 ? -std::int32_t{moves} : std::int32_t{moves}));
 }
-inline float next_below(float value) { return -next_above(-value); }
 
 // The next float beyond, so that what is rounded on the way to `value` is made good.
 inline float float_above(double value) {
   const float near = static_cast<float>(value);
-  return (near <= value) & (near < INFINITE_FLOAT) ? next_above(near) : near;
+  return next_above(near, (near <= value) & (near < INFINITE_FLOAT));
 }
 inline float float_below(double value) { return -float_above(-value); }
 
@@ -40,12 +39,11 @@ struct SafeBox {
     if (box.greatest.y <= greatest_y && box.greatest.y < INFINITE) greatest_y = float_below(box.greatest.y);
     if (!holds(p)) *this = nowhere();
   }
-  void keep_off(const Strip& strip, Point p);
 
  private:
   static float at_least(double value) {
     const float near = static_cast<float>(value);
-    return near < value ? next_above(near) : near;
+    return next_above(near, near < value);
   }
 };
 
@@ -79,11 +77,11 @@ class Clearance {
 
   SafeBox box() const {
     if (is_close_) return SafeBox::nowhere();
-    SafeBox box = box_;
-    if (right_ < box_.greatest_x - p_.x) box.greatest_x = float_below(p_.x + right_);
-    if (left_ < p_.x - box_.least_x) box.least_x = float_above(p_.x - left_);
-    if (up_ < box_.greatest_y - p_.y) box.greatest_y = float_below(p_.y + up_);
-    if (down_ < p_.y - box_.least_y) box.least_y = float_above(p_.y - down_);
+    const float right = float_below(p_.x + right_), left = float_above(p_.x - left_);
+    const float up = float_below(p_.y + up_), down = float_above(p_.y - down_);
+    const SafeBox box = {
+        left_ < p_.x - box_.least_x ? left : box_.least_x, right_ < box_.greatest_x - p_.x ? right : box_.greatest_x,
+        down_ < p_.y - box_.least_y ? down : box_.least_y, up_ < box_.greatest_y - p_.y ? up : box_.greatest_y};
     return box.holds(p_) ? box : SafeBox::nowhere();
   }
 
@@ -159,11 +157,5 @@ class Clearance {
   double right_, left_, up_, down_;
   bool is_close_;
 };
-
-inline void SafeBox::keep_off(const Strip& strip, Point p) {
-  Clearance clearance(*this, p);
-  clearance.keep_off(strip);
-  *this = clearance.box();
-}
 
 }  // namespace dynhull

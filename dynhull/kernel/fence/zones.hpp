@@ -47,9 +47,11 @@ inline std::optional<bool> inside_after(std::span<const Piece> pieces, Point fro
   return inside;
 }
 
-// A finite point of a box. If it has none, of its closure.
+// A finite point of a box, in the middle if it has one: ways from there are short. If it has none, of its closure.
 inline Point anchor_of(const Box& box) {
   const auto of = [](double least, double greatest) {
+    const double middle = least / 2 + greatest / 2;
+    if (std::isfinite(middle) && least <= middle && middle < greatest) return middle;
     return least > -INFINITE ? least : greatest < INFINITE ? std::nextafter(greatest, -INFINITE) : 0;
   };
   return {of(box.least.x, box.greatest.x), of(box.least.y, box.greatest.y)};
@@ -70,7 +72,7 @@ struct alignas(LINE) Zone {
     for (std::size_t i = 0; i < sizeof(Zone); i += LINE) prefetch(reinterpret_cast<const char*>(this) + i);
   }
   void fetch_pieces() const {
-    const std::size_t bytes = std::min(pieces.size() * sizeof(Piece), std::size_t{8 * LINE});
+    const std::size_t bytes = std::min(pieces.size() * sizeof(Piece), std::size_t{12 * LINE});
     for (std::size_t i = 0; i < bytes; i += LINE) prefetch(reinterpret_cast<const char*>(pieces.data()) + i);
   }
   void fetch_subjects() const { prefetch(&subjects); }
