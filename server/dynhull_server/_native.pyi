@@ -2,8 +2,8 @@
 
 
 
-class Places:
-    """The places of fences in columns, by their numbers."""
+class Numbers:
+    """A dictionary of integers, those of fences, without an object for each."""
 
     def __init__(self) -> None: ...
 
@@ -11,13 +11,13 @@ class Places:
 
     def __contains__(self, arg: int, /) -> bool: ...
 
-    def __getitem__(self, number: int) -> int: ...
+    def __getitem__(self, key: int) -> int: ...
 
-    def __setitem__(self, number: int, place: int) -> None: ...
+    def __setitem__(self, key: int, value: int) -> None: ...
 
-    def pop(self, number: int) -> int: ...
+    def pop(self, key: int) -> int: ...
 
-def numbered(waiting: list[tuple[object, ...]], types: bytes, places: Places, lasts: object, times: object) -> tuple[bytes, bytes, bytes]:
+def numbered(waiting: list[tuple[object, ...]], types: bytes, places: Numbers, lasts: object, times: object) -> tuple[bytes, bytes, bytes]:
     """
     The events of crossings: the bytes of their runs, of themselves, and of what they say of their fences.
     """
@@ -27,17 +27,17 @@ def encoded(runs: object, rows: object, keys: bytes, own: object, names: tuple[s
     Events as the bytes that are stored, without those of members and origins, whose flags are `more`.
     """
 
-def followed(runs: object, places: Places, lasts: object, news: dict[int, int]) -> bool:
+def followed(runs: object, places: Numbers, lasts: object, news: Numbers) -> bool:
     """
     Whether each run follows the last event of its fence; if so, `news` has the new last events.
     """
 
-def own(runs: object, places: Places, subjects: object, names: tuple[int, ...]) -> bytes | None:
+def own(runs: object, places: Numbers, subjects: object, names: tuple[int, ...]) -> bytes | None:
     """
     Of which runs the hull is the one that the fence names; None if a fence does not exist.
     """
 
-def added(runs: object, places: Places, lasts: object, news: object, end: int, row: int) -> None:
+def added(runs: object, places: Numbers, lasts: object, news: object, end: int, row: int) -> None:
     """
     Add runs to the columns of new ones, and set the last events of their fences.
     """

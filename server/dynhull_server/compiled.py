@@ -13,25 +13,25 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 
-class Places(Protocol):
-    """The places of fences in columns, by their numbers: a dictionary, or the class of that name in C++."""
+class Numbers(Protocol):
+    """A dictionary of integers, those of fences: a real one, or the class of that name in C++."""
 
     def __len__(self) -> int: ...
 
-    def __contains__(self, number: int, /) -> bool: ...
+    def __contains__(self, key: int, /) -> bool: ...
 
-    def __getitem__(self, number: int, /) -> int: ...
+    def __getitem__(self, key: int, /) -> int: ...
 
-    def __setitem__(self, number: int, place: int, /) -> None: ...
+    def __setitem__(self, key: int, value: int, /) -> None: ...
 
-    def pop(self, number: int, /) -> int:
-        """Remove a fence, and return its place; KeyError if it is not there."""
+    def pop(self, key: int, /) -> int:
+        """Remove an integer, and return its value; KeyError if it is not there."""
 
 
 class Native(Protocol):
     """The module `dynhull_server._native`. mypy compares it with the module's stub."""
 
-    Places: "type[Any]"
+    Numbers: "type[Any]"
 
     def numbered(
         self,
@@ -59,7 +59,7 @@ class Native(Protocol):
         runs: "npt.NDArray[Any]",
         places: "Any",
         lasts: "npt.NDArray[Any]",
-        news: "dict[int, int]",
+        news: "Any",
     ) -> bool:
         """Whether runs follow the last events of their fences: `FenceRuns.follow` in storage/rows."""
 
@@ -103,3 +103,8 @@ def _load() -> Native | None:
 
 
 native = _load()
+
+
+def numbers() -> Numbers:
+    """No integers."""
+    return {} if native is None else native.Numbers()

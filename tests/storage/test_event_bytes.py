@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from dynhull_server.compiled import native
+from dynhull_server.compiled import native, numbers
 from dynhull_server.state.fences.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.event_block import EventBlock, block_of, joined
 from dynhull_server.state.fences.records import EventType, FenceEvent, FenceRow, Origin
@@ -103,21 +103,25 @@ def test_runs_are_kept_alike_in_both_implementations(monkeypatch: pytest.MonkeyP
         runs = FenceRuns(rows)
         for number in rows:
             runs.begin(number)
-        lasts: dict[int, int] = {}
+        lasts = numbers()
+
+        def so_far() -> dict[int, int]:
+            return {number: lasts[number] for number in rows if number in lasts}
+
         for place in range(30):
             made: dict[int, list[FenceEvent]] = {}
             for number in dice.choices(range(1, 20), k=dice.choice([1, 3, 30])):
-                sequence = lasts.get(number, 0) + len(made.get(number, [])) + 1
+                sequence = so_far().get(number, 0) + len(made.get(number, [])) + 1
                 moment = dice.randrange(3)
                 made.setdefault(number, []).append(event(sequence, dice.choice(HULLS), moment))
             block = block_of(made)
             runs.follow(block, lasts)
-            noted += [runs.own(block).tolist(), dict(sorted(lasts.items()))]
+            noted += [runs.own(block).tolist(), so_far()]
             runs.add(block, place)
             for wrong, error in ((made, ValueError), ({99: [event(1, "fleet", 0)]}, KeyError)):
                 with pytest.raises(error):
                     runs.follow(block_of(wrong), lasts)
-            noted.append(dict(sorted(lasts.items())))
+            noted.append(so_far())
         found = []
         for each in rows.values():
             runs.update(each)

@@ -54,10 +54,14 @@ class Bytes {
     data += text;
   }
   void little(std::uint64_t number, int size) {
-    for (int i = 0; i < size; ++i) byte(static_cast<int>(number >> 8 * i & 255));
+    char bytes[8];
+    put_little(bytes, number, size);
+    data.append(bytes, static_cast<std::size_t>(size));
   }
   void big(std::uint64_t number, int size) {
-    while (size-- > 0) byte(static_cast<int>(number >> 8 * size & 255));
+    char bytes[8];
+    for (int i = 0; i < size; ++i) bytes[i] = static_cast<char>(number >> 8 * (size - 1 - i));
+    data.append(bytes, static_cast<std::size_t>(size));
   }
   void real(double number) { little(bits_of(number), 8); }
 
@@ -91,11 +95,19 @@ class Bytes {
     const int size = bytes_of(static_cast<std::uint64_t>(greatest) - base);
     signed_integer(least);
     byte(size);
-    if (size)
-      for (std::size_t i = 0; i < n; ++i) little(static_cast<std::uint64_t>(of(i)) - base, size);
+    if (size == 0) return;
+    const std::size_t begin = data.size();
+    data.resize(begin + n * static_cast<std::size_t>(size));
+    char* to = data.data() + begin;
+    for (std::size_t i = 0; i < n; ++i, to += size) put_little(to, static_cast<std::uint64_t>(of(i)) - base, size);
   }
   void column(const Integers& numbers) {
     column(numbers.size(), [&](std::size_t i) { return numbers[i]; });
+  }
+
+ private:
+  static void put_little(char* to, std::uint64_t number, int size) {
+    for (int i = 0; i < size; ++i) to[i] = static_cast<char>(number >> 8 * i);
   }
 };
 

@@ -3,11 +3,11 @@
 
 #include <memory>
 #include <string>
-#include <unordered_map>
 #include <utility>
 
 #include "encoding.hpp"
 #include "numbering.hpp"
+#include "numbers.hpp"
 
 namespace nb = nanobind;
 using namespace nanobind::literals;
@@ -114,34 +114,16 @@ nb::bytes bytes(const Value* values, std::size_t count) {
   return nb::bytes(values, count * sizeof(Value));
 }
 
-// The places of fences in columns, by number: a dictionary of integers without an object for each.
-class Places {
- public:
-  std::size_t size() const { return places_.size(); }
-  std::optional<std::int64_t> find(std::int64_t number) const {
-    const auto entry = places_.find(number);
-    return entry == places_.end() ? std::nullopt : std::optional(entry->second);
-  }
-  std::int64_t operator[](std::int64_t number) const {
-    if (const auto place = find(number)) return *place;
-    throw nb::key_error(std::to_string(number).c_str());
-  }
-  void set(std::int64_t number, std::int64_t place) { places_[number] = place; }
-  std::int64_t pop(std::int64_t number) {
-    const std::int64_t place = (*this)[number];
-    places_.erase(number);
-    return place;
-  }
-
- private:
-  std::unordered_map<std::int64_t, std::int64_t> places_;
-};
+std::int64_t value_of(const Numbers& numbers, std::int64_t key) {
+  if (const std::int64_t* const found = numbers.find(key)) return *found;
+  throw nb::key_error(std::to_string(key).c_str());
+}
 
 // The last sequence and time of each fence, from its place in a column of each.
-void look_up(Told& told, const Places& places, const nb::object& lasts, const nb::object& times) {
+void look_up(Told& told, const Numbers& places, const nb::object& lasts, const nb::object& times) {
   const View<std::int64_t> of_lasts(lasts), of_times(times, of_lasts.size());
   for (std::size_t i = 0; i < told.fences.size(); ++i) {
-    const auto place = static_cast<std::size_t>(places[told.fences[i]]);  // KeyError if it is not there
+    const auto place = static_cast<std::size_t>(value_of(places, told.fences[i]));  // KeyError if it is not there
     if (place >= of_lasts.size()) throw nb::value_error("a place outside of the columns");
     told.places[i] = static_cast<std::int64_t>(place);
     told.lasts[i] = of_lasts.data()[place];
@@ -149,7 +131,7 @@ void look_up(Told& told, const Places& places, const nb::object& lasts, const nb
   }
 }
 
-nb::tuple numbered(const nb::list& waiting, const nb::bytes& types, const Places& places, const nb::object& lasts,
+nb::tuple numbered(const nb::list& waiting, const nb::bytes& types, const Numbers& places, const nb::object& lasts,
                    const nb::object& times) {
   if (types.size() != 3) throw nb::value_error("there are three changes of side");
   std::vector<Columns> columns;
@@ -208,53 +190,50 @@ nb::bytes encoded(const nb::object& runs, const nb::object& rows, const nb::byte
   return nb::bytes(out.data.data(), out.data.size());
 }
 
-// The value of an integer in a dictionary; nothing if it is not there.
-std::optional<std::int64_t> value_of(const nb::dict& numbers, std::int64_t key) {
-  PyObject* const value = PyDict_GetItemWithError(numbers.ptr(), nb::int_(key).ptr());
-  if (value) return nb::cast<std::int64_t>(nb::handle(value));
-  if (PyErr_Occurred()) throw nb::python_error();
-  return {};
-}
-
 // Takes note in `news` of the last events of fences, if each run follows the one before; otherwise changes nothing.
-bool followed(const nb::object& runs, const Places& places, const nb::object& lasts, nb::dict news) {
+bool followed(const nb::object& runs, const Numbers& places, const nb::object& lasts, Numbers& news) {
   const View<Run> of_runs(runs);
   const View<std::int64_t> of_lasts(lasts);
-  std::unordered_map<std::int64_t, std::int64_t> found;
+  Numbers found(of_runs.size());
   for (const Run& run : of_runs.values()) {
-    const auto known = found.find(run.fence);
-    std::optional<std::int64_t> last = known == found.end() ? value_of(news, run.fence) : known->second;
+    const std::int64_t* last = found.find(run.fence);
+    if (!last) last = news.find(run.fence);
     if (!last) {
-      const auto place = places.find(run.fence);
+      const std::int64_t* const place = places.find(run.fence);
       if (!place || static_cast<std::size_t>(*place) >= of_lasts.size()) return false;
-      last = of_lasts.data()[*place];
+      last = of_lasts.data() + *place;
     }
     if (run.first != *last + 1) return false;
-    found[run.fence] = *last + run.count;
+    found.set(run.fence, *last + run.count);
   }
-  for (const auto& [fence, last] : found) news[nb::int_(fence)] = last;
+  if (news.size() == 0)
+    std::swap(news, found);
+  else
+    found.for_each([&](std::int64_t fence, std::int64_t last) { news.set(fence, last); });
   return true;
 }
 
 // Of which runs the hull is the one that the fence names; None if a fence does not exist. The columns have the names as
 // numbers, and `names` those of the hulls.
-nb::object own(const nb::object& runs, const Places& places, const nb::object& subjects, const nb::tuple& names) {
+nb::object own(const nb::object& runs, const Numbers& places, const nb::object& subjects, const nb::tuple& names) {
   const View<Run> of_runs(runs);
   const View<std::int64_t> of_subjects(subjects);
+  std::vector<std::int64_t> of_hulls;
+  for (const nb::handle name : names) of_hulls.push_back(nb::cast<std::int64_t>(name));
   std::string found;
+  found.reserve(of_runs.size());
   for (const Run& run : of_runs.values()) {
-    const auto place = places.find(run.fence);
+    const std::int64_t* const place = places.find(run.fence);
     if (!place) return nb::none();
-    if (static_cast<std::size_t>(*place) >= of_subjects.size() || static_cast<std::size_t>(run.hull) >= names.size())
+    if (static_cast<std::size_t>(*place) >= of_subjects.size() || static_cast<std::size_t>(run.hull) >= of_hulls.size())
       throw nb::value_error("a place outside of the columns");
-    const auto name = nb::cast<std::int64_t>(names[static_cast<std::size_t>(run.hull)]);
-    found.push_back(of_subjects.data()[*place] == name);
+    found.push_back(of_subjects.data()[*place] == of_hulls[static_cast<std::size_t>(run.hull)]);
   }
   return nb::bytes(found.data(), found.size());
 }
 
 // Adds runs to the three columns of new ones, from `end` on, and sets the last events of their fences.
-void added(const nb::object& runs, const Places& places, const nb::object& lasts, const nb::object& news,
+void added(const nb::object& runs, const Numbers& places, const nb::object& lasts, const nb::object& news,
            std::size_t end, std::int64_t row) {
   const View<Run> of_runs(runs);
   const Room of_lasts(lasts), of_news(news);
@@ -264,7 +243,7 @@ void added(const nb::object& runs, const Places& places, const nb::object& lasts
     of_news[end] = run.fence;
     of_news[room + end] = run.first;
     of_news[2 * room + end++] = row;
-    of_lasts[static_cast<std::size_t>(places[run.fence])] = run.first + run.count - 1;
+    of_lasts[static_cast<std::size_t>(value_of(places, run.fence))] = run.first + run.count - 1;
   }
 }
 
@@ -291,16 +270,22 @@ void counted(const nb::object& places, const nb::tuple& news, const nb::tuple& c
 
 NB_MODULE(_native, module) {
   module.doc() = "Events of fences in C++, with the same results as in Python.";
-  nb::class_<dynhull_server::Places>(module, "Places", "The places of fences in columns, by their numbers.")
+  using dynhull_server::Numbers;
+  nb::class_<Numbers>(module, "Numbers", "A dictionary of integers, those of fences, without an object for each.")
       .def(nb::init<>())
-      .def("__len__", &dynhull_server::Places::size)
-      .def("__contains__",
-           [](const dynhull_server::Places& places, std::int64_t number) { return places.find(number).has_value(); })
-      .def("__getitem__", &dynhull_server::Places::operator[], "number"_a)
-      .def("__setitem__", &dynhull_server::Places::set, "number"_a, "place"_a)
-      .def("pop", &dynhull_server::Places::pop, "number"_a);
+      .def("__len__", &Numbers::size)
+      .def("__contains__", [](const Numbers& numbers, std::int64_t key) { return numbers.find(key) != nullptr; })
+      .def("__getitem__", &dynhull_server::value_of, "key"_a)
+      .def("__setitem__", &Numbers::set, "key"_a, "value"_a)
+      .def(
+          "pop",
+          [](Numbers& numbers, std::int64_t key) {
+            const auto taken = numbers.take(key);
+            return taken ? *taken : dynhull_server::value_of(numbers, key);  // KeyError
+          },
+          "key"_a);
   module.def("numbered", &dynhull_server::numbered, "waiting"_a, "types"_a, "places"_a, "lasts"_a, "times"_a,
-             nb::sig("def numbered(waiting: list[tuple[object, ...]], types: bytes, places: Places, "
+             nb::sig("def numbered(waiting: list[tuple[object, ...]], types: bytes, places: Numbers, "
                      "lasts: object, times: object) -> tuple[bytes, bytes, bytes]"),
              "The events of crossings: the bytes of their runs, of themselves, and of what they say of their fences.");
   module.def("encoded", &dynhull_server::encoded, "runs"_a, "rows"_a, "keys"_a, "own"_a, "names"_a, "more"_a,
@@ -308,14 +293,14 @@ NB_MODULE(_native, module) {
                      "more: int) -> bytes"),
              "Events as the bytes that are stored, without those of members and origins, whose flags are `more`.");
   module.def("followed", &dynhull_server::followed, "runs"_a, "places"_a, "lasts"_a, "news"_a,
-             nb::sig("def followed(runs: object, places: Places, lasts: object, news: dict[int, int]) -> bool"),
+             nb::sig("def followed(runs: object, places: Numbers, lasts: object, news: Numbers) -> bool"),
              "Whether each run follows the last event of its fence; if so, `news` has the new last events.");
   module.def("own", &dynhull_server::own, "runs"_a, "places"_a, "subjects"_a, "names"_a,
-             nb::sig("def own(runs: object, places: Places, subjects: object, names: tuple[int, ...]) "
+             nb::sig("def own(runs: object, places: Numbers, subjects: object, names: tuple[int, ...]) "
                      "-> bytes | None"),
              "Of which runs the hull is the one that the fence names; None if a fence does not exist.");
   module.def("added", &dynhull_server::added, "runs"_a, "places"_a, "lasts"_a, "news"_a, "end"_a, "row"_a,
-             nb::sig("def added(runs: object, places: Places, lasts: object, news: object, end: int, row: int) "
+             nb::sig("def added(runs: object, places: Numbers, lasts: object, news: object, end: int, row: int) "
                      "-> None"),
              "Add runs to the columns of new ones, and set the last events of their fences.");
   module.def("counted", &dynhull_server::counted, "places"_a, "news"_a, "columns"_a,

@@ -37,6 +37,16 @@ struct Told {
         times(fences.size()),
         made(fences.size()),
         changes(fences.size()) {}
+
+  // Where a fence is. O(log(1 + how far that is behind `from`)) where it is behind.
+  std::size_t place_of(std::int64_t fence, std::size_t from) const {
+    if (from >= fences.size() || fences[from] > fence) from = 0;
+    std::size_t step = 1;
+    while (from + step < fences.size() && fences[from + step] <= fence) from += std::exchange(step, 2 * step);
+    const auto first = fences.begin() + static_cast<std::ptrdiff_t>(from);
+    const auto end = fences.begin() + static_cast<std::ptrdiff_t>(std::min(from + step, fences.size()));
+    return static_cast<std::size_t>(std::lower_bound(first, end, fence) - fences.begin());
+  }
 };
 
 // The numbers of the fences, ascending. O(n + k log k).
@@ -61,8 +71,7 @@ inline void number(const std::vector<Crossed>& waiting, Types types, Told& told,
     for (std::size_t row = 0; row < each.count; ++row, ++event) {
       const std::int64_t fence = each.fences[row];
       if (row == 0 || fence != each.fences[row - 1]) {
-        place = static_cast<std::size_t>(std::lower_bound(told.fences.begin(), told.fences.end(), fence) -
-                                         told.fences.begin());
+        place = told.place_of(fence, place);
         const std::int64_t time = told.times[place] = std::max(told.times[place], each.now);
         const auto area = each.areas.find(fence);
         const std::int64_t area_revision = area == each.areas.end() ? 0 : area->second;

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ...compiled import Places, native
+from ...compiled import Numbers, native, numbers
 
 if TYPE_CHECKING:
     from .fence import Fence
@@ -35,7 +35,7 @@ class Table:
 
     def __init__(self, columns: int, room: int = ROOM) -> None:
         self.columns: Integers = np.zeros((columns, room), np.int64)
-        self.at: Places = {} if native is None else native.Places()
+        self.at: Numbers = numbers()
         self._free: list[int] = []
 
     def add(self, number: int) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ...compiled import numbers
 from ...state.changes import FenceChange
 from ...state.fences.event_block import EventBlock, joined
 from ...state.fences.records import (
@@ -192,7 +193,7 @@ class FenceChanges:
         self._statements = statements
         self._effects = effects
         self._now: dict[int, _Now] = {}
-        self._lasts: dict[int, int] = {}  # the last events of fences, where these are new
+        self._lasts = numbers()  # the last events of fences, where these are new
         self._blocks: list[EventBlock] = []
         self._firsts: list[AppendFirst] = []
         self._counted: list[int] = []  # fences whose staged events are valid from now on
@@ -346,7 +347,7 @@ class FenceChanges:
 
     def _count_staged(self, step: CountStaged) -> None:
         rows = self._ledger.staged.get(step.number, [])
-        last = self._lasts.get(step.number, self._ledger.runs.last(step.number))
+        last = self._lasts[step.number] if step.number in self._lasts else self._ledger.runs.last(step.number)
         if [last, *(row.last for row in rows)] != [*(row.first - 1 for row in rows), step.last]:
             raise NotCommittedError(f"the events of fence {step.number} up to {step.last} have not been written")
         self._lasts[step.number] = step.last
@@ -419,7 +420,8 @@ class FenceChanges:
     def _drop_fence(self, number: int, now: _Now) -> None:
         """Delete the row of the fence. `sweep` drops the rest."""
         now.deleted = True
-        self._lasts.pop(number, None)
+        if number in self._lasts:
+            self._lasts.pop(number)
         self._plus(now, -now.count, -now.sum)
         self._statements.append(Remove("fences", (number,)))
 

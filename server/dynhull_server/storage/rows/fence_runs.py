@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from ...compiled import native
+from ...compiled import Numbers, native
 from ...state.fences.event_block import EventBlock
 from ...state.fences.records import Consumer, FenceRow, Subject
 from ...state.fences.tallies import Integers, Table
@@ -225,7 +225,7 @@ class FenceRuns:
         if not self._uses[name]:
             del self._uses[name], self._names[name]
 
-    def follow(self, block: EventBlock, lasts: dict[int, int]) -> None:
+    def follow(self, block: EventBlock, lasts: Numbers) -> None:
         """Take note in `lasts` of the last events of fences after a block; it has those before where they are new.
 
         Raises:
@@ -238,7 +238,9 @@ class FenceRuns:
         for number, first, made in zip(
             *(block.runs[name].tolist() for name in ("fence", "first", "count")), strict=True
         ):
-            last = found.get(number, lasts.get(number, self.last(number)))
+            last = found.get(number)
+            if last is None:
+                last = lasts[number] if number in lasts else self.last(number)
             if last is None:
                 raise KeyError(number)
             if first != last + 1:
@@ -246,7 +248,8 @@ class FenceRuns:
                 name = number if fence is None else fence.row.name
                 raise ValueError(f"event {first} of fence {name} does not follow event {last}")
             found[number] = last + made
-        lasts |= found
+        for number, last in found.items():
+            lasts[number] = last
 
     def last(self, number: int) -> int | None:
         """The sequence of the last event of a fence; None if it does not exist."""
