@@ -94,6 +94,16 @@ def test_reads_of_a_pipeline_wait_while_partitions_move(url: str) -> None:
 
 
 @pytest.mark.one_process("a cluster has a shape of its own")
+def test_servers_that_stop_together_leave_nothing_to_each_other(url: str) -> None:
+    """Neither waits for the other one to take over, which it would complain about in the end."""
+    options = ("--cluster", "--partitions", "4", "--journal", url, "--scrub-cpu", "0")
+    with server_process(*options) as first, server_process(*options) as second:
+        wait_until(lambda: sorted(served(url).values()) == [2, 2])
+        for each in (first, second):
+            each.process.terminate()
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_killed_machine_and_a_stopped_one_are_replaced(url: str) -> None:
     """A machine that was stopped ends when it goes on: it can commit nothing, and its processes are started again."""
     with ExitStack() as stack:

@@ -103,7 +103,7 @@ class Member:
             log.info("the other workers take over", extra={"partitions": len(self._served)})
             try:
                 async with asyncio.timeout(self._settings.grace):
-                    while self._served or self._busy:
+                    while (self._served or self._busy) and self._others():  # who may leave as well
                         self._settled.clear()
                         await self._settled.wait()
             except TimeoutError:
