@@ -51,7 +51,8 @@ def as_polygons(polygons: Any) -> list[list[Points]]:
         ValueError: there is no polygon, or a ring is not valid. The message names polygon, ring and reason.
         TypeError: an argument is not a sequence, or a coordinate is not a number.
 
-    O(k log k) for k corners if few edges overlap in x, at worst O(k²).
+    O(k log k) for k corners if few edges overlap in x or few in y, at worst O(k²); a valid polygon of one ring is
+    always checked in O(k log k) by the kernel.
     """
     checked = [
         _as_polygon(polygon, f"polygon {number}") for number, polygon in enumerate(_sequence(polygons, "polygons"))
@@ -81,15 +82,8 @@ def _as_polygon(polygon: Any, name: str) -> list[Points]:
         raise ValueError(f"{name} has no ring: the first one is its exterior")
     _refuse_meeting_edges(rings, name)
     rings = [_turned(ring, left=number == 0) for number, ring in enumerate(rings)]
-    for number in range(1, len(rings)):
-        if any(sign < 0 for sign in _sides(rings[0], rings[number])):
-            raise ValueError(f"{name} ring {number} is a hole that is not inside the exterior")
-        for other in range(1, number):
-            one, two = rings[other], rings[number]
-            if _apart(one, two):
-                continue
-            if any(sign > 0 for sign in _sides(one, two)) or any(sign > 0 for sign in _sides(two, one)):
-                raise ValueError(f"{name} rings {other} and {number} are holes that overlap")
+    if len(rings) > 1:
+        _refuse_holes(rings, name)
     return rings
 
 
@@ -117,7 +111,8 @@ def _turned(ring: Points, left: bool) -> Points:
 
 def _refuse_meeting_edges(rings: list[Points], name: str) -> None:
     edges = _edges_of(rings)
-    for i, j in _near_pairs(edges):
+    low, high = np.minimum(edges.a, edges.b), np.maximum(edges.a, edges.b)
+    for i, j in _near_pairs(low, high):
         a, b, c, d = edges.a[i], edges.b[i], edges.a[j], edges.b[j]
         signs = [np.asarray(orient2d(*corners)) for corners in ((a, b, c), (a, b, d), (c, d, a), (c, d, b))]
         across = (signs[0] * signs[1] <= 0) & (signs[2] * signs[3] <= 0)
@@ -155,11 +150,9 @@ def _edges_of(rings: list[Points]) -> _Edges:
     )
 
 
-def _near_pairs(edges: _Edges) -> Iterator[tuple[Rows, Rows]]:
-    """All pairs of edges whose boxes meet, in portions."""
-    low, high = np.minimum(edges.a, edges.b), np.maximum(edges.a, edges.b)
-    order = np.argsort(low[:, 0], kind="stable")
-    later = np.searchsorted(low[order, 0], high[order, 0], side="right") - np.arange(len(order)) - 1
+def _near_pairs(low: Points, high: Points) -> Iterator[tuple[Rows, Rows]]:
+    """All pairs of boxes that meet, in portions: along the axis along which fewer of them overlap."""
+    order, later = min((_overlapping(low[:, axis], high[:, axis]) for axis in (0, 1)), key=lambda each: each[1].sum())
     ends = np.cumsum(later)
     start = 0
     while start < len(order):
@@ -169,25 +162,67 @@ def _near_pairs(edges: _Edges) -> Iterator[tuple[Rows, Rows]]:
         first = np.repeat(np.arange(start, stop), counts)
         second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
         i, j = order[first], order[second]
-        near = (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
+        near = ((low[i] <= high[j]) & (low[j] <= high[i])).all(axis=1)
         if near.any():
             yield i[near], j[near]
         start = stop
 
 
-def _apart(ring: Points, other: Points) -> bool:
-    """Whether the boxes of two rings do not meet."""
-    return bool((ring.min(axis=0) > other.max(axis=0)).any() or (other.min(axis=0) > ring.max(axis=0)).any())
+def _overlapping(low: Heights, high: Heights) -> tuple[Rows, Rows]:
+    """Intervals in the order of their low ends, and for each of them how many of the following ones it meets."""
+    order = np.argsort(low, kind="stable")
+    return order, np.searchsorted(low[order], high[order], side="right") - np.arange(len(order)) - 1
 
 
 # Where a ring is that no edge of the other crosses
 
 
-def _sides(ring: Points, other: Points) -> Iterator[int]:
-    """The signs of the parts into which `ring` divides the edges of `other`: +1 inside, -1 outside."""
-    signs = ring_signs(ring, other).tolist()
+def _refuse_holes(rings: list[Points], name: str) -> None:
+    """Refuse holes that are not inside of the exterior, or that overlap; no edges cross."""
+    exterior = rings[0]
+    signs = np.split(ring_signs(exterior, np.concatenate(rings[1:])), np.cumsum([len(ring) for ring in rings[1:-1]]))
+    in_order = exterior[np.argsort(exterior[:, 0], kind="stable")]
+    low, high = (np.array([end(ring, axis=0) for ring in rings[1:]]) for end in (np.min, np.max))
+    first, after = (
+        np.searchsorted(in_order[:, 0], x, side=side).tolist()
+        for x, side in ((low[:, 0], "left"), (high[:, 0], "right"))
+    )
+    for number, ring in enumerate(rings[1:], start=1):
+        near = in_order[first[number - 1] : after[number - 1]]
+        near = near[(near[:, 1] >= low[number - 1, 1]) & (near[:, 1] <= high[number - 1, 1])]
+        if not len(near) and (signs[number - 1] > 0).all():
+            continue
+        if any(sign < 0 for sign in _sides(exterior, ring, signs[number - 1], near)):
+            raise ValueError(f"{name} ring {number} is a hole that is not inside the exterior")
+    overlapping = [
+        (max(one, two), min(one, two))
+        for i, j in _near_pairs(low, high)
+        for one, two in zip((i + 1).tolist(), (j + 1).tolist(), strict=True)
+        if _overlap(rings[one], rings[two])
+    ]
+    if overlapping:
+        number, other = min(overlapping)
+        raise ValueError(f"{name} rings {other} and {number} are holes that overlap")
+
+
+def _overlap(one: Points, two: Points) -> bool:
+    """Whether two rings have inner points in common; no edges cross."""
+    return any(sign > 0 for ring, other in ((one, two), (two, one)) for sign in _sides(ring, other))
+
+
+def _sides(ring: Points, other: Points, of_corners: Signs | None = None, near: Points | None = None) -> Iterator[int]:
+    """The signs of the parts into which `ring` divides the edges of `other`: +1 inside, -1 outside.
+
+    Args:
+        ring: the ring that divides.
+        other: the ring whose edges are divided.
+        of_corners: the signs of its corners, if known.
+        near: the corners of `ring` in the box of `other`, if known.
+    """
+    signs = (ring_signs(ring, other) if of_corners is None else of_corners).tolist()
     corners = as_tuples(other)
-    touching = as_tuples(ring[ring_signs(other, ring) == 0])
+    near = ring if near is None else near
+    touching = as_tuples(near[ring_signs(other, near) == 0]) if len(near) else []
     for k, a in enumerate(corners):
         b = corners[(k + 1) % len(corners)]
         stops = [(a, signs[k])]

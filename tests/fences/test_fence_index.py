@@ -4,6 +4,7 @@ import pickle
 import re
 from math import inf
 
+import fence_oracle
 import numpy as np
 import pytest
 from hulls import KEYED_HULLS
@@ -238,6 +239,53 @@ def test_good_polygons(make, polygons):
     index = FenceIndex(make())
     index.set_polygons(1, polygons)
     assert 1 in index
+
+
+def comb(teeth):
+    """A polygon whose upright edges are all at one height."""
+    row = np.arange(4 * teeth)
+    top = np.where((row % 4 == 1) | (row % 4 == 2), 6.0, 1.0)
+    return np.vstack([np.column_stack([row // 2, top]), [[2 * teeth, -1], [0, -1]]])
+
+
+def turned(corners):
+    return corners @ np.array([[1.0, 1.0], [-1.0, 1.0]])
+
+
+LARGE = {"upright": comb(60), "lying": comb(60)[:, ::-1], "diagonal": turned(comb(60))}
+
+
+@kinds
+@pytest.mark.parametrize("corners", LARGE.values(), ids=LARGE)
+def test_subjects_among_long_edges(make, corners):
+    rng = np.random.default_rng(7)
+    at = rng.integers(0, len(corners), 200)
+    points = np.vstack([corners[at], (corners[at] + corners[at - 1]) / 2, corners[at] + rng.normal(size=(200, 2))])
+    keys = [str(number) for number in range(len(points))]
+    area = fence_oracle.Area(("polygons", [[corners.tolist()]]), closed=True)
+    expected = sorted(key for key, point in zip(keys, points.tolist(), strict=True) if area.holds(point))
+    index = FenceIndex(make.from_entities(keys, points))
+    index.set_polygons(1, [[corners]])
+    assert list(index.inside(1)) == expected
+    hull = make.from_entities(keys, np.full((len(keys), 2), -1e6))
+    index = FenceIndex(hull)
+    index.set_polygons(1, [[corners]])
+    hull.put_many(keys, points)
+    assert list(index.take().keys) == expected
+
+
+@kinds
+def test_many_holes(make):
+    places = [(float(x), float(y)) for x in range(30) for y in range(30)]
+    holes = [[(x, y), (x + 0.5, y), (x, y + 0.5)] for x, y in places]
+    exterior = [[-1, -1], [31, -1], [31, 31], [-1, 31]]
+    index = FenceIndex(make.from_entities(["in", "on", "between"], [[7.1, 9.1], [7.5, 9], [7.6, 9.6]]))
+    index.set_polygons(1, [[exterior, *holes]])
+    assert list(index.inside(1)) == ["between", "on"]
+    with pytest.raises(ValueError, match=r"ring 901 is a hole that is not inside"):
+        index.set_polygons(1, [[exterior, *holes, [[40, 40], [41, 40], [40, 41]]]])
+    with pytest.raises(ValueError, match=r"rings 38 and 901 are holes that overlap"):
+        index.set_polygons(1, [[exterior, *holes, [[1.1, 7.1], [1.2, 7.1], [1.1, 7.2]]]])
 
 
 def test_a_hole_that_leaves_through_a_corner_is_refused():

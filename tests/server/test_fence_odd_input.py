@@ -11,9 +11,10 @@ import pytest
 from command_line import dynhull
 from fence_calls import points, polygon, refused_by
 from google.protobuf.duration_pb2 import Duration
+from patience import PATIENCE
 from server_process import server_process
 
-from dynhull_client import Circle, HullClient, InvalidRequestError, Prefix
+from dynhull_client import Circle, HullClient, InvalidRequestError, Polygon, Prefix
 from dynhull_proto.v1 import fence_pb2, points_pb2
 from dynhull_proto.v1 import fence_service_pb2 as fs
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
@@ -322,6 +323,35 @@ def test_a_request_is_refused(address: str, unchanged: Callable[[], bytes], case
     assert refused.metadata.get("field", "") == field
     assert value in refused.metadata.values()
     assert unchanged() == before
+
+
+def comb() -> np.ndarray:
+    """As many corners as an area may have, and all long edges side by side."""
+    row = np.arange(99_996)
+    teeth = np.column_stack([row // 2, np.where((row % 4 == 1) | (row % 4 == 2), 6.0, 1.0)])
+    return np.vstack([teeth, [[50_000, -1], [0, -1]]])
+
+
+def sieve() -> Polygon:
+    """A square with 3,600 holes."""
+    places = [(x, y) for x in range(60) for y in range(60)]
+    holes = tuple(np.array([[x, y], [x + 0.5, y], [x, y + 0.5]]) for x, y in places)
+    return Polygon(np.array([[-1.0, -1], [61, -1], [61, 61], [-1, 61]]), holes)
+
+
+@pytest.mark.parametrize(("area", "inside", "outside"), [(comb(), (1, 2), (1.5, 2)), (sieve(), (7.6, 9.6), (7.1, 9.1))])
+def test_areas_with_many_parts_do_not_stop_the_server(
+    address: str, area: Any, inside: tuple[float, float], outside: tuple[float, float]
+) -> None:
+    with HullClient(address, timeout=PATIENCE) as client:
+        client.create_fence("odd/large", area=area, subjects="odd/ids", initial="none")
+        client.apply("odd/points", insert=[[1, 1]], delete=[[1, 1]])
+        client.put("odd/ids", [1], [inside])
+        client.put("odd/ids", [1], [outside])
+        with client.watch_fence("odd/large", after=0) as watch:
+            assert [next(watch).type for _ in range(2)] == ["enter", "exit"]
+        client.remove("odd/ids", [1])
+        client.delete_fence("odd/large")
 
 
 def test_odd_input_that_is_allowed(address: str) -> None:

@@ -210,8 +210,19 @@ def test_held_positions_leave_with_their_window_and_their_deadline():
     assert (set(hull.positions()), set(hull.held())) == ({"d"}, {"e", "f"})
     hull.now += 5 * SECOND
     result = hull.ask(releases=["e"])
-    assert (result.late, result.inserted, hull.held()) == (1, 0, {})
+    assert (result.missing, result.late, result.inserted, hull.held()) == (1, 0, 0, {})
     hull.restart()
+
+
+def test_a_release_that_comes_too_late_is_missing_and_not_late():
+    hull = Hull(QuarantineRules(max_growth=1.5), window=Window(max_age=20 * SECOND))
+    hull.put([("a", 0, 0, 0), ("b", 4, 0, 0), ("c", 0, 4, 0)])
+    hull.put([("far", 90, 90, 0), ("near", 80, 80, 9)])
+    assert sorted(hull.held()) == ["far", "near"]
+    hull.now += 20 * SECOND
+    found = hull.ask(releases=["far", "near"])
+    assert (found.released, found.inserted, found.missing, found.late) == (1, 1, 1, 0)
+    assert sorted(hull.positions()) == ["near"]
 
 
 def test_rules_can_be_changed_and_switched_off():

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -68,9 +69,10 @@ class Polygon {
         for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i)
           if (!passes(corners_[i], corners_[i + 1], p, inside)) return 0;
     } else {
-      const std::size_t slab = slab_of(p.y);
+      const auto turned = [&](Point q) { return upright_ ? Point{q.y, q.x} : q; };
+      const std::size_t slab = slab_of(along(p));
       for (std::uint32_t k = slabs_[slab]; k < slabs_[slab + 1]; ++k)
-        if (!passes(corners_[in_slabs_[k]], corners_[in_slabs_[k] + 1], p, inside)) return 0;
+        if (!passes(turned(corners_[in_slabs_[k]]), turned(corners_[in_slabs_[k] + 1]), turned(p), inside)) return 0;
     }
     return inside ? 1 : -1;
   }
@@ -99,7 +101,7 @@ class Polygon {
   }
 
  private:
-  static constexpr std::size_t FEW_CORNERS = 24, CORNERS_OF_A_SLAB = 4;
+  static constexpr std::size_t FEW_CORNERS = 24, CORNERS_OF_A_SLAB = 4, ENTRIES_OF_A_CORNER = 8;
 
   // Flips `inside` if the edge crosses the ray from p to the right. False if p is on the edge.
   static bool passes(Point a, Point b, Point p, bool& inside) {
@@ -112,29 +114,47 @@ class Polygon {
     return true;
   }
 
+  // Slabs along the axis along which fewer edges are long, and so few that the lists of edges stay short.
   void lay_slabs() {
-    const std::size_t slabs = corners_.size() / CORNERS_OF_A_SLAB;
-    scale_ = static_cast<double>(slabs) / (box_.greatest.y - box_.least.y);
-    if (!(scale_ > 0 && scale_ < INFINITE)) return;
-    std::vector<std::uint32_t> ends(slabs + 1, 0);
-    slabs_ = ends;
-    const auto each = [&](auto visit) {
-      for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
-        for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i) {
-          const auto [low, high] = std::minmax(corners_[i].y, corners_[i + 1].y);
-          for (std::size_t slab = slab_of(low); slab <= slab_of(high); ++slab) visit(slab, i);
-        }
+    const auto cut = [&](bool upright, std::size_t slabs) {
+      upright_ = upright;
+      count_ = slabs;
+      scale_ = static_cast<double>(slabs) / (along(box_.greatest) - along(box_.least));
+      if (!(scale_ > 0 && scale_ < INFINITE)) return std::numeric_limits<std::size_t>::max();
+      std::size_t entries = 0;
+      for_each_slabs([&](std::size_t first, std::size_t last, std::uint32_t) { entries += last - first + 1; });
+      return entries;
     };
-    each([&](std::size_t slab, std::uint32_t) { ++slabs_[slab + 1]; });
-    for (std::size_t slab = 0; slab < slabs; ++slab) slabs_[slab + 1] += slabs_[slab];
-    ends = slabs_;
-    in_slabs_.resize(slabs_.back());
-    each([&](std::size_t slab, std::uint32_t i) { in_slabs_[ends[slab]++] = i; });
+    std::size_t slabs = corners_.size() / CORNERS_OF_A_SLAB;
+    const bool upright = cut(true, slabs) < cut(false, slabs);
+    while (slabs > 1 && cut(upright, slabs) > ENTRIES_OF_A_CORNER * corners_.size()) slabs /= 2;
+    const std::size_t entries = cut(upright, slabs);
+    if (entries == std::numeric_limits<std::size_t>::max()) return;
+    std::vector<std::uint32_t> ends(slabs + 1, 0);
+    for_each_slabs([&](std::size_t first, std::size_t last, std::uint32_t) {
+      for (std::size_t slab = first; slab <= last; ++slab) ++ends[slab + 1];
+    });
+    for (std::size_t slab = 0; slab < slabs; ++slab) ends[slab + 1] += ends[slab];
+    slabs_ = ends;
+    in_slabs_.resize(entries);
+    for_each_slabs([&](std::size_t first, std::size_t last, std::uint32_t i) {
+      for (std::size_t slab = first; slab <= last; ++slab) in_slabs_[ends[slab]++] = i;
+    });
   }
+  // Visits the first and the last slab of each edge, and the number of the edge.
+  template <class Visit>
+  void for_each_slabs(Visit visit) const {
+    for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
+      for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i) {
+        const double at = along(corners_[i]), next = along(corners_[i + 1]);
+        visit(slab_of(std::min(at, next)), slab_of(std::max(at, next)), i);
+      }
+  }
+  double along(Point p) const { return upright_ ? p.x : p.y; }
   // Rounding is monotone: an edge is in the slabs of all heights between its ends.
-  std::size_t slab_of(double y) const {
-    const auto slab = static_cast<std::size_t>((y - box_.least.y) * scale_);
-    return std::min(slab, corners_.size() / CORNERS_OF_A_SLAB - 1);
+  std::size_t slab_of(double coordinate) const {
+    const auto slab = static_cast<std::size_t>((coordinate - along(box_.least)) * scale_);
+    return std::min(slab, count_ - 1);
   }
 
   // Whether the way from a point of rings to another one starts inside: on the inner side of every ring there.
@@ -170,9 +190,10 @@ class Polygon {
   std::vector<Point> corners_;
   std::vector<std::uint32_t> starts_;  // of rings, and the end
   Box box_ = Box::none();
+  bool upright_ = false;  // of the slabs
+  std::size_t count_ = 0;
   double scale_ = 0;
-  std::vector<std::uint32_t> slabs_,
-      in_slabs_;  // horizontal slabs: the first of each in the list of corners, and the list
+  std::vector<std::uint32_t> slabs_, in_slabs_;  // the first of each slab in the list of edges, and the list
 };
 
 // Counter-clockwise from the least vertex, three or more.

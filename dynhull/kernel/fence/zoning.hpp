@@ -141,9 +141,19 @@ class Zoning {
         extent.add(strip.least);
         extent.add(strip.greatest);
       }
-    const Point split = {middle(extent.least.x, extent.greatest.x, box.least.x, box.greatest.x),
-                         middle(extent.least.y, extent.greatest.y, box.least.y, box.greatest.y)};
+    Point split = {middle(extent.least.x, extent.greatest.x, box.least.x, box.greatest.x),
+                   middle(extent.least.y, extent.greatest.y, box.least.y, box.greatest.y)};
     const std::size_t size = by_subjects ? zones_[number].subjects.size() : zones_[number].pieces.size();
+    if (!by_subjects) {  // a cut that most pieces cross only repeats them
+      std::size_t across_x = 0, across_y = 0;
+      for (const Piece& piece : zones_[number].pieces) {
+        const Box strip = around(strip_of(piece));
+        across_x += strip.least.x < split.x && split.x <= strip.greatest.x;
+        across_y += strip.least.y < split.y && split.y <= strip.greatest.y;
+      }
+      if (across_x > size / 2 && across_y <= size / 2) split.x = INFINITE;
+      if (across_y > size / 2 && across_x <= size / 2) split.y = INFINITE;
+    }
     zones_[number].most = 2 * size;  // unless dividing helps
     if (split == HIGHEST) return;
 
@@ -169,9 +179,9 @@ class Zoning {
         for (const Piece& piece : run)
           if (may_touch(strip_of(piece), part.box)) part.pieces.push_back(piece);
         if (first == part.pieces.size()) {
-          if (area.holds(part.anchor())) part.covering.push_back(run[0].fence);
-        } else {
-          const bool inside = inside_at(area, part.anchor());
+          if (holds_anchor(area, old, run, part)) part.covering.push_back(run[0].fence);
+        } else if (is_simple(area)) {
+          const bool inside = holds_anchor(area, old, run, part);
           for (std::size_t k = first; k < part.pieces.size(); ++k) part.pieces[k].inside = inside;
         }
         i += run.size();
@@ -214,6 +224,12 @@ class Zoning {
   }
   static bool is_simple(const Area& area) { return area.polygons.size() == 1; }
   static bool inside_at(const Area& area, Point anchor) { return is_simple(area) && area.where(anchor) > 0; }
+  // Whether the anchor of a part of a zone is in an area; if possible, by the pieces of the zone and its own anchor.
+  static bool holds_anchor(const Area& area, const Zone& zone, std::span<const Piece> run, const Zone& part) {
+    if (!is_simple(area)) return area.holds(part.anchor());
+    const std::optional<bool> inside = inside_after(run, zone.anchor(), run[0].inside, part.anchor());
+    return inside ? *inside : area.where(part.anchor()) > 0;
+  }
   static void append_pieces(Zone& zone, std::uint32_t handle, const Area& area, std::span<const Edge> edges,
                             bool inside) {
     const bool disk = area.kind == Area::Kind::DISK;

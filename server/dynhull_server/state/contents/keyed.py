@@ -183,7 +183,8 @@ class Keyed:
         late = 0
         if admission.young is not None:
             refuse_repeated(rows)
-            late = len(rows.keys) - int(np.count_nonzero(admission.young))
+            if not batch.of_quarantine:  # a released position that has just become too old is missing
+                late = len(rows.keys) - int(np.count_nonzero(admission.young))
             rows = _selected(rows, admission.young)
         admitted = Admitted(rows, admission.clock, late, admission.clamped, batch.refuse_missing, admission.young)
         if batch.of_quarantine:
