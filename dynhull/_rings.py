@@ -183,10 +183,8 @@ def _refuse_holes(rings: list[Points], name: str) -> None:
     signs = np.split(ring_signs(exterior, np.concatenate(rings[1:])), np.cumsum([len(ring) for ring in rings[1:-1]]))
     in_order = exterior[np.argsort(exterior[:, 0], kind="stable")]
     low, high = (np.array([end(ring, axis=0) for ring in rings[1:]]) for end in (np.min, np.max))
-    first, after = (
-        np.searchsorted(in_order[:, 0], x, side=side).tolist()
-        for x, side in ((low[:, 0], "left"), (high[:, 0], "right"))
-    )
+    first = np.searchsorted(in_order[:, 0], low[:, 0], side="left").tolist()
+    after = np.searchsorted(in_order[:, 0], high[:, 0], side="right").tolist()
     for number, ring in enumerate(rings[1:], start=1):
         near = in_order[first[number - 1] : after[number - 1]]
         near = near[(near[:, 1] >= low[number - 1, 1]) & (near[:, 1] <= high[number - 1, 1])]

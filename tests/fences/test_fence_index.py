@@ -275,6 +275,28 @@ def test_subjects_among_long_edges(make, corners):
 
 
 @kinds
+@pytest.mark.parametrize("turn", [False, True], ids=["upright", "lying"])
+def test_subjects_on_one_line_leave_it(make, turn):
+    """Many at one x have a zone of their own, which must not reach beyond what it was cut out of."""
+    rng = np.random.default_rng(3)
+    points = np.vstack([np.column_stack([np.full(4000, 10.0), rng.random(4000) * 20]), rng.random((500, 2)) * 100])
+    far = np.vstack([np.column_stack([rng.random(4000) * 90, points[:4000, 1]]), points[4000:]])
+    ways = [each[:, ::-1] if turn else each for each in (points, far)]
+    hull = make.from_entities([str(number) for number in range(len(points))], ways[0])
+    index = FenceIndex(hull)
+    areas = {number: (float(x), float(x) + 5.0) for number, x in enumerate(range(2, 82, 8))}
+    for number, (low, high) in areas.items():
+        index.set_polygons(number, [[[[low, low], [high, low], [high, high], [low, high]]]])
+    hull.put_many([str(number) for number in range(len(points))], ways[0])
+    index.take()
+    hull.put_many([str(number) for number in range(len(points))], ways[1])
+    index.take()
+    for number, (low, high) in areas.items():
+        inside = np.flatnonzero(((ways[1] >= low) & (ways[1] <= high)).all(axis=1))
+        assert list(index.inside(number)) == sorted(map(str, inside))
+
+
+@kinds
 def test_many_holes(make):
     places = [(float(x), float(y)) for x in range(30) for y in range(30)]
     holes = [[(x, y), (x + 0.5, y), (x, y + 0.5)] for x, y in places]

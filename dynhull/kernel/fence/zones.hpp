@@ -129,6 +129,15 @@ class Zones {
     return static_cast<unsigned>(p.x >= split.x) | static_cast<unsigned>(p.y >= split.y) << 1;
   }
 
+  // An infinite coordinate of the split leaves the first half whole and the second one empty.
+  static Box quarter_of(Box box, Point split, unsigned q) {
+    q& 1 ? box.least.x = split.x : box.greatest.x = std::min(split.x, box.greatest.x);
+    q& 2 ? box.least.y = split.y : box.greatest.y = std::min(split.y, box.greatest.y);
+    return box;
+  }
+
+  static bool empty(const Box& box) { return !(box.least.x < box.greatest.x && box.least.y < box.greatest.y); }
+
   // Replaces an emptied zone by four; the first has its number. Returns the numbers.
   std::array<Number, 4> divide(Number zone, Point split) {
     const std::uint32_t parent = parent_of(zone);
@@ -177,13 +186,6 @@ class Zones {
     Point split;
     std::uint32_t child[4];  // nodes, or zones with the bit ZONE
   };
-
-  static Box quarter_of(Box box, Point split, unsigned q) {
-    (q & 1 ? box.least.x : box.greatest.x) = split.x;
-    (q & 2 ? box.least.y : box.greatest.y) = split.y;
-    return box;
-  }
-  static bool empty(const Box& box) { return !(box.least.x < box.greatest.x && box.least.y < box.greatest.y); }
 
   std::uint32_t parent_of(Number zone) const {
     const Point p = zones_[zone].anchor();

@@ -159,19 +159,15 @@ class Zoning {
 
     // Everything that may fail is done on the side.
     Zone parts[4];
-    for (unsigned q = 0; q < 4; ++q) {
-      parts[q].box = box;
-      (q & 1 ? parts[q].box.least.x : parts[q].box.greatest.x) = split.x;
-      (q & 2 ? parts[q].box.least.y : parts[q].box.greatest.y) = split.y;
-    }
+    for (unsigned q = 0; q < 4; ++q) parts[q].box = Zones::quarter_of(box, split, q);
     const Zone& old = zones_[number];
     for (const std::uint32_t slot : old.subjects)
       parts[Zones::quarter(split, (*slots_)[slot].place)].subjects.push_back(slot);
     for (Zone& part : parts) {
+      part.subjects.shrink_to_fit();
+      if (Zones::empty(part.box)) continue;
       part.covering = old.covering;
       part.pending = old.pending;
-      part.subjects.shrink_to_fit();
-      if (!(part.box.least.x < part.box.greatest.x && part.box.least.y < part.box.greatest.y)) continue;
       for (std::size_t i = 0; i < old.pieces.size();) {
         const std::span<const Piece> run = old.run(i);
         const Area& area = *fences_[run[0].fence]->area;
@@ -179,9 +175,9 @@ class Zoning {
         for (const Piece& piece : run)
           if (may_touch(strip_of(piece), part.box)) part.pieces.push_back(piece);
         if (first == part.pieces.size()) {
-          if (holds_anchor(area, old, run, part)) part.covering.push_back(run[0].fence);
-        } else if (is_simple(area)) {
-          const bool inside = holds_anchor(area, old, run, part);
+          if (area.holds(part.anchor())) part.covering.push_back(run[0].fence);
+        } else {
+          const bool inside = inside_at(area, part.anchor());
           for (std::size_t k = first; k < part.pieces.size(); ++k) part.pieces[k].inside = inside;
         }
         i += run.size();
@@ -224,12 +220,6 @@ class Zoning {
   }
   static bool is_simple(const Area& area) { return area.polygons.size() == 1; }
   static bool inside_at(const Area& area, Point anchor) { return is_simple(area) && area.where(anchor) > 0; }
-  // Whether the anchor of a part of a zone is in an area; if possible, by the pieces of the zone and its own anchor.
-  static bool holds_anchor(const Area& area, const Zone& zone, std::span<const Piece> run, const Zone& part) {
-    if (!is_simple(area)) return area.holds(part.anchor());
-    const std::optional<bool> inside = inside_after(run, zone.anchor(), run[0].inside, part.anchor());
-    return inside ? *inside : area.where(part.anchor()) > 0;
-  }
   static void append_pieces(Zone& zone, std::uint32_t handle, const Area& area, std::span<const Edge> edges,
                             bool inside) {
     const bool disk = area.kind == Area::Kind::DISK;
