@@ -204,6 +204,7 @@ class Fences : public OwnHull {
         const Point p = (*slots_)[slot].place;
         if (subjects_.box(slot).holds(p)) require(zones_.find(p) == zone, "a subject in another zone");
       }
+      if (Zones::empty(zones_[zone].box)) continue;  // no point is in it
       for (const std::uint32_t handle : zones_[zone].covering) {
         require(fences_[handle] && !fences_[handle]->own, "a fence that is gone covers a zone");
         require(fences_[handle]->area->holds(zones_[zone].anchor()), "a fence that does not cover its zone");
