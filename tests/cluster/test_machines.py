@@ -152,6 +152,20 @@ def test_operators_see_who_serves_what_and_move_it(url: str) -> None:
         assert second.process.poll() is None
 
 
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_worker_that_gave_up_its_partitions_takes_some_when_it_is_started_again(url: str) -> None:
+    """It was the last one: nobody else would ever serve them."""
+    with machine(url, complaints=None) as server, HullClient(server.address, retries=1000) as client:
+        (worker,) = served(url)
+        assert dynhull("cluster", "drain", worker, "--journal", url).exit_code == 0
+        assert apply_all(client, 1) == [1] * len(NAMES)
+        drained = processes(server.process.pid)["worker-0"]
+        os.kill(drained, signal.SIGKILL)
+        there = "SELECT process FROM owners WHERE until > '-infinity' AND address <> ''"
+        wait_until(lambda: not any(f" {drained} " in process for (process,) in query(url, there)) and served(url))
+        assert apply_all(client, 2) == [2] * len(NAMES)
+
+
 @pytest.fixture(scope="module")
 def alone(postgres: PostgreSQL) -> Iterator[tuple[str, str]]:
     """The address of a cluster of one machine, and its database."""

@@ -52,7 +52,8 @@ WISHES = b"SELECT partition, worker FROM wishes"
 HEIRS = b"SELECT partition, worker, process, epoch FROM heirs"
 RENEW = (
     b"INSERT INTO workers VALUES (%s, %s, %s, clock_timestamp()) ON CONFLICT (worker) DO UPDATE SET "
-    b"seen = clock_timestamp(), process = excluded.process, draining = workers.draining OR excluded.draining"
+    b"seen = clock_timestamp(), process = excluded.process, "
+    b"draining = excluded.draining OR (workers.draining AND workers.process = excluded.process)"
 )
 OFFER = (
     b"INSERT INTO heirs VALUES (%s, %s, %s, %s) ON CONFLICT (partition) "
