@@ -10,8 +10,9 @@ from typing import Any
 import aiomqtt
 import nats
 import pytest
-from brokers import broker, free_port, mosquitto, nats_server
+from brokers import broker, mosquitto, nats_server
 from patience import PATIENCE, wait_until
+from ports import free_port
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
 
 from dynhull_client import HullClient

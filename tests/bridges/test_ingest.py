@@ -10,12 +10,13 @@ from typing import Any
 
 import nats
 import pytest
-from brokers import broker, free_port, mosquitto, nats_server
+from brokers import broker, mosquitto, nats_server
 from command_line import dynhull
 from ingest_process import ingest_process, ingested
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 from patience import PATIENCE, wait_until
+from ports import free_port
 from server_process import server_process
 
 from dynhull_client import HullClient, HullNotFoundError

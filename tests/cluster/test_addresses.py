@@ -4,6 +4,7 @@ import asyncio
 import socket
 
 import pytest
+from ports import free_port
 
 from dynhull_cluster.frames import Frames
 from dynhull_cluster.machines import addresses
@@ -39,8 +40,7 @@ def test_an_owner_that_cannot_be_reached_is_logged_once_with_the_reason(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(addresses, "NOTE_SECONDS", -1.0)
-    with socket.create_server(("127.0.0.1", 0)) as place:
-        port = place.getsockname()[1]
+    port = free_port()
     with caplog.at_level("INFO"):
         asyncio.run(reach(port))
     refused, reached = caplog.records

@@ -3,7 +3,6 @@
 import base64
 import os
 import shlex
-import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,6 +12,7 @@ import pytest
 from command_line import dynhull
 from forked import COMMAND
 from patience import PATIENCE, wait_until
+from ports import free_port
 from server_process import server_process
 
 BEFORE = """\
@@ -40,8 +40,7 @@ def test_an_alarm_from_an_empty_folder(
     text = (site / "how-to" / "alarms" / "index.html").read_text()
     for line in [*BEFORE.splitlines(), RELAY, AFTER, LIST]:
         assert line.replace("'", "&#39;") in text or line in text
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = str(free.getsockname()[1])
+    port = str(free_port())
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DYNHULL_WEBHOOK_SECRET", f"whsec_{base64.b64encode(os.urandom(32)).decode()}")
     monkeypatch.setenv("PORT", port)

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from brokers import broker, free_port, nats_server
+from brokers import broker, nats_server
 from command_line import dynhull
+from ports import free_port
 from server_process import server_process
 
 INGEST = (

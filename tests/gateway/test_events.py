@@ -8,9 +8,10 @@ from urllib.parse import quote
 
 import pytest
 from chromium import chromium
-from gateway_process import Events, Gateway, free_port, gateway_process
+from gateway_process import Events, Gateway, gateway_process
 from patience import PATIENCE, wait_until
 from playwright.sync_api import Browser, Page
+from ports import free_port
 from server_process import server_process
 
 from dynhull_client import HullClient
@@ -49,8 +50,8 @@ def seen(page: Page, url: str) -> dict[str, Any]:
 
 def test_a_browser_misses_nothing_over_restarts(browser: Browser, tmp_path: Path) -> None:
     """The server is restarted, then the gateway, while points and keys come: every event once, and the exact hull."""
-    served = ["--data", str(tmp_path), "--port", free_port()]
-    own = ["--port", free_port()]
+    served = ["--data", str(tmp_path), "--port", str(free_port())]
+    own = ["--port", str(free_port())]
     hull, fence = "/hulls/a%2Fb/events?rate=100", "/fences/yard/events"
     moves = 0
 

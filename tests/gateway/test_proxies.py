@@ -8,9 +8,10 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from gateway_process import NDJSON, Events, Gateway, free_port, gateway_process
+from gateway_process import NDJSON, Events, Gateway, gateway_process
 from patience import PATIENCE, wait_until
 from peers import program
+from ports import free_port
 
 DEPLOY = Path(__file__).parents[2] / "deploy" / "nginx.conf"
 NAMED = "hulls.example.org"

@@ -10,12 +10,6 @@ from patience import PATIENCE, wait_until
 from peers import program
 
 
-def free_port() -> int:
-    """A port that a broker can have again after it was killed."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        return int(free.getsockname()[1])
-
-
 @contextmanager
 def broker(command: Sequence[object], port: int) -> Iterator[subprocess.Popen[bytes]]:
     """A broker, once it listens."""

@@ -2,7 +2,6 @@
 
 import http.client
 import json
-import socket
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -114,9 +113,3 @@ class Events:
     def close(self) -> None:
         self.response.close()
         self._connection.close()
-
-
-def free_port() -> str:
-    """A port that was free a moment ago; processes that start again need the same one."""
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        return str(listening.getsockname()[1])

@@ -3,7 +3,6 @@
 import os
 import secrets
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from tempfile import TemporaryDirectory
 
 from cluster import descendants
 from patience import PATIENCE, wait_until
+from ports import free_port
 
 RAY = str(Path(sys.executable).with_name("ray"))
 MEMORY = "100000000"
@@ -39,10 +39,10 @@ class Node:
 
     def __init__(self, folder: Path, address: str = "") -> None:
         first = ["--head", "--num-cpus=0", "--include-dashboard=false", f"--temp-dir={folder}"]
-        self.address = address or f"127.0.0.1:{_free_port()}"
+        self.address = address or f"127.0.0.1:{free_port()}"
         port = self.address.rpartition(":")[2]
         where = ["--num-cpus=1", f"--address={address}"] if address else [*first, f"--port={port}"]
-        self._log = (folder / f"node-{_free_port()}.log").open("w+")
+        self._log = (folder / f"node-{free_port()}.log").open("w+")
         self._process = subprocess.Popen(
             [RAY, "start", "--block", "--node-ip-address=127.0.0.1", f"--object-store-memory={MEMORY}", *where],
             stdout=self._log,
@@ -109,8 +109,3 @@ def _name(process: int) -> str:
         return Path(f"/proc/{process}/comm").read_text().strip()
     except OSError:
         return ""
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return int(probe.getsockname()[1])

@@ -27,9 +27,10 @@ import nats
 from nats.js.client import JetStreamContext
 
 sys.path.append(str(Path(__file__).parents[2] / "support"))
-from brokers import broker, free_port, nats_server
+from brokers import broker, nats_server
 from ingest_process import ingest_process, ingested
 from patience import PATIENCE, wait_until
+from ports import free_port
 from server_process import Server, server_process
 
 from dynhull_client import HullClient
