@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster ray simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster cluster ray simulate mutants coverage peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -150,6 +150,9 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100 --workers
 	$(BIN)/python tests/robustness/cluster/machines_torture.py --faults 100
+
+cluster: .venv/.test  ## all tests of several processes and machines; `make test` runs the cheaper ones
+	CLUSTER_CASES=all $(BIN)/pytest tests/cluster -n 4
 
 ray: .venv/.test  ## all tests of Ray: Datasets, and as a launcher of servers; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray

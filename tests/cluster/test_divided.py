@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import with_all_cases
 from cluster import descendants, processes
 from command_line import dynhull
 from patience import PATIENCE, wait_until
@@ -47,7 +48,7 @@ SHARDS = 3
 START = 1_700_000_000
 
 
-@pytest.fixture(scope="module", params=SHAPES)
+@pytest.fixture(scope="module", params=["process", "workers", pytest.param("cluster", marks=with_all_cases)])
 def server(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     options = SHAPES[request.param]
     if request.param != "cluster":
@@ -491,7 +492,7 @@ def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
         assert client.verify("fleet").equal
 
 
-@pytest.mark.parametrize("options", [(), WORKERS], ids=["process", "workers"])
+@pytest.mark.parametrize("options", [(), pytest.param(WORKERS, marks=with_all_cases)], ids=["process", "workers"])
 def test_a_server_that_is_killed_has_the_old_shards_or_the_new_ones(tmp_path: Path, options: tuple[str, ...]) -> None:
     points = np.random.default_rng(5).normal(size=(20_000, 2))
     for life in range(6):

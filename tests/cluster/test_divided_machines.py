@@ -14,6 +14,7 @@ import grpc
 import numpy as np
 import pytest
 import trustme
+from cases import with_all_cases
 from cluster import processes
 from command_line import dynhull
 from one_gateway import entries
@@ -173,6 +174,7 @@ def test_owners_that_were_stopped_cannot_disturb_those_that_replaced_them(fleet:
     fleet.check()
 
 
+@with_all_cases
 def test_servers_come_and_go(postgres: PostgreSQL) -> None:
     """One of three gives up what it has, another one is stopped, and the last but one is gone all at once."""
     url = postgres.new_database()
@@ -194,6 +196,7 @@ def test_servers_come_and_go(postgres: PostgreSQL) -> None:
         fleet.check()
 
 
+@with_all_cases
 def test_other_numbers_of_shards_beside_moves(fleet: Fleet) -> None:
     one, other = sorted(set(fleet.owners()))
     done: list[int] = []
@@ -228,6 +231,7 @@ def test_the_shards_of_a_deleted_hull_are_deleted(fleet: Fleet) -> None:
         assert client.sample_points(fleet.hull, 9).points.tolist() == [[3, 4]]
 
 
+@with_all_cases
 def test_a_dump_beside_writes_is_of_one_revision(fleet: Fleet, postgres: PostgreSQL, tmp_path: Path) -> None:
     fleet.writer.more()
     before = len(fleet.writer.revisions)
@@ -269,6 +273,7 @@ def test_machines_with_addresses_of_their_own_use_tls(postgres: PostgreSQL, tmp_
         assert beside.positions("fleet", ["k7"]).positions.tolist() == [POINTS[7].tolist()]
 
 
+@with_all_cases
 def test_a_database_goes_from_workers_to_a_cluster_into_a_folder_and_back(postgres: PostgreSQL, tmp_path: Path) -> None:
     """Each has the same hull, and goes on: roots of a new database begin above all that the shards know of."""
     workers = ("--workers", "2", "--gateways", "1", *QUIET)

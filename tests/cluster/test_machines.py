@@ -90,6 +90,7 @@ def test_reads_of_a_pipeline_wait_while_partitions_move(url: str) -> None:
             asked = [pipeline.get_hull(name) for name in NAMES]
             while first.process.poll() is None:
                 asked += [pipeline.get_hull(name) for name in NAMES]
+                asked[-1].result()
         assert [each.result().info.name for each in asked] == NAMES * (len(asked) // len(NAMES))
 
 

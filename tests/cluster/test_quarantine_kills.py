@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import with_all_cases
 from cluster import processes
 from command_line import dynhull
 from postgresql import PostgreSQL
@@ -116,6 +117,7 @@ def live(server: Server, seed: int) -> list[Fleet]:
 
 
 @pytest.mark.one_process("a server of several processes has a shape of its own")
+@with_all_cases
 def test_in_folders(tmp_path: Path) -> None:
     data, copy, restored = (str(tmp_path / each) for each in ("data", "copy", "restored"))
     with server_process(*WORKERS, "--data", data, complaints=ENDED) as server:
