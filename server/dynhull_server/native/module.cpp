@@ -194,7 +194,8 @@ nb::bytes encoded(const nb::object& runs, const nb::object& rows, const nb::byte
 bool followed(const nb::object& runs, const Numbers& places, const nb::object& lasts, Numbers& news) {
   const View<Run> of_runs(runs);
   const View<std::int64_t> of_lasts(lasts);
-  Numbers found(of_runs.size());
+  Numbers found;
+  found.reserve(of_runs.size());
   for (const Run& run : of_runs.values()) {
     const std::int64_t* last = found.find(run.fence);
     if (!last) last = news.find(run.fence);
@@ -206,10 +207,12 @@ bool followed(const nb::object& runs, const Numbers& places, const nb::object& l
     if (run.first != *last + 1) return false;
     found.set(run.fence, *last + run.count);
   }
-  if (news.size() == 0)
+  if (news.size() == 0) {
     std::swap(news, found);
-  else
-    found.for_each([&](std::int64_t fence, std::int64_t last) { news.set(fence, last); });
+    return true;
+  }
+  news.reserve(found.size());
+  found.for_each([&](std::int64_t fence, std::int64_t last) { news.set(fence, last); });
   return true;
 }
 

@@ -1,92 +1,70 @@
-// A dictionary of integers without an object for each: open addressing with linear probing.
+// A dictionary of integers without an object for each.
 #pragma once
 
-#include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <stdexcept>
-#include <utility>
-#include <vector>
+
+#include "../../../dynhull/kernel/memory/open_table.hpp"
 
 namespace dynhull_server {
 
 class Numbers {
  public:
-  Numbers() = default;
-  // With room for that many.
-  explicit Numbers(std::size_t count) {
-    if (count > 0) allocate(std::bit_ceil(count + count / 2 + 1));
-  }
-
-  std::size_t size() const { return size_; }
+  std::size_t size() const { return table_.size(); }
 
   // Where the value of a key is; null if it is not there.
   const std::int64_t* find(std::int64_t key) const {
-    if (size_ == 0) return nullptr;
-    const Entry& entry = entries_[place_of(key)];
-    return entry.key == key && key != FREE ? &entry.value : nullptr;
+    const std::uint32_t at = position(key);
+    return at == dynhull::NONE ? nullptr : &table_[at].value;
   }
   void set(std::int64_t key, std::int64_t value) {
     if (key == FREE) throw std::invalid_argument("a number that no fence has");
-    if (4 * (size_ + 1) > 3 * entries_.size()) grow();
-    Entry& entry = entries_[place_of(key)];
-    size_ += entry.key == FREE;
-    entry = {key, value};
+    const std::uint32_t at = position(key);
+    if (at != dynhull::NONE) {
+      table_[at].value = value;
+      return;
+    }
+    table_.reserve(1);
+    table_.insert({key, value});
   }
+  // Makes room for `extra` more keys: those of another table come in the order of this one, and would all begin where
+  // it is small.
+  void reserve(std::size_t extra) { table_.reserve(extra); }
   // Returns the value, if it was there.
   std::optional<std::int64_t> take(std::int64_t key) {
-    const std::int64_t* const found = find(key);
-    if (!found) return {};
-    const std::int64_t value = *found;
-    std::size_t hole = place_of(key);
-    // Those behind it move up, unless their home is behind the hole.
-    for (std::size_t at = next(hole); entries_[at].key != FREE; at = next(at))
-      if (((at - home(entries_[at].key)) & mask()) >= ((at - hole) & mask()))
-        entries_[std::exchange(hole, at)] = entries_[at];
-    entries_[hole] = Entry();
-    --size_;
+    const std::uint32_t at = position(key);
+    if (at == dynhull::NONE) return {};
+    const std::int64_t value = table_[at].value;
+    table_.erase(at);
     return value;
   }
   template <class Visit>
   void for_each(Visit visit) const {
-    for (const Entry& entry : entries_)
-      if (entry.key != FREE) visit(entry.key, entry.value);
+    table_.for_each([&](const Entry& entry) { visit(entry.key, entry.value); });
   }
 
  private:
   static constexpr std::int64_t FREE = std::numeric_limits<std::int64_t>::min();
 
   struct Entry {
-    std::int64_t key = FREE, value = 0;
+    std::int64_t key, value;
+
+    std::uint32_t tag() const { return tag_of(key); }
+    bool is_free() const { return key == FREE; }
+    void make_free() { key = FREE; }
   };
 
-  std::size_t mask() const { return entries_.size() - 1; }
-  std::size_t next(std::size_t at) const { return (at + 1) & mask(); }
-  std::size_t home(std::int64_t key) const {
-    return static_cast<std::size_t>(static_cast<std::uint64_t>(key) * 0x9e3779b97f4a7c15 >> shift_);
+  static std::uint32_t tag_of(std::int64_t key) {
+    return static_cast<std::uint32_t>(static_cast<std::uint64_t>(key) * 0x9e3779b97f4a7c15 >> 32);
   }
-  // Of a key, or the free place for it.
-  std::size_t place_of(std::int64_t key) const {
-    std::size_t at = home(key);
-    while (entries_[at].key != key && entries_[at].key != FREE) at = next(at);
-    return at;
-  }
-  void allocate(std::size_t room) {
-    entries_.assign(room, Entry());
-    shift_ = 64 - std::countr_zero(room);
-  }
-  void grow() {
-    Numbers larger(std::max<std::size_t>(entries_.size(), 4));
-    for_each([&](std::int64_t key, std::int64_t value) { larger.set(key, value); });
-    std::swap(*this, larger);
+  std::uint32_t position(std::int64_t key) const {
+    return table_.first(tag_of(key), [key](const Entry& entry) { return entry.key == key; });
   }
 
-  std::vector<Entry> entries_;  // a power of two; a quarter of them is free
-  std::size_t size_ = 0;
-  int shift_ = 0;
+  dynhull::OpenTable<Entry> table_;
 };
 
 }  // namespace dynhull_server
