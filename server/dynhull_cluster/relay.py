@@ -74,16 +74,20 @@ class Relay:
         sending: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
         """Pass on the responses of a worker to a request, until the last; `sending` is around the sending of each."""
-        with call.cutoff():
-            await link.arrive()
-        async with one_request(link.stream(method, metadata_of(call)), message, call.cutoff()) as upstream:
-            while True:
-                with call.cutoff():
-                    response = await upstream.read()
-                if response is None:
-                    return
-                with sending():
-                    await self.send(call, response)
+
+        async def pass_on() -> None:
+            with call.cutoff():
+                await link.arrive()
+            async with one_request(link.stream(method, metadata_of(call)), message, call.cutoff()) as upstream:
+                while True:
+                    with call.cutoff():
+                        response = await upstream.read()
+                    if response is None:
+                        return
+                    with sending():
+                        await self.send(call, response)
+
+        await link.answer(method, call, message, pass_on)
 
     async def send(self, call: Call, response: bytes) -> None:
         """Send a response. Raises LimitExceededError if the caller does not receive it."""

@@ -53,22 +53,29 @@ class SharedFences:
             request = pb.WatchFenceRequest.FromString(message)
             call.access.require_read(decode_fence_name(request.name))
             link = self._relay.link(request.name)
-            with call.cutoff():
-                await link.arrive()
             sending = partial(self._metrics.sending, watcher, "fence")
             if request.HasField("consumer") or request.conflate or request.max_responses_per_second:
                 await self._relay.read_from(link, WATCH_FENCE, call, message, sending)
+            else:
+                work = partial(self._share, call, link, request, joined, sending)
+                await link.answer(WATCH_FENCE, call, message, work)
+
+    async def _share(
+        self, call: Call, link: WorkerLink, request: pb.WatchFenceRequest, joined: ExitStack, sending: Sending
+    ) -> None:
+        """Pass on a watch of the caller's own and the feed by turns, until the watch ends."""
+        feed: FenceFeed | None = None
+        with call.cutoff():
+            await link.arrive()
+        while True:
+            found = await self._catch_up(call, link, request, feed, joined, sending)
+            if found is None:
                 return
-            feed: FenceFeed | None = None
-            while True:
-                found = await self._catch_up(call, link, request, feed, joined, sending)
-                if found is None:
-                    return
-                feed, number = found
-                sequence = await self._follow(call, feed, number, sending)
-                if sequence is None:
-                    return
-                request.uid, request.after_sequence = feed.uid, sequence
+            feed, number = found
+            sequence = await self._follow(call, feed, number, sending)
+            if sequence is None:
+                return
+            request.uid, request.after_sequence = feed.uid, sequence
 
     async def _catch_up(
         self,

@@ -59,15 +59,22 @@ class SharedWatches:
                 message = await call.receive()
             request = pb.WatchRequest.FromString(message)
             call.access.require_read(decode_name(request.name))
-            found = await self._begin(call, request, message, watcher, joined)
+            link = self._relay.link(request.name)
+            begin = partial(self._begin, call, link, request, message, watcher, joined)
+            found = await link.answer(WATCH, call, message, begin)
             if found is not None:
                 await self._follow(call, request, watcher, *found)
 
     async def _begin(
-        self, call: Call, request: pb.WatchRequest, message: bytes, watcher: object, joined: ExitStack
+        self,
+        call: Call,
+        link: WorkerLink,
+        request: pb.WatchRequest,
+        message: bytes,
+        watcher: object,
+        joined: ExitStack,
     ) -> "tuple[Feed, Held] | None":
         """Pass on a watch of the caller's own, until what the caller holds is known; None if it ends before."""
-        link = self._relay.link(request.name)
         with call.cutoff():
             await link.arrive()
         revision = request.resume.revision

@@ -2,10 +2,10 @@
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import nullcontext, suppress
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 from weakref import WeakSet
 
 import grpc
@@ -25,6 +25,8 @@ from .ways import Ways
 LOOK_SECONDS = 0.05
 HEALTH_WATCH = "/grpc.health.v1.Health/Watch"
 UNKNOWN = health_pb2.HealthCheckResponse.UNKNOWN
+
+T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
@@ -117,12 +119,22 @@ class WorkerLink:
             WorkerAwayError: the worker is away; it has not seen the request.
             RelayedError: the worker refuses it, or has ended meanwhile.
         """
+        return await self._repeat(method, message, partial(self._ask, method, call, message), lambda: False)
+
+    async def answer(self, method: str, call: Call, message: bytes, work: Callable[[], Awaitable[T]]) -> T:
+        """Do the work of a call with many responses; again, as `ask` does, as long as its caller has none of them."""
+        return await self._repeat(method, message, work, lambda: call.begun)
+
+    async def _repeat(
+        self, method: str, message: bytes, work: Callable[[], Awaitable[T]], begun: Callable[[], bool]
+    ) -> T:
         until: float | None = None
         while True:
             try:
-                await self.arrive()
-                return await self._ask(method, call, message)
+                return await work()
             except (WorkerAwayError, RelayedError) as error:
+                if begun():
+                    raise
                 until = await self.again(method, message, error, until)
 
     async def again(
@@ -146,6 +158,7 @@ class WorkerLink:
         return until
 
     async def _ask(self, method: str, call: Call, message: bytes) -> bytes:
+        await self.arrive()
         frames = self._present().frames
         if len(message) <= MOST_BYTES:
             while not frames.writable.is_set():  # what a worker that does not read has not got is its caller's alone

@@ -116,6 +116,23 @@ def test_a_sketch_continues_too(address: str, connect: type[HullClient], name: s
             assert event.vertices.tolist() == [[5, 5]]
 
 
+def test_until_it_has_begun_it_is_tried_as_often_as_other_calls(
+    address: str, connect: type[HullClient], name: str
+) -> None:
+    with proxy("") as way, connect(way.address, retries=1_000_000) as patient, HullClient(address) as client:
+        client.create_hull(name)
+        watch = patient.watch(name)
+        events: list[object] = []
+        thread = threading.Thread(target=lambda: events.append(next(watch)))
+        thread.start()
+        wait_until(lambda: watch.lost is not None)
+        way.server = address
+        thread.join()
+        watch.close()
+        assert isinstance(events[0], Snapshot)
+        assert watch.lost is None
+
+
 def test_what_it_does_not_wait_for(connect: type[HullClient], address: str, name: str) -> None:
     with connect("127.0.0.1:1") as nowhere, pytest.raises(UnavailableError):
         next(nowhere.watch("a"))

@@ -20,7 +20,7 @@ from patience import PATIENCE, wait_until
 from postgresql import PostgreSQL, query
 from server_process import Server, server_process
 
-from dynhull_client import Batch, HullClient, HullUnsuitableError
+from dynhull_client import Batch, HullClient, HullUnsuitableError, Prefix
 from dynhull_cluster.placement import worker_of
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -113,11 +113,20 @@ def test_a_killed_machine_and_a_stopped_one_are_replaced(url: str) -> None:
         wait_until(lambda: sorted(served(url).values()) == [2, 2])
         client = stack.enter_context(HullClient(first.address, retries=0))
         assert apply_all(client, 1) == [1] * len(NAMES)
+        for name in NAMES:
+            client.create_fence(f"{name}-fence", [[0, 0], [9, 0], [0, 9]], Prefix(name[:2]))
         frozen = processes(second.process.pid)["worker-0"]
         os.kill(frozen, signal.SIGSTOP)
         try:
+            begun = [stack.enter_context(client.watch(name, reconnect=False)) for name in NAMES]
+            alarms = [
+                stack.enter_context(client.watch_fence(f"{name}-fence", progress_interval=1, reconnect=False))
+                for name in NAMES
+            ]
             assert apply_all(client, 2) == [2] * len(NAMES)
             assert len(served(url)) == 1
+            assert {next(each).revision for each in begun} <= {1, 2}
+            assert {next(each).type for each in alarms} == {"progress"}
         finally:
             os.kill(frozen, signal.SIGCONT)
         wait_until(lambda: sorted(served(url).values()) == [2, 2])  # it was started again, and has its share

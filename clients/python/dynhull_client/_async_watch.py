@@ -86,11 +86,11 @@ class AsyncWatch(AsyncFollower[Event]):
     """`Watch` for asyncio: an async iterator and an async context manager; another task may call `close`."""
 
     def __init__(self, connection: AsyncConnection, watching: Watching) -> None:
-        super().__init__(connection, HullPlace(watching))
+        super().__init__(connection, HullPlace(watching, connection.retries))
 
 
 class AsyncFenceWatch(AsyncFollower[FenceEvent]):
     """`FenceWatch` for asyncio: an async iterator and an async context manager; another task may call `close`."""
 
     def __init__(self, connection: AsyncConnection, watching: WatchingFence) -> None:
-        super().__init__(connection, FencePlace(watching))
+        super().__init__(connection, FencePlace(watching, connection.retries))

@@ -883,7 +883,8 @@ def watch(
             HullNotFoundError ends the watch. With `directions`, `layer` or `max_vertices`, the watch notices only a
             deletion that happens while it is connected.
         reconnect: whether the watch continues after a lost connection, however long that takes, with the changes since
-            then, or with a snapshot if the server no longer has them. The first connection must succeed. Without it,
+            then, or with a snapshot if the server no longer has them. Until the first event it is tried again as
+            other reads are (`retries` of the client). Without it,
             UnavailableError ends the watch, as does RevisionForgottenError if the server cannot continue from a copy.
         timeout: seconds after which the watch ends with DeadlineError; None for never.
     """

@@ -16,8 +16,8 @@ class FencePlace(Place[FenceEvent]):
     method = "WatchFence"
     request: pb.WatchFenceRequest
 
-    def __init__(self, watching: WatchingFence) -> None:
-        super().__init__(watching.timeout, watching.reconnect)
+    def __init__(self, watching: WatchingFence, retries: int) -> None:
+        super().__init__(watching.timeout, watching.reconnect, retries)
         self.request = pb.WatchFenceRequest()
         self.request.CopyFrom(watching.request)
         self._reports_progress = watching.request.HasField("progress_interval")

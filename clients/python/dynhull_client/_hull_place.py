@@ -22,9 +22,9 @@ class HullPlace(Place[Event]):
     method = "Watch"
     request: pb.WatchRequest
 
-    def __init__(self, watching: Watching) -> None:
+    def __init__(self, watching: Watching, retries: int) -> None:
         longest_pause = LONGEST_PAUSE_FOR_A_HULL if watching.follow else LONGEST_PAUSE
-        super().__init__(watching.timeout, watching.reconnect, longest_pause)
+        super().__init__(watching.timeout, watching.reconnect, retries, longest_pause)
         self.request = pb.WatchRequest()
         self.request.CopyFrom(watching.request)
         self._watching = watching

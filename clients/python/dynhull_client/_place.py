@@ -27,7 +27,9 @@ class Place(ABC, Generic[Happening]):
     method: str
     request: Any
 
-    def __init__(self, timeout: float | None, reconnect: bool, longest_pause: float = LONGEST_PAUSE) -> None:
+    def __init__(
+        self, timeout: float | None, reconnect: bool, retries: int, longest_pause: float = LONGEST_PAUSE
+    ) -> None:
         self.lost: DynhullError | None = None
         self.pause = 0.0
         self.ended = False
@@ -35,6 +37,7 @@ class Place(ABC, Generic[Happening]):
         self._reconnect = reconnect
         self._longest_pause = longest_pause
         self._begun = False
+        self._retries = retries
         self._pauses = self._new_pauses()
 
     def timeout(self) -> float | None:
@@ -55,8 +58,13 @@ class Place(ABC, Generic[Happening]):
             self.lost, self._begun, self._pauses = None, True, self._new_pauses()
 
     def _continue_later(self, error: DynhullError) -> None:
-        """Prepare the next connection after this one was lost; raises any other error."""
-        if not (self._reconnect and self._begun and error.code == grpc.StatusCode.UNAVAILABLE):
+        """Prepare the next connection after this one was lost; raises any other error.
+
+        Until the watch has begun it is a call like others, with as many retries; afterwards it goes on for ever.
+        """
+        if not self._begun:
+            self._retries -= 1
+        if not self._reconnect or self._retries < 0 or error.code != grpc.StatusCode.UNAVAILABLE:
             raise error from None
         if not self.request.HasField("progress_interval"):  # reports the new connection even if nothing changes
             self.request.progress_interval.seconds = 1

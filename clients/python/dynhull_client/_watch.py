@@ -87,7 +87,7 @@ class Watch(Follower[Event]):
     """
 
     def __init__(self, connection: BlockingConnection, watching: Watching) -> None:
-        super().__init__(connection, HullPlace(watching))
+        super().__init__(connection, HullPlace(watching, connection.retries))
 
 
 class FenceWatch(Follower[FenceEvent]):
@@ -98,4 +98,4 @@ class FenceWatch(Follower[FenceEvent]):
     """
 
     def __init__(self, connection: BlockingConnection, watching: WatchingFence) -> None:
-        super().__init__(connection, FencePlace(watching))
+        super().__init__(connection, FencePlace(watching, connection.retries))

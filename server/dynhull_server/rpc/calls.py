@@ -77,6 +77,11 @@ class Call:
         self._begun = False
 
     @property
+    def begun(self) -> bool:
+        """Whether `write_within` has sent anything."""
+        return self._begun
+
+    @property
     def owner(self) -> str:
         """The owner whose limits apply: that of the token, or without tokens the address of the caller."""
         if not self._owner:
