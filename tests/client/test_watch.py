@@ -181,6 +181,25 @@ def test_following_a_hull_that_is_deleted_and_created_again(address: str, connec
         watch.close()
 
 
+@pytest.mark.parametrize("shown", [{"layer": 2}, {"max_vertices": 4}, {"directions": [[1, 0]]}], ids=str)
+def test_following_what_cannot_be_resumed(
+    shown: dict[str, Any], address: str, connect: type[HullClient], name: str
+) -> None:
+    """A hull that was deleted and created again while there was no connection is another one."""
+    with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
+        client.create_hull(name)
+        client.apply(name, insert=[[1, 2], [3, 4]])
+        with watching.watch(name, follow=True, **shown) as watch:
+            assert next(watch).revision == 1
+            way.server = ""
+            way.cut()
+            client.delete_hull(name)
+            client.create_hull(name)
+            way.server = address
+            assert next(watch) == Deleted(1)
+            assert next(watch).revision == 0
+
+
 def test_following_from_a_copy_of_an_earlier_hull(address: str, connect: type[HullClient], name: str) -> None:
     copy = HullCopy()
     with connect(address) as client:

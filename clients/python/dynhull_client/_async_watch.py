@@ -47,7 +47,7 @@ class AsyncFollower(AsyncIterator[Happening]):
                         await self._closed.wait()
             if self._closed.is_set() or self._place.ended:
                 raise StopAsyncIteration
-            if self._call is None or self._call.cancelled():  # gRPC cancels a call when its caller stops waiting
+            if self._call is None:
                 self._begin()
             try:
                 self._arrived.extend(self._place.take(await anext(self._events)))
@@ -56,6 +56,9 @@ class AsyncFollower(AsyncIterator[Happening]):
                 self._arrived.extend(self._place.end(error_of(failure)))
             except asyncio.CancelledError:
                 if not self._closed.is_set():
+                    # gRPC's iterator has ended, but not always its call. The next one continues where this one was.
+                    self._call.cancel()
+                    self._call, self._place.pause = None, 0.0
                     raise
         return self._arrived.popleft()
 
