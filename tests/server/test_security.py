@@ -13,7 +13,9 @@ from refusal import refusal
 from server_process import Server, server_process
 
 from dynhull_client import (
+    Circle,
     HullClient,
+    HullFencedError,
     HullNotFoundError,
     PermissionDeniedError,
     UnauthenticatedError,
@@ -321,3 +323,19 @@ def test_a_point_is_not_told_either(guarded: Server) -> None:
         after = root.get_hull("port")
         assert (after.revision, after.info.uid) == (before.revision, before.info.uid)
         assert points_pb2.Points(packed=after.vertices.tobytes()) == points_pb2.Points(packed=before.vertices.tobytes())
+
+
+def test_a_refusal_names_no_fence_that_the_caller_may_not_read(guarded: Server) -> None:
+    with HullClient(guarded.address, token=FLEET) as fleet, HullClient(guarded.address, token=ROOT) as root:
+        root.create_hull("fleet/truck-9", keyed="str", geographic=True)
+        root.put("fleet/truck-9", ["a"], [[1, 1]])
+        for fence, told in (("secret/fence", None), ("fleet/fence", "fleet/fence")):
+            root.create_fence(fence, area=Circle(0, 0, 1), subjects="fleet/truck-9")
+            for refused in (fleet.delete_hull, fleet.recenter):
+                with pytest.raises(HullFencedError) as error:
+                    refused("fleet/truck-9")
+                assert error.value.fence == told
+                assert "secret" not in str(error.value)
+                with pytest.raises(HullFencedError, match=fence):
+                    getattr(root, refused.__name__)("fleet/truck-9")
+            root.delete_fence(fence)

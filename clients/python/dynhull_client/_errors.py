@@ -128,7 +128,7 @@ class HullFencedError(DynhullError):
 
     @property
     def fence(self) -> str | None:
-        """The name of a fence to delete first."""
+        """The name of a fence to delete first; None if the token may not read it."""
         return self.metadata.get("fence")
 
 

@@ -34,8 +34,8 @@ class FenceServiceStub(object):
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
     A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
-    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
-    leave, with the cause SUBJECT_REMOVED.
+    name of a fence in the metadata ("fence"), unless the caller may not read it. A hull that a fence only knows by its prefix
+    can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.
@@ -103,8 +103,8 @@ class FenceServiceServicer(object):
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
     A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
-    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
-    leave, with the cause SUBJECT_REMOVED.
+    name of a fence in the metadata ("fence"), unless the caller may not read it. A hull that a fence only knows by its prefix
+    can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.
@@ -240,8 +240,8 @@ class FenceService(object):
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
     A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
-    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
-    leave, with the cause SUBJECT_REMOVED.
+    name of a fence in the metadata ("fence"), unless the caller may not read it. A hull that a fence only knows by its prefix
+    can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.

@@ -35,8 +35,8 @@ class FenceServiceStub:
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
     A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
-    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
-    leave, with the cause SUBJECT_REMOVED.
+    name of a fence in the metadata ("fence"), unless the caller may not read it. A hull that a fence only knows by its prefix
+    can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.
@@ -79,8 +79,8 @@ class FenceServiceAsyncStub(FenceServiceStub):
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
     A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
-    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
-    leave, with the cause SUBJECT_REMOVED.
+    name of a fence in the metadata ("fence"), unless the caller may not read it. A hull that a fence only knows by its prefix
+    can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.
@@ -119,8 +119,8 @@ class FenceServiceServicer(metaclass=_abc_1.ABCMeta):
     none. Between two revisions in one atomic batch nothing is seen. Within one revision events are in the order of the keys.
 
     A hull that a fence names cannot be deleted: DeleteHull is refused with FAILED_PRECONDITION, reason HULL_FENCED, and the
-    name of a fence in the metadata ("fence"). A hull that a fence only knows by its prefix can: its subjects that are inside
-    leave, with the cause SUBJECT_REMOVED.
+    name of a fence in the metadata ("fence"), unless the caller may not read it. A hull that a fence only knows by its prefix
+    can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
     create, replace or delete it; the right to read for the name of the fence for all else.

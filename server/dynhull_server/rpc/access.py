@@ -106,6 +106,10 @@ class Rights:
         self._access.require_write(name)
         self._granted.append((Access.require_write, name))
 
+    def may_read(self, name: str) -> bool:
+        """Whether the name may be told."""
+        return name.startswith(self._access.read)
+
     def readable(self, prefix: str) -> list[str]:
         """The prefixes of the readable names that begin with `prefix`."""
         return self._access.readable(prefix)

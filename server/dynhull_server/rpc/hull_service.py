@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import aclosing
+from contextlib import aclosing, contextmanager
 from functools import partial
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..engine.live_hull import LiveHull
 from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
-from ..state.errors import HullEmptyError
+from ..state.errors import HullEmptyError, HullFencedError
 from ..state.frames import require_lines, require_reach
 from . import answers, decode, encode
 from .calls import Call
@@ -65,7 +65,8 @@ class HullService:
     async def DeleteHull(self, request: pb.DeleteHullRequest, call: Call) -> pb.DeleteHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
-        await self._engine.delete(name)
+        with _naming_fences(call):
+            await self._engine.delete(name)
         return pb.DeleteHullResponse()
 
     async def ListHulls(self, request: pb.ListHullsRequest, call: Call) -> pb.ListHullsResponse:
@@ -79,7 +80,8 @@ class HullService:
     async def Recenter(self, request: pb.RecenterRequest, call: Call) -> pb.RecenterResponse:
         hull = self._engine.get(self._written(call, request.name))
         center = decode_center(request.center, "center") if request.HasField("center") else None
-        counts, hull_changed = await hull.recenter(center)
+        with _naming_fences(call):
+            counts, hull_changed = await hull.recenter(center)
         return pb.RecenterResponse(hull=encode.encode_hull(hull, counts), hull_changed=hull_changed)
 
     async def SetQuarantine(self, request: pb.SetQuarantineRequest, call: Call) -> pb.SetQuarantineResponse:
@@ -499,6 +501,17 @@ class HullService:
             )
         name = self._written(call, first.name)
         return StreamedBatches(call, first, name, self._engine, self._metrics, create=self._create_on_write)
+
+
+@contextmanager
+def _naming_fences(call: Call) -> Iterator[None]:
+    """A refusal names no fence that the caller may not read."""
+    try:
+        yield
+    except HullFencedError as error:
+        if error.fence is None or call.access.may_read(error.fence):
+            raise
+        raise HullFencedError(error.name) from None
 
 
 def _acknowledgements(streamed: StreamedBatches) -> Iterator[pb.StreamResponse]:

@@ -202,7 +202,7 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case HullFencedError():
             failure = PreconditionFailure()
             failure.violations.add(type="HULL_FENCED", subject=error.name, description=str(error))
-            metadata = {"value": error.name, "fence": error.fence}
+            metadata = {"value": error.name} | ({} if error.fence is None else {"fence": error.fence})
             return _status(code.FAILED_PRECONDITION, str(error), "HULL_FENCED", metadata, failure)
         case SequenceAheadError():
             metadata = {"field": error.field, "value": str(error.sequence), "last": str(error.last)}

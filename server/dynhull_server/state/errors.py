@@ -271,11 +271,12 @@ class HullFencedError(RefusedError):
 
     Attributes:
         name: the name of the hull.
-        fence: the name of a fence that depends on it.
+        fence: the name of a fence that depends on it; None if it is not to be told.
     """
 
-    def __init__(self, name: str, fence: str) -> None:
-        super().__init__(f"the fence {fence!r} depends on the hull {name!r}: delete the fence first")
+    def __init__(self, name: str, fence: str | None = None) -> None:
+        told = "a fence that this token may not read" if fence is None else f"the fence {fence!r}"
+        super().__init__(f"{told} depends on the hull {name!r}: delete the fence first")
         self.name = name
         self.fence = fence
 
