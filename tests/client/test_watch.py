@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -244,6 +245,29 @@ def test_a_cancelled_wait_does_not_end_the_watch(address: str, name: str) -> Non
                     await asyncio.wait_for(anext(watch), 0.05)
                 await client.apply(name, insert=[[1, 2]])
                 assert isinstance(await anext(watch), Change)
+        return copy
+
+    copy = asyncio.run_coroutine_threadsafe(follow(), loop()).result()
+    assert copy.vertices.tolist() == [[1, 2]]
+
+
+def test_waits_cancelled_at_any_moment_do_not_end_the_watch(address: str, name: str) -> None:
+    """Also before the call that the wait has begun is sent."""
+
+    async def follow() -> HullCopy:
+        copy = HullCopy()
+        async with AsyncHullClient(address) as client:
+            await client.create_hull(name)
+            async with client.watch(name, copy=copy) as watch:
+                for turns in reversed(range(1, 12)):
+                    wait = asyncio.ensure_future(anext(watch))
+                    for _ in range(turns):
+                        await asyncio.sleep(0)
+                    wait.cancel()
+                    await asyncio.wait([wait])
+                await client.apply(name, insert=[[1, 2]])
+                while copy.revision < 1:
+                    await anext(watch)
         return copy
 
     copy = asyncio.run_coroutine_threadsafe(follow(), loop()).result()

@@ -9,7 +9,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ._calls import Watching, resumable
 from ._errors import DynhullError, HullNotFoundError, HullReplacedError, RevisionForgottenError
-from ._messages import Deleted, Event, Progress, Snapshot, decode_event
+from ._messages import Deleted, Event, Progress, Sketch, Snapshot, decode_event
 from ._place import Place
 from ._retry import LONGEST_PAUSE, LONGEST_PAUSE_FOR_A_HULL
 
@@ -29,6 +29,7 @@ class HullPlace(Place[Event]):
         self.request.CopyFrom(watching.request)
         self._watching = watching
         self._revision = -1
+        self._uid = self.request.resume.uid
         self._unknown: set[int] = set()
 
     def take(self, message: pb.WatchResponse) -> Sequence[Event]:
@@ -38,6 +39,7 @@ class HullPlace(Place[Event]):
         if event is None:
             self._note(message)
             return ()
+        deleted = self._identify(event.uid) if isinstance(event, Snapshot | Sketch) else ()
         if isinstance(event, Snapshot) and resumable(self.request):
             self.request.resume.uid = event.uid
         if self.request.HasField("resume"):  # without one, each connection begins with the whole state
@@ -46,7 +48,7 @@ class HullPlace(Place[Event]):
             self._watching.copy.update(event)
         news = event.revision > self._revision or self._watching.request.HasField("progress_interval")
         self._revision = event.revision
-        return (event,) if news or not isinstance(event, Progress) else ()
+        return (*deleted, event) if news or not isinstance(event, Progress) else ()
 
     def end(self, error: DynhullError) -> Sequence[Event]:
         """Prepare the next connection after one has ended; raises the error if there is none."""
@@ -60,6 +62,11 @@ class HullPlace(Place[Event]):
         else:
             self._continue_later(error)
         return ()
+
+    def _identify(self, uid: str) -> Sequence[Event]:
+        """Learn which hull this is: the one before was deleted where a watch that does not resume sees another one."""
+        before, self._uid = self._uid, uid
+        return self._forget() if self._watching.follow and before not in ("", uid) else ()
 
     def _forget(self) -> Sequence[Event]:
         """Expect another hull; the event is for a hull that the caller has seen."""

@@ -392,6 +392,7 @@ class Sketch(Value):
     clock: datetime | None = None
     center: tuple[float, float] | None = None
     error: float = 0.0
+    uid: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -626,8 +627,9 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
         return Snapshot(*head, decode_points(snapshot.vertices), measures, snapshot.uid, named, cause, clock, center)
     if message.HasField("sketch"):
         named = decode_names(message.sketch.keys) if keys else None
-        vertices, error = decode_points(message.sketch.vertices), message.sketch.error
-        return Sketch(*head, vertices, measures, named, cause, clock, center, error)
+        sketch = message.sketch
+        vertices = decode_points(sketch.vertices)
+        return Sketch(*head, vertices, measures, named, cause, clock, center, sketch.error, sketch.uid)
     if message.HasField("change"):
         change = message.change
         return Change(

@@ -913,14 +913,16 @@ class HullSnapshot(_message.Message):
     def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., uid: _Optional[str] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class HullSketch(_message.Message):
-    __slots__ = ("vertices", "keys", "error")
+    __slots__ = ("vertices", "keys", "error", "uid")
     VERTICES_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
     ERROR_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     vertices: _points_pb2.Points
     keys: _points_pb2.Keys
     error: float
-    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., error: _Optional[float] = ...) -> None: ...
+    uid: str
+    def __init__(self, vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., error: _Optional[float] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class HullChange(_message.Message):
     __slots__ = ("removed", "removed_indices", "added", "added_indices", "rotation", "added_keys", "renamed_indices", "renamed_keys")

@@ -46,6 +46,7 @@ class Sketch:
     """
 
     counts: Counts
+    uid: str
     extremes: Points
     vertices: Points | None
     keys: VertexKeys | None = None
@@ -187,7 +188,7 @@ class SketchView:
     async def first(self, min_revision: int) -> Event:
         """A sketch."""
         counts, self._held = await self._hull.read(self._look, self._rows, min_revision)
-        return Sketch(counts, *self._held)
+        return Sketch(counts, self._hull.uid, *self._held)
 
     async def next(self) -> Event:
         """A sketch, if it has changed."""
@@ -195,7 +196,7 @@ class SketchView:
         counts, self._held = await self._hull.read(self._look, self._rows)
         if all(map(_same, before, self._held)):
             return Progress(counts)
-        return Sketch(counts, *self._held)
+        return Sketch(counts, self._hull.uid, *self._held)
 
     async def changed(self, revision: int) -> None:
         """Wait until the vertices, or with keys the hull, may have changed."""
@@ -246,7 +247,7 @@ class FewView:
         else:
             rows = self._most * ROWS_A_VERTEX + (self._hull.vertex_count if self._with_vertices else 0)
             counts, (self._held, self._error) = await self._hull.read(self._look, rows, min_revision)
-        return Sketch(counts, *self._held, error=self._error)
+        return Sketch(counts, self._hull.uid, *self._held, error=self._error)
 
     async def first(self, min_revision: int) -> Event:
         """A sketch."""

@@ -290,6 +290,7 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
         case Progress():
             message.progress.SetInParent()
         case _:
+            message.sketch.uid = event.uid
             message.sketch.vertices.CopyFrom(encode_points(event.extremes, encoding))
             message.sketch.error = event.error
             if event.keys is not None:
