@@ -115,6 +115,10 @@ def test_waiting_for_a_hull(address: str, connect: type[HullClient], name: str) 
     with proxy(address) as way, connect(way.address) as waiting, HullClient(address) as client:
         with pytest.raises(DeadlineError, match=f"not within 0.2 s: .*{name}"):
             waiting.wait_for_hull(name, timeout=0.2)
+        way.flowing.clear()
+        with pytest.raises(DeadlineError, match=f"not within 0.2 s: no server has said whether hull '{name}' exists"):
+            waiting.wait_for_hull(name, timeout=0.2)
+        way.flowing.set()
         way.server = "127.0.0.1:1"
         way.cut()
         found = []

@@ -74,11 +74,13 @@ class Attempts:
         return call, pause
 
     def _explained(self, call: Call[Answer], error: DynhullError) -> DynhullError:
-        """The error; after the timeout with the revision that the call waited for, which gRPC does not know."""
+        """The error; after the timeout with what the call waited for, which gRPC does not know."""
         if not isinstance(error, DeadlineError) or self._timeout is None:
             return error
         message = f"the call took longer than {self._timeout:g} s"
-        revision = getattr(call.request, "min_revision", 0)
+        revision, hull = getattr(call.request, "min_revision", 0), getattr(call.request, "name", "")
         if revision:
-            message += f"; hull {getattr(call.request, 'name', '')!r} may not have reached revision {revision}"
+            message += f"; hull {hull!r} may not have reached revision {revision}"
+        elif call.awaits_hull:
+            message = f"not within {self._timeout:g} s: no server has said whether hull {hull!r} exists"
         return DeadlineError(message, error.code, error.reason, error.metadata)
