@@ -190,6 +190,7 @@ def test_events_are_values(client: HullClient, name: str) -> None:
         position=(1.0, 1.0),
         distance=0.0,
         time=enter.time,
+        after=1,
     )
     assert (leave.type, leave.sequence, leave.cause) == ("exit", 2, frozenset({"subject_moved"}))
     assert (leave.position, leave.previous_position, leave.distance) == ((4.0, 7.0), (1.0, 1.0), 3.0)
@@ -321,4 +322,20 @@ def test_cancelling_events_can_be_left_out(client: HullClient, name: str) -> Non
     client.put(name, ["c"], [[1, 1]])
     with client.watch_fence(name, after=0, conflate=True) as watch:
         event = next(watch)
-    assert (event.key, event.sequence, event.conflated) == ("c", 5, 4)
+    assert (event.key, event.sequence, event.conflated, event.after) == ("c", 5, 4, 5)
+
+
+def test_where_a_watch_continues_from_which_events_were_left_out(client: HullClient, name: str) -> None:
+    """Not behind the sequences of its events: those left out lie around them."""
+    client.create_fence(name, area=SQUARE, subjects=name, initial="none")
+    for keys, place in (("a", 1), ("a", 9), ("b", 1), ("c", 1), ("a", 1)):
+        client.put(name, [keys], [[place, place]])
+    with client.watch_fence(name, after=1, conflate=True) as watch:
+        assert [(event.key, event.sequence, event.after) for event in (next(watch), next(watch))] == [
+            ("b", 3, None),
+            ("c", 4, 5),
+        ]
+    client.put(name, ["a"], [[9, 9]])
+    with client.watch_fence(name, after=5, conflate=True) as watch:
+        event = next(watch)
+    assert (event.type, event.key, event.after) == ("exit", "a", 6)

@@ -129,6 +129,36 @@ def test_a_reader_continues_where_it_was(gateway: Gateway, name: str) -> None:
         each.close()
 
 
+def test_a_reader_cut_off_where_events_are_left_out(gateway: Gateway, name: str) -> None:
+    """It would have missed the exit that was left out: it gets all events up to where what was sent together led."""
+    gateway.post("/hulls", {"name": name, "keyed": "str"})
+    gateway.post("/fences", {"name": name, "area": {"exterior": SQUARE}, "subjects": name, "initial": "none"})
+
+    def move(key: str, place: int) -> None:
+        gateway.post(f"/hulls/{name}/points", {"keys": [key], "points": [[place, place]]})
+
+    def after(ident: str) -> Events:
+        return Events(gateway, f"/fences/{name}/events?conflate=true", Last_Event_ID=ident)
+
+    for key, place in (("a", 1), ("a", 9), ("b", 1), ("c", 1), ("a", 1)):
+        move(key, place)
+    uid = gateway.get(f"/fences/{name}").json["uid"]
+    whole = after(f"{uid}:1")
+    first, last = next(iter(whole)), next(iter(whole))
+    assert [json.loads(each["data"])["key"] for each in (first, last)] == ["b", "c"]
+    assert last["id"] == f"{uid}:5"
+    cut_off = after(first["id"])
+    move("a", 9)
+    for reader, expected in (
+        (cut_off, ["exit a", "enter b", "enter c", "enter a", "exit a"]),
+        (after(last["id"]), ["exit a"]),
+        (whole, ["exit a"]),
+    ):
+        told = [reader.next() for _ in expected]
+        assert [f"{kind} {data['key']}" for kind, data in told] == expected
+        reader.close()
+
+
 def test_a_layer_and_a_sketch(gateway: Gateway, name: str) -> None:
     gateway.post("/hulls", {"name": name})
     octagon = [[2, 0], [4, 0], [6, 2], [6, 4], [4, 6], [2, 6], [0, 4], [0, 2]]

@@ -199,6 +199,9 @@ class FenceEvent:
             `previous_position` is; empty otherwise. A list of the subjects inside loses the key of this hull by "exit"
             and "transfer".
         previous_hull_revision: the revision of that hull that has removed the key; 0 otherwise.
+        after: the sequence after which a later watch continues behind this event. It is `sequence`, unless events were
+            left out of what was sent together: then that of the last one is beyond what was left out, and that of the
+            others is None.
     """
 
     type: EventType
@@ -222,6 +225,7 @@ class FenceEvent:
     conflated: int = 0
     previous_hull: str = ""
     previous_hull_revision: int = 0
+    after: int | None = None
 
 
 def decode_fence(message: fence_pb2.Fence) -> Fence:
@@ -271,7 +275,9 @@ def decode_inside(parts: list[fence_service_pb2.ReadInsideResponse]) -> Inside:
     return Inside(parts[0].sequence, tuple(found.values()))
 
 
-def decode_fence_event(message: fence_pb2.FenceEvent, fence: str, uid: str, conflated: int) -> FenceEvent:
+def decode_fence_event(
+    message: fence_pb2.FenceEvent, fence: str, uid: str, conflated: int, after: int | None
+) -> FenceEvent:
     """An event of a fence."""
     chosen = message.WhichOneof("key")
     return FenceEvent(
@@ -294,6 +300,7 @@ def decode_fence_event(message: fence_pb2.FenceEvent, fence: str, uid: str, conf
         conflated=conflated,
         previous_hull=message.previous_hull,
         previous_hull_revision=message.previous_hull_revision,
+        after=after,
     )
 
 

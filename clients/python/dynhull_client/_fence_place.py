@@ -33,17 +33,19 @@ class FencePlace(Place[FenceEvent]):
         events = []
         if message.HasField("lost"):
             first, last = message.lost.first_sequence, message.lost.last_sequence
-            events.append(FenceEvent("lost", last, name, uid, first=first, last=last))
+            events.append(FenceEvent("lost", last, name, uid, first=first, last=last, after=last))
         self._conflated += message.conflated
         for i, event in enumerate(message.events, start=1):
-            conflated = self._conflated if i == len(message.events) else 0
-            events.append(decode_fence_event(event, name, uid, conflated))
+            conflated, after = 0, None if message.conflated else event.sequence
+            if i == len(message.events):
+                conflated, after = self._conflated, message.sequence
+            events.append(decode_fence_event(event, name, uid, conflated, after))
         if message.events:
             self._conflated = 0
         self.request.after_sequence = message.sequence
         self._closed = any(event.type == "closed" for event in events)
         if not events and self._reports_progress:
-            events.append(FenceEvent("progress", message.sequence, name, uid))
+            events.append(FenceEvent("progress", message.sequence, name, uid, after=message.sequence))
         return events
 
     def end(self, error: DynhullError) -> Sequence[FenceEvent]:

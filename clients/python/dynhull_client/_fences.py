@@ -248,7 +248,8 @@ def watch_fence(
             acknowledges.
         after: the sequence after which to begin; 0 for all events that are kept.
         uid: the uid of the fence whose sequences the caller has: FenceReplacedError if it was created again since then.
-        conflate: leave out events that cancel each other in what is sent together; not with a consumer.
+        conflate: leave out events that cancel each other in what is sent together; not with a consumer. A later watch
+            continues after the attribute `after` of an event, not after its sequence.
         max_rate: the most responses a second, each with all events since the one before; 0 for no limit. At
             least one a day.
         progress_interval: seconds without an event after which an event "progress" is sent; None for never.

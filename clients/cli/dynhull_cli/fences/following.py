@@ -9,6 +9,7 @@ import typer
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..plural import plural
+from ..tab_lines import tab_line
 from .settings import FenceName
 
 if TYPE_CHECKING:
@@ -29,7 +30,12 @@ def watch(
     ] = None,
     events: Annotated[int | None, typer.Option(min=1, max=sys.maxsize, help="End after this many events.")] = None,
     conflate: Annotated[
-        bool, typer.Option("--conflate", help="Leave out an enter and an exit that cancel each other.")
+        bool,
+        typer.Option(
+            "--conflate",
+            help="Leave out an enter and an exit that cancel each other. "
+            'A later --after is the member "after" of --json.',
+        ),
     ] = False,
     max_rate: Annotated[float, typer.Option(min=0, help="At most this many messages per second; 0 for all.")] = 0.0,
     as_json: AsJson = False,
@@ -54,7 +60,9 @@ def watch(
         raise ValueError("--ack needs --consumer: who acknowledges?")
 
     def line(event: FenceEvent) -> str:
-        return json_line(**event_members(event)) if as_json else "\t".join(event_cells(event))
+        if as_json:
+            return json_line(**event_members(event), **({"after": event.after} if conflate else {}))
+        return tab_line(*event_cells(event))
 
     with client.watch_fence(name, consumer, after, conflate=conflate, max_rate=max_rate) as stream:
         if not sys.stdout.isatty():

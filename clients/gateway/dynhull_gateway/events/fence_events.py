@@ -23,6 +23,8 @@ class Reading:
         uid: the uid of the fence; empty if it is not known yet.
         after: the sequence of the last event that the reader has; None for new events only.
         conflate: whether to leave out events that cancel each other.
+        exact: the sequence up to which none is left out again: the reader has a part of what was sent together.
+        ended: whether the fence was deleted.
     """
 
     name: str
@@ -30,6 +32,8 @@ class Reading:
     uid: str
     after: int | None
     conflate: bool
+    exact: int = 0
+    ended: bool = False
 
 
 async def events(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:
@@ -48,23 +52,30 @@ async def events(client: AsyncHullClient, reading: Reading, keepalive: float) ->
             yield COMMENT
             await asyncio.sleep(RETRY_SECONDS)
         else:
-            return  # the fence was deleted
+            if reading.ended:
+                return
 
 
 async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:
-    """One watch, which continues over lost connections itself once it has begun."""
+    """One watch, which continues over lost connections itself once it has begun.
+
+    Who has a part of what was sent together is not where any sequence leads. The ids of such events say so, from which
+    sequence to which, and a reader with such an id is sent all events of that part.
+    """
     if reading.consumer is None and not (reading.uid and reading.after is not None):
         fence = await client.get_fence(reading.name)
         reading.uid = fence.uid
         reading.after = fence.last_sequence if reading.after is None else reading.after
         yield place(f"{reading.uid}:{reading.after}")  # a reader that is cut off before the first event misses none
+    exact = reading.conflate and (reading.after or 0) < reading.exact
     watch = client.watch_fence(
         reading.name,
         consumer=reading.consumer,
         after=None if reading.consumer else reading.after,
         uid=reading.uid,
-        conflate=reading.conflate,
+        conflate=reading.conflate and not exact,
     )
+    together: list[FenceEvent] = []
     async with watch:
         coming = asyncio.ensure_future(anext(watch))
         try:
@@ -76,18 +87,30 @@ async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) 
                 try:
                     event = coming.result()
                 except StopAsyncIteration:
+                    reading.ended = True
                     return
-                yield message(event.type, f"{event.uid}:{event.sequence}", shown(event))
-                reading.uid, reading.after = event.uid, event.sequence
+                together.append(event)
+                if event.after is not None:
+                    idents = [f"{event.uid}:{reading.after}~{event.after}"] * (len(together) - 1)
+                    idents.append(f"{event.uid}:{event.after}")
+                    yield b"".join(map(_text, together, idents))
+                    reading.uid, reading.after = event.uid, event.after
+                    together.clear()
+                    if exact and event.after >= reading.exact:
+                        return
                 coming = asyncio.ensure_future(anext(watch))
         finally:
             coming.cancel()
             await asyncio.gather(coming, return_exceptions=True)
 
 
+def _text(event: FenceEvent, ident: str) -> bytes:
+    return message(event.type, ident, shown(event))
+
+
 def shown(event: FenceEvent) -> dict[str, Any]:
     """An event as JSON has it, without what is not there."""
-    named = {name: getattr(event, name) for name in FenceEvent.__dataclass_fields__}
+    named = {name: getattr(event, name) for name in FenceEvent.__dataclass_fields__ if name != "after"}
     named["cause"] = sorted(event.cause)
     named["inside"] = [{"hull": each.hull, "keys": each.keys, "revision": each.revision} for each in event.inside]
     return {name: value for name, value in named.items() if value not in (None, "", [], 0) or name == "sequence"}

@@ -20,6 +20,12 @@ def place(ident: str) -> bytes:
     return f"id: {ident}\n\n".encode()
 
 
+def parted(ident: str | None) -> tuple[str | None, int]:
+    """A Last-Event-ID "UID:AFTER~EXACT" as "UID:AFTER" and the number behind, which is 0 for others."""
+    place, _, exact = (ident or "").partition("~")
+    return (place, int(exact)) if exact.isdecimal() and len(exact) <= 20 else (ident, 0)
+
+
 def resumed(ident: str | None) -> tuple[str, int] | None:
     """The uid and the number in a Last-Event-ID; None if there is none, or none of ours."""
     uid, _, number = (ident or "").rpartition(":")

@@ -15,7 +15,7 @@ from . import documents
 from .feeds import Form, View
 from .fence_events import Reading
 from .fence_events import events as fence_events
-from .messages import resumed
+from .messages import parted, resumed
 from .stream import EventStream
 
 router = APIRouter(tags=["events"])
@@ -118,6 +118,9 @@ async def follow_fence(
 ) -> Response:
     """Follow a fence: each event once and in order, named by its type, with ids UID:SEQUENCE.
 
+    With `conflate`, events that are sent together may belong together; the ids of all but the last one then say so. Who
+    connects again with such an id is sent all of them once more, and what was left out of them.
+
     It begins with the next event unless Last-Event-ID, a sequence or a consumer says where; a consumer acknowledges
     with `PUT /fences/{name}/consumers/{consumer}`, and is sent what it has not acknowledged. `POST /fences` creates a
     fence. The data is JSON, as described by the schema FenceEvent. Also: "replaced", when another fence has the name
@@ -126,9 +129,10 @@ async def follow_fence(
     if consumer is not None and (after is not None or conflate):
         raise ValueError("give either consumer, which knows its place, or after and conflate")
     _admit(request)
-    resume = resumed(last_event_id)
+    ident, exact = parted(last_event_id)
+    resume = resumed(ident)
     uid, place = ("", after) if resume is None or consumer is not None else resume
-    reading = Reading(name, consumer, uid, place, conflate)
+    reading = Reading(name, consumer, uid, place, conflate, exact)
     await _require_fence(client, reading, "after" if resume is None else "Last-Event-ID")
     state = request.app.state
     texts = fence_events(client, reading, state.settings.keepalive_seconds)
