@@ -3,7 +3,9 @@
 import json
 
 import pytest
-from command_line import dynhull
+from command_line import dynhull, on_a_terminal
+
+from dynhull_client import HullClient
 
 
 def run(*arguments, code=0, **more):
@@ -38,3 +40,24 @@ def test_held_positions_are_listed_released_and_dropped(name):
     assert "--max-speed or --max-growth" in run("quarantine", "set", name, "--confirmations", "3", code=2).stderr
     assert "must be positive" in run("quarantine", "set", name, "--max-speed", "0", code=2).stderr
     assert "give either keys or --all" in run("quarantine", "drop", name, "a", "--all", code=2).stderr
+
+
+def test_a_key_forges_no_lines_and_no_markup(name, served):
+    """Devices choose keys: with tabs and ends of lines, commands for the terminal, what rich takes for markup."""
+    run("create", name, "--keyed", "str", "--max-growth", "1", "--confirmations", "0")
+    with HullClient(served) as client:
+        client.put(name, ["a\tb\nc", "\x1b[2Jd", "[/e]"], [[0, 0], [4, 0], [0, 4]])
+        client.put(name, ["f\n\x1b[2J[/f]"], [[9, 9]])
+    run("fences", "create", name, "--circle", "0", "0", "9", "--subjects", name)
+    keys = ["[/e]", "\\x1b[2Jd", "a\\tb\\nc"]
+    inside = run("fences", "inside", name).stdout
+    assert sorted(line.split("\t") for line in inside.splitlines()) == sorted([name, key] for key in keys)
+    vertices = run("query", name, "vertices", "--keys").stdout
+    assert sorted(line.split("\t")[2] for line in vertices.splitlines()) == sorted(keys)
+    run("fences", "delete", name, "--yes")
+    run("fences", "create", name, "--circle", "0", "0", "9", "--subjects", name, "--initial", "events")
+    events = run("fences", "watch", name, "--after", "0", "--events", "3").stdout
+    assert sorted(line.split("\t")[4] for line in events.splitlines()) == sorted(keys)
+    assert run("quarantine", "list", name).stdout.startswith("f\\n\\x1b[2J[/f]\t9.0\t9.0\t")
+    code, shown = on_a_terminal("quarantine", "list", name, "--address", served)
+    assert (code, "f\\n\\x1b[2J[/f]" in shown) == (0, True), shown

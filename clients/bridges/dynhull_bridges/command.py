@@ -12,6 +12,7 @@ from dynhull_cli.exits import Exit
 from dynhull_cli.groups import beside, group
 from dynhull_cli.json_lines import json_line
 from dynhull_cli.listing import listed
+from dynhull_cli.tab_lines import tab_line
 
 
 class LogForm(StrEnum):
@@ -75,7 +76,7 @@ def list_dead_letters(state: State = Path("dynhull-relay"), as_json: AsJson = Fa
                 )
             )
         else:
-            typer.echo(f"{each.letter.id}\t{time}\t{each.place}\t{each.attempts}\t{each.reason}")
+            typer.echo(tab_line(each.letter.id, time, each.place, each.attempts, each.reason))
 
 
 def send(

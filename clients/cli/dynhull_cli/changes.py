@@ -15,7 +15,7 @@ from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points
 
 from .closed_pipe import when_pipe_closes
 from .json_lines import json_line
-from .tab_lines import tab_line
+from .tab_lines import printable, tab_line
 
 SHOWN_EVENTS = 12
 NOTHING = np.empty((0, 2))
@@ -68,7 +68,7 @@ class Corners:
 
     def difference(self) -> str:
         """The keys that came and went, for people."""
-        return " ".join([*(f"+{key}" for key in self.joined), *(f"-{key}" for key in self.left)])
+        return printable(" ".join([*(f"+{key}" for key in self.joined), *(f"-{key}" for key in self.left)]))
 
 
 def follow(client: HullClient, name: str, shown: Shown, *, events: int | None, as_json: bool) -> None:
@@ -78,7 +78,7 @@ def follow(client: HullClient, name: str, shown: Shown, *, events: int | None, a
     """
     copy = HullCopy()
     corners = Corners(copy) if shown.keys else None
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     with shown.watch(client, name, copy) as stream:
         if not as_json and console.is_terminal:
             _show(console, name, stream, copy, corners, events)

@@ -9,6 +9,7 @@ from .groups import group
 from .json_lines import json_line
 from .listing import listed
 from .plural import plural
+from .tab_lines import printable, tab_line
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -40,14 +41,14 @@ def list_held(client: "HullClient", name: HullName, as_json: AsJson = False) -> 
     """
     from rich.console import Console
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     held = listed(client.list_held(name), f"{name} has no keys in quarantine")
     if console.is_terminal and not as_json:
         if rows := list(held):
             console.print(_table(rows))
         return
     for each in held:
-        typer.echo(json_line(**_members(each)) if as_json else "\t".join(_columns(each)))
+        typer.echo(json_line(**_members(each)) if as_json else tab_line(*_columns(each)))
 
 
 @connected
@@ -182,5 +183,5 @@ def _table(held: "list[HeldPosition]") -> "Table":
 
     table = Table("key", "x", "y", "time", "speed", "growth", "revision", "confirmed")
     for each in held:
-        table.add_row(*_columns(each))
+        table.add_row(*map(printable, _columns(each)))
     return table

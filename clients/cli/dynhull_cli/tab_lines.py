@@ -1,4 +1,4 @@
-"""Lines of numbers between tabs, for people and pipes."""
+"""Lines of numbers and names between tabs, for people and pipes."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,7 +6,12 @@ from typing import Any
 
 def tab_line(*values: Any) -> str:
     """The values, with nested arrays and tuples flattened, between tabs."""
-    return "\t".join(map(str, _flat(values)))
+    return "\t".join(printable(str(value)) for value in _flat(values))
+
+
+def printable(text: str) -> str:
+    """The text with escapes for what is not printed: a key may have tabs and ends of lines, or command the terminal."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def _flat(value: Any) -> Iterator[Any]:

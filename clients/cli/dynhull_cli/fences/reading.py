@@ -10,6 +10,7 @@ from ..exits import Exit
 from ..json_lines import json_line
 from ..listing import below, listed
 from ..plural import plural
+from ..tab_lines import tab_line
 from .settings import FenceName
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def inside(client: "HullClient", name: FenceName, as_json: AsJson = False) -> No
         return
     subjects = ((each.hull, key) for each in found.subjects for key in each.keys)
     for hull, key in listed(subjects, f"nobody is inside {name}"):
-        typer.echo(f"{hull}\t{key}")
+        typer.echo(tab_line(hull, key))
 
 
 @connected
