@@ -2,13 +2,16 @@
 
 import asyncio
 import threading
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from client_kinds import loop
-from patience import wait_until
+from metrics import measured, scrape
+from patience import PATIENCE, wait_until
 from proxy import proxy
 from server_process import server_process
 
@@ -251,24 +254,46 @@ def test_a_cancelled_wait_does_not_end_the_watch(address: str, name: str) -> Non
     assert copy.vertices.tolist() == [[1, 2]]
 
 
-def test_waits_cancelled_at_any_moment_do_not_end_the_watch(address: str, name: str) -> None:
-    """Also before the call that the wait has begun is sent."""
+def test_waits_that_are_too_short_get_the_events_in_the_end(address: str, name: str) -> None:
+    """A wait that is cancelled, even before its call is sent, neither ends the watch nor makes it begin again."""
 
     async def follow() -> HullCopy:
         copy = HullCopy()
-        async with AsyncHullClient(address) as client:
+        async with asyncio.timeout(PATIENCE), AsyncHullClient(address) as client:
             await client.create_hull(name)
+            await client.apply(name, insert=[[1, 2]])
             async with client.watch(name, copy=copy) as watch:
-                for turns in reversed(range(1, 12)):
-                    wait = asyncio.ensure_future(anext(watch))
-                    for _ in range(turns):
-                        await asyncio.sleep(0)
-                    wait.cancel()
-                    await asyncio.wait([wait])
-                await client.apply(name, insert=[[1, 2]])
                 while copy.revision < 1:
-                    await anext(watch)
+                    wait = asyncio.ensure_future(anext(watch))
+                    await asyncio.sleep(0)
+                    wait.cancel()
+                    with suppress(asyncio.CancelledError):
+                        await wait
         return copy
 
     copy = asyncio.run_coroutine_threadsafe(follow(), loop()).result()
     assert copy.vertices.tolist() == [[1, 2]]
+
+
+def test_watches_end_that_were_left_in_the_middle_of_a_wait() -> None:
+    """Though their readers have not closed them."""
+
+    async def follow(client: AsyncHullClient) -> None:
+        async for _ in client.watch("a"):
+            pass
+
+    async def leave(address: str, watchers: Callable[[], float]) -> None:
+        async with AsyncHullClient(address) as client:
+            await client.create_hull("a")
+            readers = [asyncio.create_task(follow(client)) for _ in range(3)]
+            await asyncio.to_thread(wait_until, lambda: watchers() == 3)
+            while readers:
+                reader = readers.pop()
+                reader.cancel()
+                await asyncio.wait([reader])
+            del reader
+            await asyncio.to_thread(wait_until, lambda: watchers() == 0)
+
+    with measured() as (server, metrics):
+        work = leave(server.address, lambda: scrape(metrics)["dynhull_watchers"])
+        asyncio.run_coroutine_threadsafe(work, loop()).result()

@@ -29,6 +29,7 @@ class AsyncFollower(AsyncIterator[Happening]):
         self._closed = asyncio.Event()
         self._arrived: deque[Happening] = deque()
         self._call: Any = None
+        self._reading: asyncio.Task[Any] | None = None
         self._begin()
 
     @property
@@ -49,16 +50,22 @@ class AsyncFollower(AsyncIterator[Happening]):
                 raise StopAsyncIteration
             if self._call is None:
                 self._begin()
+            if self._reading is None:
+                self._reading = asyncio.ensure_future(anext(self._events))
+                self._reading.add_done_callback(_heard)
+            reading = self._reading
+            if not reading.done():
+                await asyncio.wait([reading])  # a wait that is cancelled leaves the read to the next one
+            if reading is not self._reading:
+                continue  # another task has its events
+            self._reading = None
             try:
-                self._arrived.extend(self._place.take(await anext(self._events)))
+                self._arrived.extend(self._place.take(reading.result()))
             except grpc.RpcError as failure:
                 self._call = None
                 self._arrived.extend(self._place.end(error_of(failure)))
             except asyncio.CancelledError:
                 if not self._closed.is_set():
-                    # gRPC's iterator has ended, but not always its call. The next one continues where this one was.
-                    self._call.cancel()
-                    self._call, self._place.pause = None, 0.0
                     raise
         return self._arrived.popleft()
 
@@ -76,6 +83,11 @@ class AsyncFollower(AsyncIterator[Happening]):
     ) -> None:
         await self.close()
 
+    def __del__(self) -> None:
+        if self._reading is not None:  # of a wait that was cancelled: it holds the call
+            with suppress(RuntimeError):  # the loop has ended
+                self._reading.cancel()
+
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self._place.request.name!r}>"
 
@@ -83,6 +95,12 @@ class AsyncFollower(AsyncIterator[Happening]):
         method = getattr(self._connection.stub, self._place.method)
         self._call = self._connection.begin(method, self._place.request, self._place.timeout())
         self._events = aiter(self._call)
+
+
+def _heard(reading: asyncio.Task[Any]) -> None:
+    """Note the error of a read that nobody may wait for any more."""
+    if not reading.cancelled():
+        reading.exception()
 
 
 class AsyncWatch(AsyncFollower[Event]):
