@@ -1,3 +1,4 @@
+import gc
 import re
 from collections import Counter
 from collections.abc import Generator, Iterator
@@ -67,7 +68,18 @@ def name(request: pytest.FixtureRequest) -> str:
 def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
     """No docstrings of tests: to look for examples there, every worker would import every file of support twice."""
     found = yield
-    return [each for each in found if isinstance(each, pytest.Module)]
+    return [each for each in found if type(each) is pytest.Module]  # those of docstrings are a subclass
+
+
+def pytest_collection() -> None:
+    """No collections of garbage while tests are found: they went through all that is imported, again and again."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """What is imported stays: collections during the tests need not go through it."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
