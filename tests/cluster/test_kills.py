@@ -31,7 +31,8 @@ NAMES = ("north/a", "fleet/a")  # of the workers 0 and 1
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     folder = tmp_path_factory.mktemp("data")
-    with server_process(*WORKERS, "--data", str(folder), complaints="is started again") as server:
+    options = (*WORKERS, "--data", str(folder))
+    with server_process(*options, wrap=["env"], complaints="is started again") as server:  # started as it is for users
         with HullClient(server.address) as client:
             for name in NAMES:
                 client.create_hull(name)

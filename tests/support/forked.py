@@ -11,8 +11,11 @@ import gc
 import importlib
 import inspect
 import json
+import multiprocessing.util
 import os
+import resource
 import runpy
+import signal
 import socket
 import subprocess
 import sys
@@ -26,13 +29,14 @@ from typing import NoReturn
 
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
 
-# What the commands import when they run.
+# What the commands import when they run, and those that serve with several processes.
 RUN_BY = {
     "serve": ["dynhull_server.process"],
     "gateway": ["dynhull_client", "dynhull_gateway.serve"],
     "dashboard": ["dynhull_client", "dynhull_dashboard.serve"],
     "ingest": ["dynhull_client", "dynhull_bridges.ingest.ingest", "dynhull_bridges.ingest.jetstream"],
 }
+RUN_BY_SEVERAL = ["dynhull_cluster.process", "dynhull_cluster.child"]
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
 
 CHILD_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl
@@ -121,6 +125,9 @@ def _import_for(command: list[str]) -> None:
         if entry.name in command:
             for module in (entry.module, *RUN_BY.get(entry.name, RUN_BY_OTHERS)):
                 importlib.import_module(module)
+    if {"--workers", "--cluster"} & set(command):
+        for module in RUN_BY_SEVERAL:
+            importlib.import_module(module)
     gc.freeze()  # a collection would write to, and so copy, all of the memory that the processes share
 
 
@@ -131,6 +138,7 @@ def _become(command: list[str], folder: str, environment: dict[str, str], files:
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
+    multiprocessing.util.spawnv_passfds = _fork_instead
     time.tzset()
     sys.argv = command[command[0] == sys.executable :]
     sys.path[0] = str(Path(sys.argv[0]).parent)
@@ -138,6 +146,34 @@ def _become(command: list[str], folder: str, environment: dict[str, str], files:
         open(number, mode, buffering, encoding=old.encoding, errors=old.errors, closefd=False)  # noqa: SIM115
         for number, mode, buffering, old in ((0, "r", -1, sys.stdin), (1, "w", -1, sys.stdout), (2, "w", 1, sys.stderr))
     )
+
+
+_spawn = multiprocessing.util.spawnv_passfds
+
+
+def _fork_instead(path: bytes, arguments: list[str], files: list[int]) -> int:
+    """What `multiprocessing` starts its helpers by: that which forks workers has imported all of it, if it is a fork.
+
+    A fork has only one thread, so there must be no others.
+    """
+    code = arguments[-1]
+    if "multiprocessing.forkserver" not in code or len(list(Path("/proc/self/task").iterdir())) > 1:
+        return _spawn(path, arguments, files)
+    if (process := os.fork()) != 0:
+        return process
+    try:
+        signal.set_wakeup_fd(-1)
+        for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP}:
+            if callable(signal.getsignal(number)):
+                signal.signal(number, signal.SIG_DFL)
+        first = 3
+        for each in sorted(files):
+            os.closerange(first, each)
+            first = each + 1
+        os.closerange(first, resource.getrlimit(resource.RLIMIT_NOFILE)[0])
+        exec(code)
+    finally:
+        os._exit(0)
 
 
 def _leave(code: int) -> NoReturn:

@@ -41,9 +41,9 @@ class Torture(postgres_torture.Torture):
 
     shards = 3
 
-    def __init__(self, folder: Path, seed: int) -> None:
+    def __init__(self, folder: Path, seed: int, breath: float) -> None:
         self._other: torture.Server | None = None
-        super().__init__(folder, seed, OPTIONS)
+        super().__init__(folder, seed, breath, OPTIONS)
         self._other = torture.Server(folder, OPTIONS, self._journal)
         self._other.start()
         self._balanced()
@@ -187,9 +187,9 @@ KINDS = [
 ]
 
 
-def run(folder: Path, kinds: Sequence[str], faults: int, seed: int) -> str:
+def run(folder: Path, kinds: Sequence[str], faults: int, seed: int, breath: float) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
-    tortured = Torture(folder, seed)
+    tortured = Torture(folder, seed, breath)
     tortured.rounds(kinds, faults)
     return tortured.counts()
 
@@ -201,7 +201,7 @@ def main() -> None:
     torture.on_small_disk(
         __file__,
         postgres_torture.DISK,
-        lambda folder: run(folder, options.kinds, options.faults, options.seed),
+        lambda folder: run(folder, options.kinds, options.faults, options.seed, options.breath),
         mounted=options.mounted,
     )
 

@@ -38,7 +38,7 @@ ENDED = 70  # the exit code of a server that cannot go on
 class Torture(torture.Torture):
     """A server on PostgreSQL, which it reaches through a proxy."""
 
-    def __init__(self, folder: Path, seed: int, options: Sequence[str] = ()) -> None:
+    def __init__(self, folder: Path, seed: int, breath: float, options: Sequence[str] = ()) -> None:
         folder.chmod(0o777)
         home = folder / "pg"
         home.mkdir()
@@ -50,7 +50,7 @@ class Torture(torture.Torture):
         given = conninfo_to_dict(self._url)
         self._journal = make_conninfo(dbname=given["dbname"], user=given["user"], host=host, port=port)
         self._options = options
-        super().__init__(folder, seed, 2, options, self._journal)
+        super().__init__(folder, seed, breath, options=options, journal=self._journal)
 
     def _socket(self) -> str:
         return f"{conninfo_to_dict(self._url)['host']}/.s.PGSQL.5432"
@@ -142,7 +142,7 @@ class Torture(torture.Torture):
         self._database.stop()
 
 
-def run(folder: Path, faults: int, seed: int, *, workers: bool) -> str:
+def run(folder: Path, faults: int, seed: int, breath: float, *, workers: bool) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     kinds = ["zombie", "crash", "terminate", "cut", "kill", "hold", "replace", "freeze", "terminate", "full_disk"]
     if workers:
@@ -157,7 +157,7 @@ def run(folder: Path, faults: int, seed: int, *, workers: bool) -> str:
             "freeze",
             "full_disk",
         ]
-    tortured = Torture(folder, seed, torture.WORKERS if workers else ())
+    tortured = Torture(folder, seed, breath, torture.WORKERS if workers else ())
     tortured.rounds(kinds, faults)
     return tortured.counts()
 
@@ -168,7 +168,7 @@ def main() -> None:
     torture.on_small_disk(
         __file__,
         DISK,
-        lambda folder: run(folder, options.faults, options.seed, workers=options.workers),
+        lambda folder: run(folder, options.faults, options.seed, options.breath, workers=options.workers),
         mounted=options.mounted,
     )
 

@@ -15,7 +15,8 @@ from postgresql import postgres_program
 def test_no_promise_is_broken():
     postgres_program("postgres")  # else the test is skipped
     torture = Path(__file__).with_name("postgres_torture.py")
-    run = subprocess.run([sys.executable, torture, "--faults", "2"], capture_output=True, text=True, check=False)
+    command = [sys.executable, torture, "--breath", "0.05", "--faults", "2"]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     counts = run.stdout.splitlines()[-1]
     assert "faults: 1 crash, 1 zombie;" in counts

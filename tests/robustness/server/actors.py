@@ -38,6 +38,7 @@ class Shared:
     """The state that all threads share."""
 
     target: str
+    breath: float = BREATH
     gate: threading.Event = field(default_factory=threading.Event)  # open: writers write
     over: threading.Event = field(default_factory=threading.Event)
     failures: list[BaseException] = field(default_factory=list)
@@ -194,7 +195,7 @@ class PointWriter(Streamer):
         self._own: list[tuple[float, float]] = []
 
     def create_batch(self) -> tuple[np.ndarray, np.ndarray]:
-        time.sleep(BREATH)
+        time.sleep(self.shared.breath)
         rng = self._random
         inserts = rng.normal(size=(rng.integers(1, 30), 2)).round(rng.integers(0, 4)) + 0.0
         deletes = []
@@ -225,7 +226,7 @@ class Reader(Actor):
             require(revision >= self.seen, f"{self.name}: revision {revision} after {self.seen}")
             self.seen = revision
             self.reads += 1
-            time.sleep(2 * BREATH)
+            time.sleep(2 * self.shared.breath)
 
     def read(self, stub: HullServiceStub) -> int:
         return stub.GetHull(pb.GetHullRequest(name=self._hull), timeout=10).hull.revision
@@ -329,7 +330,7 @@ class Leaver(Actor):
     def act(self, stub: HullServiceStub) -> None:
         while not self.shared.over.is_set():
             hull = self._random.choice((*self.NAMES, self._hull))
-            time.sleep(4 * BREATH)
+            time.sleep(4 * self.shared.breath)
             call = self._begin(stub, hull)
             threading.Event().wait(self._random.random() ** 3 * 0.02)
             self.left += call.cancel()

@@ -12,7 +12,8 @@ import pytest
 @pytest.mark.long
 def test_no_promise_is_broken():
     torture = Path(__file__).with_name("torture.py")
-    run = subprocess.run([sys.executable, torture, "--faults", "10"], capture_output=True, text=True, check=False)
+    command = [sys.executable, torture, "--breath", "0.05", "--faults", "10"]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     counts = run.stdout.splitlines()[-1]
     clock_back, kills = ("1 clock back, ", 3) if shutil.which("faketime") else ("", 4)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
-from actors import BREATH, Seen, Shared, Streamer, Watcher, Writer, persist
+from actors import Seen, Shared, Streamer, Watcher, Writer, persist
 from patience import PATIENCE
 from promises import require
 from timeline import FLEETS, SECOND, Change, Contents, Entity, Key, Kind, Timeline, draw, encode, outline
@@ -45,7 +45,7 @@ class TimedWriter(Streamer):
         self._revisions = [(0, 0)]  # since the last rest: revision and number of acknowledged batches
 
     def create_batch(self) -> tuple[Change]:
-        time.sleep(BREATH)
+        time.sleep(self.shared.breath)
         self._now = wall() if self.kind.follows_server else self._now + int(self._random.integers(SECOND // 50))
         change = draw(self._random, self._sent, self._now)
         self._sent.apply(change)
@@ -127,7 +127,7 @@ class Shuttle(Writer):
             require(same, f"{self.name}: batch {self.acknowledged} is in one hull only: {one}, {other}")
 
     def create_batch(self) -> tuple[Change, ...]:
-        time.sleep(BREATH)
+        time.sleep(self.shared.breath)
         rng = self._random
         changes = Change(), Change()
         for i in rng.permutation(len(self._keys))[: rng.integers(2, 8)]:

@@ -46,6 +46,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 import wall_clock
 from actors import (
+    BREATH,
     Leaver,
     PointWriter,
     Reader,
@@ -120,14 +121,22 @@ class Torture:
 
     shards = 0
 
-    def __init__(self, folder: Path, seed: int, writers: int, options: Sequence[str] = (), journal: str = "") -> None:
+    def __init__(
+        self,
+        folder: Path,
+        seed: int,
+        breath: float,
+        writers: int = 2,
+        options: Sequence[str] = (),
+        journal: str = "",
+    ) -> None:
         self._folder = folder
         self._seed, self._random = seed, random.Random(seed)
         self.server = Server(folder, options, journal)
         self.server.start()
         self._started = wall(), time.monotonic()
         self._proxy = Proxy(self.server.address)
-        self.shared = Shared(self._proxy.address)
+        self.shared = Shared(self._proxy.address, breath)
         self._channel, self._stub = self.shared.stub()
         persist(self._stub.CreateHull, pb.CreateHullRequest(name=HULL, config={"shards": self.shards}))
         for kind in (*TIMED, *FLEETS):
@@ -412,13 +421,13 @@ class Torture:
         self.server.process.wait()
 
 
-def torture(folder: Path, faults: int, seed: int, writers: int = 2, *, workers: bool = False) -> str:
+def torture(folder: Path, faults: int, seed: int, breath: float, *, workers: bool = False) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     clock_back = "clock_back" if shutil.which("faketime") else "kill"
     kinds = ["kill", clock_back, "descriptors", "damage", "kill", "full_disk", "pause", "copy", "kill", "sever"]
     if workers:
         kinds = ["kill_worker", "kill_gateway", "restart", "kill_worker", "pause_worker", "full_disk", "sever", "kill"]
-    run = Torture(folder, seed, writers, WORKERS if workers else ())
+    run = Torture(folder, seed, breath, options=WORKERS if workers else ())
     run.rounds(kinds, faults)
     damage = (
         f"with a bit changed: {run.damage['refused']} refused to start, {run.damage['served']} served what is right"
@@ -431,6 +440,9 @@ def arguments(description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--faults", type=int, default=50, help="how many (default 50)")
     parser.add_argument("--seed", type=int, default=0, help="what the faults and the batches depend on (default 0)")
+    parser.add_argument(
+        "--breath", type=float, default=BREATH, help=f"seconds between the calls of a client (default {BREATH})"
+    )
     parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
     parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
     return parser
@@ -458,7 +470,7 @@ def main() -> None:
     on_small_disk(
         __file__,
         DISK,
-        lambda folder: torture(folder, options.faults, options.seed, workers=options.workers),
+        lambda folder: torture(folder, options.faults, options.seed, options.breath, workers=options.workers),
         mounted=options.mounted,
     )
 
