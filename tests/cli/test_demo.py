@@ -17,7 +17,7 @@ import server_process as servers
 from cluster import descendants
 from command_line import dynhull
 from forgetful import FORGETFUL
-from forked import COMMAND
+from forked import COMMAND, Process
 from patience import PATIENCE, wait_until
 from typer.testing import Result
 
@@ -39,14 +39,14 @@ def is_picture(path) -> bool:
 def test_hours_of_flights(tmp_path):
     """`make demo` replays a whole day."""
     picture = tmp_path / "flights.png"
-    done = demo("--day", "2013-03-08", "--hours", 4, "--out", picture)
+    done = demo("--day", "2013-03-08", "--hours", 2, "--out", picture)
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[-1] == "VERIFIED 240/240"
+    assert lines[-1] == "VERIFIED 120/120"
     assert re.fullmatch(r"EVENTS ([1-9]\d*)/\1", lines[-2])
     assert any(line.strip().startswith("near/LAX enter ") for line in lines)
     hours = [line for line in lines if " km²  " in line]
-    assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(4)]
+    assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(2)]
     assert " to SJU" in done.stdout
     assert is_picture(picture)
 
@@ -54,7 +54,7 @@ def test_hours_of_flights(tmp_path):
 @pytest.mark.long
 def test_the_flights_live_until_ctrl_c(tmp_path: Path) -> None:
     command = [COMMAND, "demo", "--live", "--hours", "1", "--speed", "6000"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as process:
+    with Process(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         assert process.stdout is not None
         words = [process.stdout.readline().split() for _ in range(4)]
         page, http, address = (line[-1] for line in words[1:])
@@ -97,10 +97,10 @@ def test_live_is_for_the_flights(tmp_path):
 
 
 def test_the_positions_of_the_last_half_hour(tmp_path):
-    done = demo("--day", "2013-03-08", "--hours", 2, "--window", "30m", "--out", tmp_path / "window.png")
+    done = demo("--day", "2013-03-08", "--hours", 1, "--window", "30m", "--out", tmp_path / "window.png")
     assert done.exit_code == 0, done.stderr
     assert "positions of the last 30m" in done.stdout
-    assert done.stdout.splitlines()[-1] == "VERIFIED 120/120"
+    assert done.stdout.splitlines()[-1] == "VERIFIED 60/60"
 
 
 def test_points_of_ones_own(tmp_path):

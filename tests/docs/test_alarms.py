@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from command_line import dynhull
-from forked import COMMAND
+from forked import COMMAND, Process
 from patience import PATIENCE, wait_until
 from ports import free_port
 from server_process import server_process
@@ -51,7 +51,7 @@ def test_an_alarm_from_an_empty_folder(
         relay = [COMMAND, *shlex.split(RELAY.replace("8000", port))[1:]]
         with (
             subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True) as alarm,
-            subprocess.Popen([*relay, "--first-pause", "10ms"], stderr=subprocess.DEVNULL) as running,
+            Process([*relay, "--first-pause", "10ms"], stderr=subprocess.DEVNULL) as running,
         ):
             try:
                 heard = [alarm.stdout.readline().split()[1:] for _ in range(2)]
