@@ -1,5 +1,4 @@
 import os
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -18,18 +17,3 @@ def pytest_ignore_collect(collection_path):
 @pytest.fixture(scope="session")
 def compiler():
     return program(os.environ.get("CXX", "c++"), "c++", "g++", "clang++")
-
-
-@pytest.fixture
-def fuzz(compiler, tmp_path):
-    """Builds a fuzzer, without sanitizers to be quick, and runs it once with each of these arguments."""
-
-    def run(source, *flags, runs):
-        build = [compiler, "-std=c++20", "-O0", "-ffp-contract=off", "-pthread", "-DDYNHULL_FAIL_ALLOCATIONS"]
-        program = tmp_path / "fuzz"
-        subprocess.run([*build, "-DDYNHULL_LEAF=4", *flags, HERE / source, "-o", program], check=True)
-        for arguments in runs:
-            done = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
-            assert done.returncode == 0, done.stdout + done.stderr
-
-    return run

@@ -16,7 +16,7 @@
 #include "failing_allocations.hpp"
 #include "fuzz_lives.hpp"
 
-namespace {
+namespace fuzz_points {
 
 using namespace dynhull;
 
@@ -364,9 +364,13 @@ class Life {
   std::vector<Point> chains_[2];
 };
 
-}  // namespace
-
-int main(int count, char** words) {
+int run(int count, char** words) {
   return fuzz_lives(count, words, "lives, leaves of " + std::to_string(LEAF),
                     [](std::uint64_t seed) { Life(seed).live(); });
 }
+
+}  // namespace fuzz_points
+
+#ifndef FUZZ_TOGETHER
+int main(int count, char** words) { return fuzz_points::run(count, words); }
+#endif

@@ -18,7 +18,7 @@
 #include "fuzz_lives.hpp"
 #include "packed_keys.hpp"
 
-namespace {
+namespace fuzz_fences {
 
 using namespace dynhull;
 
@@ -498,9 +498,7 @@ class Transfers {
   std::array<Side, 2> sides_;
 };
 
-}  // namespace
-
-int main(int count, char** words) {
+int run(int count, char** words) {
   return fuzz_lives(count, words, "lives of fences, leaves of " + std::to_string(LEAF), [](std::uint64_t seed) {
     Team::set_limit(1 + static_cast<unsigned>(seed / 4 % 4));
     if (seed % 4 == 3)
@@ -509,3 +507,9 @@ int main(int count, char** words) {
       Life(seed).live();
   });
 }
+
+}  // namespace fuzz_fences
+
+#ifndef FUZZ_TOGETHER
+int main(int count, char** words) { return fuzz_fences::run(count, words); }
+#endif

@@ -16,7 +16,7 @@
 #include "fuzz_lives.hpp"
 #include "packed_keys.hpp"
 
-namespace {
+namespace fuzz_entities {
 
 using namespace dynhull;
 
@@ -309,9 +309,13 @@ class Life {
   std::uint64_t now_ = 0;
 };
 
-}  // namespace
-
-int main(int count, char** words) {
+int run(int count, char** words) {
   return fuzz_lives(count, words, "lives of entities, leaves of " + std::to_string(LEAF),
                     [](std::uint64_t seed) { Life(seed).live(); });
 }
+
+}  // namespace fuzz_entities
+
+#ifndef FUZZ_TOGETHER
+int main(int count, char** words) { return fuzz_entities::run(count, words); }
+#endif

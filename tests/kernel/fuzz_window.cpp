@@ -12,7 +12,7 @@
 #include "failing_allocations.hpp"
 #include "fuzz_lives.hpp"
 
-namespace {
+namespace fuzz_windows {
 
 using namespace dynhull;
 
@@ -327,11 +327,15 @@ class WheelLife {
   Wheel<std::uint32_t, BySlot> wheel_;
 };
 
-}  // namespace
-
-int main(int count, char** words) {
+int run(int count, char** words) {
   return fuzz_lives(count, words, "lives of windows, leaves of " + std::to_string(LEAF), [](std::uint64_t seed) {
     WindowLife(seed).live();
     WheelLife(seed).live();
   });
 }
+
+}  // namespace fuzz_windows
+
+#ifndef FUZZ_TOGETHER
+int main(int count, char** words) { return fuzz_windows::run(count, words); }
+#endif

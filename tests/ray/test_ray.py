@@ -17,10 +17,11 @@ pytestmark = pytest.mark.long
 
 CASES = os.environ.get("RAY_CASES", "few")
 PROBLEMS = {
-    "file": ("ValueError", "bad.parquet, row 1234 is (inf, 0.0)"),
+    "block": ("ValueError", "bad.parquet, row 1234 is (inf, 0.0)"),
 }
 if CASES == "all":
     PROBLEMS |= {
+        "file": ("ValueError", "bad.parquet, row 1234 is (inf, 0.0)"),
         "unnamed": ("ValueError", "dataset has the columns a, b, c: name two, x first"),
         "absent": ("ValueError", "columns has 'height', but dataset has the columns lat, name, lon"),
         "array": ("TypeError", "dataset must be a ray.data.Dataset, got ndarray"),
@@ -55,6 +56,7 @@ def test_errors_say_what_is_wrong_and_where(found, problem):
 
 
 @pytest.mark.skipif(CASES != "all", reason="with `make ray`")
-def test_other_columns_and_integers(found):
+def test_files_other_columns_and_integers(found):
+    assert found["files"]
     assert found["turned"]
     assert found["integers"] == [[0, 0], [9, 0], [8, 2], [2, 2]]
