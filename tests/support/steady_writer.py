@@ -7,9 +7,11 @@ from patience import PATIENCE, wait_until
 
 from dynhull_client import HullClient
 
+BREATH = 0.005  # seconds between two batches, which leave the processor to others
+
 
 class SteadyWriter(threading.Thread):
-    """Writes numbered batches of one point until `stop`, each as soon as the one before is acknowledged.
+    """Writes numbered batches of one point until `stop`, each soon after the one before is acknowledged.
 
     Args:
         address: the address of a server.
@@ -48,6 +50,7 @@ class SteadyWriter(threading.Thread):
                     )
                     self.waits.append(time.monotonic() - begun)
                     self.revisions.append(done.revision)
+                    time.sleep(BREATH)
         except BaseException as error:
             self._error = error
 
