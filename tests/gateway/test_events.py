@@ -240,6 +240,17 @@ def test_a_fence_from_any_place(gateway: Gateway, name: str) -> None:
         each.close()
 
 
+def test_keys_and_distances_that_are_zero_are_in_events(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "int"})
+    gateway.post("/fences", {"name": name, "area": {"exterior": SQUARE}, "subjects": name})
+    gateway.post(f"/hulls/{name}/points", {"keys": [0], "points": [[1, 1]]})
+    events = Events(gateway, f"/fences/{quote(name)}/events?after=0")
+    place, (_, nobody), (_, enter) = (events.next() for _ in range(3))
+    assert (place[1], nobody["inside"]) == (None, [])
+    assert (enter["key"], enter["distance"], "inside" in enter) == (0, 0, False)
+    events.close()
+
+
 def rest_of(gateway: Gateway, path: str) -> dict[str, Any]:
     events = Events(gateway, f"{path}?after=2")
     events.next()

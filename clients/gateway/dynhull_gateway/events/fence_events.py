@@ -12,6 +12,9 @@ from dynhull_client import AsyncHullClient, DynhullError, FenceEvent, FenceRepla
 from .feeds import RETRY_SECONDS, of_failure
 from .messages import COMMENT, message, place
 
+LISTS = "snapshot", "closed"  # events that list who is inside
+MAY_BE_EMPTY = "sequence", "key", "distance", "inside"  # what zero or nobody is a value of
+
 
 @dataclass(slots=True)
 class Reading:
@@ -112,5 +115,6 @@ def shown(event: FenceEvent) -> dict[str, Any]:
     """An event as JSON has it, without what is not there."""
     named = {name: getattr(event, name) for name in FenceEvent.__dataclass_fields__ if name != "after"}
     named["cause"] = sorted(event.cause)
-    named["inside"] = [{"hull": each.hull, "keys": each.keys, "revision": each.revision} for each in event.inside]
-    return {name: value for name, value in named.items() if value not in (None, "", [], 0) or name == "sequence"}
+    inside = [{"hull": each.hull, "keys": each.keys, "revision": each.revision} for each in event.inside]
+    named["inside"] = inside if event.type in LISTS else None
+    return {name: value for name, value in named.items() if value or (value is not None and name in MAY_BE_EMPTY)}
