@@ -354,26 +354,42 @@ def test_timeouts_of_the_database_do_not_end_the_sessions_of_a_server(url, postg
         assert storage.read(1).last_revision == LAST + 20
 
 
-KEY_DATA = b"K\0\0\0\x0c"  # what comes before the number of the process
+class Rewriting(Proxy):
+    """Changes what a PostgreSQL says."""
 
-
-class Pooler(Proxy):
-    """Gives a connection another number than that of the process of PostgreSQL, as poolers do."""
+    def __init__(self, url, pattern, words):
+        self._pattern, self._words = re.compile(pattern, re.DOTALL), words
+        home = re.search(r"host=([^&]*)", url).group(1)
+        super().__init__(f"{home}/.s.PGSQL.5432")
+        host, port = self.address.split(":")
+        self.url = url.replace(f"host={home}", f"host={host}&port={port}")
 
     def _forward(self, source, sink):
         with suppress(OSError):
             while data := source.recv(65536):
-                sink.sendall(re.sub(KEY_DATA + rb"....", KEY_DATA + b"\0\0\0\1", data, flags=re.DOTALL))
+                sink.sendall(self._pattern.sub(self._words, data))
         shut(source)
         shut(sink)
 
 
+def test_sessions_of_newer_versions_have_no_timeout_for_transactions_either(url, postgres):
+    [(version,)] = postgres.query("SHOW server_version_num", database="postgres")
+    if int(version) >= 170_000:
+        pytest.skip("an older one says what it was asked")
+    with (
+        closing(Rewriting(url, rb"(?<=server_version\0)\d+", b"17")) as newer,
+        pytest.raises(StorageError, match='unrecognized configuration parameter "transaction_timeout"'),
+    ):
+        on(newer.url).open(no_progress)
+
+
 def test_poolers_are_refused(url):
-    home = re.search(r"host=([^&]*)", url).group(1)
-    with closing(Pooler(f"{home}/.s.PGSQL.5432")) as pooler:
-        host, port = pooler.address.split(":")
-        with pytest.raises(FormatError, match="is behind a pooler: connect to PostgreSQL itself"):
-            on(url.replace(f"host={home}", f"host={host}&port={port}")).open(no_progress)
+    # The number of a process that it gives is not that of the process of PostgreSQL.
+    with (
+        closing(Rewriting(url, rb"(?<=K\0\0\0\x0c)....", b"\0\0\0\1")) as pooler,
+        pytest.raises(FormatError, match="is behind a pooler: connect to PostgreSQL itself"),
+    ):
+        on(pooler.url).open(no_progress)
 
 
 def test_standbys_and_read_only_databases_are_refused(url, postgres):

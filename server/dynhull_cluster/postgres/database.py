@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, LiteralString
 
 import psycopg
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
@@ -28,6 +28,8 @@ SETTINGS = (
     "idle_in_transaction_session_timeout=0",
     "idle_session_timeout=0",
 )
+# The same for settings that older versions refuse to hear of, each with the first version that has it.
+NEWER_SETTINGS = ((17, "SET transaction_timeout = 0"),)
 # What callers get of an error: PostgreSQL's own words are for the log of the server.
 FOR_CALLERS = "the database of the server, PostgreSQL, cannot be used at present"
 # Where the address does not say otherwise.
@@ -90,6 +92,9 @@ class Database:
             if encoding != "UTF8":
                 raise FormatError(f"{self} has the encoding {encoding}: create one with UTF8")
             self._require_own_session(connection)
+            with as_storage_errors():
+                for statement in _newer_settings(connection):
+                    connection.execute(statement)
         except BaseException:
             connection.close()
             raise
@@ -105,11 +110,19 @@ class Database:
     async def connect_async(self, name: str) -> "psycopg.AsyncConnection[tuple[Any, ...]]":
         """The same for the event loop, of a database that `connect` has reached before. Raises StorageError."""
         try:
-            return await psycopg.AsyncConnection.connect(
+            connection = await psycopg.AsyncConnection.connect(
                 self._address, autocommit=True, application_name=name, client_encoding="utf8"
             )
         except psycopg.Error as error:
             raise StorageError(f"cannot connect to {self}: {_words(error)}", for_callers=FOR_CALLERS) from error
+        try:
+            with as_storage_errors():
+                for statement in _newer_settings(connection):
+                    await connection.execute(statement)
+        except BaseException:
+            await connection.close()
+            raise
+        return connection
 
 
 @contextmanager
@@ -126,6 +139,11 @@ def as_storage_errors() -> Iterator[None]:
 def storage_error(error: psycopg.Error) -> StorageError:
     """An error of PostgreSQL as one of the storage."""
     return StorageError(f"PostgreSQL: {_words(error)}", for_callers=FOR_CALLERS)
+
+
+def _newer_settings(connection: psycopg.BaseConnection[Any]) -> Iterator[LiteralString]:
+    version = connection.info.server_version // 10_000
+    return (statement for first, statement in NEWER_SETTINGS if version >= first)
 
 
 def _words(error: psycopg.Error) -> str:
