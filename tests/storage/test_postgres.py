@@ -1,5 +1,6 @@
 """The storage on PostgreSQL: damage, other servers, lost connections, and databases that it cannot use."""
 
+import asyncio
 import re
 import shutil
 import threading
@@ -13,6 +14,7 @@ from patience import wait_until
 from postgresql import query
 from proxy import Proxy, shut
 
+from dynhull_cluster.machines.board import Board, join
 from dynhull_cluster.postgres import ownership
 from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
@@ -336,6 +338,38 @@ def test_newer_formats_are_refused(url):
     query(url, "UPDATE format SET format = 99")
     with pytest.raises(FormatError, match="has format 99, this version reads formats 8 to"):
         on(url).open(no_progress)
+
+
+def test_what_is_served_in_an_older_format_is_not_migrated(url, monkeypatch):
+    monkeypatch.setattr(ownership, "LEASE", 3600)
+    monkeypatch.setattr(ownership, "RENEWAL", 3600)
+    storage, _ = opened(url)
+    with closing(storage):
+        query(url, "UPDATE format SET format = 9")
+        with pytest.raises(LockedError, match=r"is served by process .* in format 9, .* stop all servers of older"):
+            on(url).open(no_progress)
+        append(storage, LAST + 1, LAST + 1)
+        query(url, "UPDATE owners SET until = clock_timestamp()")  # it was not renewed in time
+        join(Database(url), 1)
+        assert query(url, "SELECT format FROM format") == [(FORMAT,)]
+        with pytest.raises(TakenOverError):
+            append(storage, LAST + 2, LAST + 2)
+
+
+def test_the_tables_of_the_first_clusters_get_what_they_lack(url):
+    join(Database(url), 1)
+    query(url, "ALTER TABLE workers DROP COLUMN process; DROP TABLE heirs")
+
+    async def present():
+        looks = asyncio.Queue()
+        board = Board(Database(url), looks.put_nowait, "north/0")
+        looking = asyncio.create_task(board.run())
+        tables = await looks.get()
+        looking.cancel()
+        return list(tables.workers)
+
+    join(Database(url), 1)
+    assert asyncio.run(present()) == ["north/0"]
 
 
 def test_encodings_other_than_utf_8_are_refused(postgres):

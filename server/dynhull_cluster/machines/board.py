@@ -36,6 +36,7 @@ TABLES = (
     "CREATE TABLE IF NOT EXISTS cluster (secret text NOT NULL)",
     "ALTER TABLE cluster ADD COLUMN IF NOT EXISTS database text",
     "CREATE TABLE IF NOT EXISTS workers (worker text PRIMARY KEY, draining boolean, process text, seen timestamptz)",
+    "ALTER TABLE workers ADD COLUMN IF NOT EXISTS process text NOT NULL DEFAULT ''",
     "CREATE TABLE IF NOT EXISTS heirs (partition integer PRIMARY KEY, worker text, process text, epoch bigint)",
     "CREATE TABLE IF NOT EXISTS wishes (partition integer PRIMARY KEY, worker text NOT NULL)",
 )
@@ -51,8 +52,8 @@ WORKERS = (
 WISHES = b"SELECT partition, worker FROM wishes"
 HEIRS = b"SELECT partition, worker, process, epoch FROM heirs"
 RENEW = (
-    b"INSERT INTO workers VALUES (%s, %s, %s, clock_timestamp()) ON CONFLICT (worker) DO UPDATE SET "
-    b"seen = clock_timestamp(), process = excluded.process, "
+    b"INSERT INTO workers (worker, draining, process, seen) VALUES (%s, %s, %s, clock_timestamp()) "
+    b"ON CONFLICT (worker) DO UPDATE SET seen = clock_timestamp(), process = excluded.process, "
     b"draining = excluded.draining OR (workers.draining AND workers.process = excluded.process)"
 )
 OFFER = (

@@ -11,7 +11,7 @@ from typing import Any
 from psycopg.errors import InsufficientPrivilege, LockNotAvailable
 from psycopg.sql import Identifier
 
-from dynhull_server.storage.port import FormatError, StorageError
+from dynhull_server.storage.port import FormatError, LockedError, StorageError
 from dynhull_server.storage.rows.tables import (
     COLUMNS,
     FORMAT,
@@ -24,6 +24,7 @@ from dynhull_server.storage.rows.tables import (
 from dynhull_server.storage.rows.totals import COPIES, Totals
 
 from .database import SCHEMA, Connection, Database
+from .ownership import is_known_dead
 
 # The first format in PostgreSQL, and the statements that lead from each format to the next one.
 FIRST_FORMAT = 8
@@ -176,6 +177,7 @@ def prepare(connection: Connection, database: Database, partitions: int) -> None
 
     Raises:
         FormatError: the database belongs to another program, or to a newer version.
+        LockedError: it is served in an older format.
         StorageError: it has another number of partitions, or the user may not create tables.
     """
     present = partitions_of(connection, database)
@@ -197,11 +199,27 @@ def prepare(connection: Connection, database: Database, partitions: int) -> None
     if present != partitions:
         raise StorageError(f"{database} is divided among {_servers(present)}: {_remedy(present)}")
     (version,) = _one(connection, "SELECT format FROM format")
+    if version == FORMAT:
+        return
+    _end_owners(connection, database, version)
     for before in range(version, FORMAT):
         for sql in MIGRATIONS[before]:
             connection.execute(sql.encode())
-    if version != FORMAT:
-        connection.execute("UPDATE format SET format = %s", [FORMAT])
+    connection.execute("UPDATE format SET format = %s", [FORMAT])
+
+
+def _end_owners(connection: Connection, database: Database, version: int) -> None:
+    """Have nobody write in an older format any more. Raises LockedError if somebody serves in it."""
+    owners = connection.execute("SELECT worker, process FROM owners WHERE until > clock_timestamp()").fetchall()
+    for worker, process in owners:
+        if not is_known_dead(process):
+            raise LockedError(
+                f"{database} is served by {worker} in format {version}, and this version would change it to format "
+                f"{FORMAT}: stop all servers of older versions first"
+            )
+    # Who was only slow is one no longer; what it commits at this moment is waited for.
+    connection.execute("SELECT epoch FROM owners FOR UPDATE")
+    connection.execute("UPDATE owners SET epoch = epoch + 1")
 
 
 def _servers(partitions: int) -> str:
