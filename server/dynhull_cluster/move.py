@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from dynhull_cli.plural import plural
 from dynhull_server.addresses import is_database
 
 SOURCE_HELP = "A data folder, or the address of a database; no server may be using it."
@@ -27,6 +28,7 @@ def move(
     if to_database == is_database(Path(source)):
         raise typer.BadParameter("one of FROM and TO must be a folder, the other one a database: postgresql://…")
 
+    from dynhull_server.data_folders import hulls_counted
     from dynhull_server.failure import code_of, fail, text_of
     from dynhull_server.progress import progress_bar
     from dynhull_server.storage.port import StorageError
@@ -44,4 +46,5 @@ def move(
         fail(text_of(error), code_of(error))
     for note in moved.notes:
         typer.echo(note, err=True)
-    typer.echo(f"{moved.target}: {moved.hulls:,} hulls, {moved.fences:,} fences, all as in {moved.source}")
+    hulls = hulls_counted(moved.hulls, moved.shards)
+    typer.echo(f"{moved.target}: {hulls}, {plural(moved.fences, 'fence')}, all as in {moved.source}")

@@ -74,7 +74,14 @@ def _check_part(data: Path) -> bool:
 
 
 def _hulls(report: copies.Report) -> str:
-    return "1 hull" if len(report.hulls) == 1 else f"{len(report.hulls):,} hulls"
+    shards = sum(hull.is_shard for hull in report.hulls)
+    return hulls_counted(len(report.hulls) - shards, shards)
+
+
+def hulls_counted(hulls: int, shards: int) -> str:
+    """The number of hulls, and that of the shards that some of them are divided among."""
+    counts = [(hulls, "hull"), *([(shards, "shard")] if shards else [])]
+    return ", ".join(f"{count:,} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
 
 
 def export_hull(data: Path, name: str, file: Path) -> None:

@@ -639,7 +639,11 @@ def test_a_shard_of_another_moment_is_not_restored(tmp_path: Path) -> None:
             client.apply("north/a", insert=np.random.default_rng(1).normal(size=(50, 2)))
         if not old.exists():
             shutil.copytree(data / "worker-1", old)
-    assert dynhull("check", data).exit_code == 0
+    checked = dynhull("check", data)
+    assert checked.exit_code == 0
+    assert all(
+        words in checked.stdout for words in ("worker-0: 1 hull, 1 shard, all", "worker-1: 0 hulls, 1 shard, all")
+    )
     shutil.rmtree(data / "worker-1")
     shutil.copytree(old, data / "worker-1")
     for done in (dynhull("check", data), dynhull("backup", tmp_path / "copy", "--data", data)):

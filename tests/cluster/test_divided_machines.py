@@ -292,6 +292,7 @@ def test_a_database_goes_from_workers_to_a_cluster_into_a_folder_and_back(postgr
     def move(source: object, target: object) -> None:
         done = dynhull("move", source, target)
         assert done.exit_code == 0, done.stderr
+        assert "1 hull, 3 shards, 0 fences," in done.stdout
 
     grow(*workers, "--journal", first)
     grow(*machine(first))  # its owners have greater numbers now than those of the next database would have

@@ -167,7 +167,9 @@ def test_a_worker_that_gave_up_its_partitions_takes_some_when_it_is_started_agai
     """It was the last one: nobody else would ever serve them."""
     with machine(url, complaints=None) as server, HullClient(server.address, retries=1000) as client:
         (worker,) = served(url)
+        assert "no worker takes" not in dynhull("cluster", "status", "--journal", url).stdout
         assert dynhull("cluster", "drain", worker, "--journal", url).exit_code == 0
+        assert "no worker takes partitions, because all" in dynhull("cluster", "status", "--journal", url).stdout
         assert apply_all(client, 1) == [1] * len(NAMES)
         drained = processes(server.process.pid)["worker-0"]
         os.kill(drained, signal.SIGKILL)

@@ -427,7 +427,7 @@ def test_roots_and_shards_are_led_back_to_the_revision_before(paths, monkeypatch
         refused("backup", copy, "--data", data, says="the folder changes faster than it can be read")
         assert not copy.exists()
         return
-    done("backup", copy, "--data", data, says=f"{copy}: 2 hulls")
+    done("backup", copy, "--data", data, says=f"{copy}: 1 hull, 1 shard")
     storage, contents = opened(copy)
     assert contents.notes == []
     assert [storage.read(number).last_revision for number in (1, 2)] == [kept, kept]

@@ -61,7 +61,7 @@ def tables(path):
         return read, {row[1:] for row in connection.execute("SELECT * FROM totals")}
 
 
-def moved(source, target, counts="1 hulls, 1 fences"):
+def moved(source, target, counts="1 hull, 1 fence,"):
     done = dynhull("move", source, target)
     assert done.exit_code == 0, done.stderr
     assert counts in done.stdout

@@ -38,6 +38,8 @@ def status(journal: JOURNAL) -> None:
     free = [str(each) for each in range(count) if (owner := tables.owners.get(each)) is None or owner.free]
     if free:
         typer.echo(f"nobody serves {', '.join(free)}")
+    if tables.workers and all(present.draining for present in tables.workers.values()):
+        typer.echo("no worker takes partitions, because all of them were drained: start the process of one again")
     for partition, worker in sorted(tables.wishes.items()):
         typer.echo(f"partition {partition} is to be on {worker}")
 

@@ -39,6 +39,7 @@ class Moved:
         source: the source, for people.
         target: the target, for people.
         hulls: the number of hulls.
+        shards: the number of shards that some of them have.
         fences: the number of fences.
         notes: messages about what was lost or damaged in the source.
     """
@@ -46,12 +47,15 @@ class Moved:
     source: str
     target: str
     hulls: int = 0
+    shards: int = 0
     fences: int = 0
     notes: list[str] = field(default_factory=list)
 
     def add(self, findings: Findings) -> None:
         """Count a part."""
-        self.hulls += len(findings.ledger.hulls)
+        shards = sum(hull.row.settings.shard is not None for hull in findings.ledger.hulls.values())
+        self.hulls += len(findings.ledger.hulls) - shards
+        self.shards += shards
         self.fences += len(findings.ledger.fences)
         self.notes += findings.notes
 

@@ -37,11 +37,13 @@ class HullReport:
         name: its name.
         summary: its revision, rows and snapshots.
         whole: whether all of its data is intact.
+        is_shard: whether it is one of the shards of a hull.
     """
 
     name: str
     summary: str
     whole: bool
+    is_shard: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -393,5 +395,6 @@ def _report(findings: Findings, notes: list[str]) -> Report:
         summary = f"revision {hull.last}, {rows} of batches"
         if hull.snapshots:
             summary += f", snapshots at {', '.join(str(snapshot.revision) for snapshot in hull.snapshots)}"
-        reports.append(HullReport(hull.row.name, summary, hull.row.number not in findings.damaged))
+        is_shard = hull.row.settings.shard is not None
+        reports.append(HullReport(hull.row.name, summary, hull.row.number not in findings.damaged, is_shard))
     return Report(reports, notes + findings.notes, findings.fatal)
