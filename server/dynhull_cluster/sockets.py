@@ -18,8 +18,7 @@ LONGEST_FOLDER = 80
 class Sockets:
     """The sockets in a folder, as ways to the workers."""
 
-    # Whoever else could answer is not there: a call to a worker that is away is refused.
-    patience = 0.0
+    takeover = 0.0
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

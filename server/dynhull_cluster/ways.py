@@ -6,6 +6,8 @@ from typing import Any, Protocol, TypeVar
 
 from .callers import Metadata
 
+# Seconds that a call waits for a worker that is away: somewhat longer than a lease lasts, and most restarts.
+PATIENCE = 10.0
 OPTIONS = [
     ("grpc.max_receive_message_length", -1),
     ("grpc.max_send_message_length", -1),
@@ -24,10 +26,10 @@ class Ways(Protocol):
     """The ways to all workers, by number.
 
     Attributes:
-        patience: the seconds that a call waits for a worker that is away.
+        takeover: the seconds in which a worker that has ended is replaced by another one; 0 where there is no other.
     """
 
-    patience: float
+    takeover: float
 
     async def connect(self, worker: int, make: Callable[[], F]) -> F:
         """Connect for frames. Raises OSError."""

@@ -19,7 +19,7 @@ from .again import may_repeat
 from .callers import Metadata, metadata_of
 from .frames import MOST_BYTES, Frames, Kind, pack_request
 from .upstream import LATE_SECONDS, Upstream, lost_status, one_request
-from .ways import Ways
+from .ways import PATIENCE, Ways
 
 # Seconds until a worker that is away is looked for again.
 LOOK_SECONDS = 0.05
@@ -102,10 +102,10 @@ class WorkerLink:
         await asyncio.gather(*self._leaving)
 
     async def arrive(self) -> None:
-        """Wait for a worker that is away, for as long as the ways to it say; `stream` says if that was in vain."""
-        if self._connection is None and self._ways.patience:
+        """Wait for a worker that is away, but not for ever; `stream` says if that was in vain."""
+        if self._connection is None:
             try:
-                async with asyncio.timeout(self._ways.patience):
+                async with asyncio.timeout(PATIENCE):
                     await self._arrived.wait()
             except TimeoutError:
                 return
@@ -113,7 +113,7 @@ class WorkerLink:
     async def ask(self, method: str, call: Call, message: bytes) -> bytes:
         """The response of the worker to a request.
 
-        A worker that may be replaced is waited for, and asked again where no request can take effect twice by that.
+        A worker that is away is waited for, and asked again where no request can take effect twice by that.
 
         Raises:
             WorkerAwayError: the worker is away; it has not seen the request.
@@ -150,9 +150,9 @@ class WorkerLink:
         """
         now = asyncio.get_running_loop().time()
         if until is None:
-            until = now + self._ways.patience
+            until = now + PATIENCE
         repeatable = isinstance(error, WorkerAwayError) or may_repeat(method, message, error.status)
-        if not self._ways.patience or now > until or not repeatable:
+        if now > until or not repeatable:
             raise error
         await _until(self._again)
         return until

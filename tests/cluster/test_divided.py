@@ -8,6 +8,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
@@ -309,25 +310,32 @@ def test_logs_of_shards_do_not_grow_for_ever(tmp_path: Path) -> None:
 
 
 def test_a_shard_that_is_away_is_named_and_all_goes_on_when_it_is_back(tmp_path: Path) -> None:
-    """Worker 1 cannot start while somebody else holds the lock of its folder."""
+    """Worker 1 cannot start while somebody else holds the lock of its folder. Calls for its own hulls wait for it."""
     with (
         server_process(*WORKERS, "--data", str(tmp_path), complaints="is started again") as server,
         HullClient(server.address, retries=0) as client,
+        HullClient(server.address) as patient,
+        ThreadPoolExecutor() as pool,
     ):
         client.create_hull("north/a", shards=2)  # of worker 0
         client.apply("north/a", insert=np.random.default_rng(1).normal(size=(50, 2)))
         before = client.get_hull("north/a")
+        client.create_hull("fleet/a")  # of worker 1
         with (tmp_path / "worker-1" / "dynhull.lock").open("a") as lock:
             os.kill(processes(server.process.pid)["worker-1"], signal.SIGKILL)
             fcntl.flock(lock, fcntl.LOCK_EX)
-            for ask in (
-                lambda: client.apply("north/a", insert=[[7, 7]]),
-                lambda: client.count("north/a", [[7, 7]]),
-            ):
+            asked = [
+                pool.submit(client.apply, "north/a", insert=[[7, 7]]),
+                pool.submit(client.count, "north/a", [[7, 7]]),
+            ]
+            for each in asked:
                 with pytest.raises(UnavailableError, match="shard 1 of hull 'north/a' is away"):
-                    ask()
+                    each.result()
             np.testing.assert_array_equal(client.get_hull("north/a").vertices, before.vertices)
             assert client.locate("north/a", [[99, 99]]).sides.tolist() == [-1]
+            reading = pool.submit(patient.get_hull, "fleet/a")
+            assert not wait([reading], timeout=1).done
+        assert reading.result().revision == 0
         wait_until(lambda: applied(client))
         info = client.get_hull("north/a").info
         assert (info.points, info.revision) == (51, 2)

@@ -18,6 +18,7 @@ from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 
 CALL: Any = SimpleNamespace(owner="owner", caller=SimpleNamespace(key=""))
 METHOD = "/dynhull.v1.HullService/GetHull"
+WRITE = "/dynhull.v1.HullService/DeleteHull"  # it is not repeated
 
 
 def test_requests_that_do_not_begin_with_a_name(client: HullClient) -> None:
@@ -82,11 +83,12 @@ def test_who_asks_again_just_when_the_worker_has_ended_is_told(tmp_path: Path) -
     async def run() -> None:
         link, running = await linked(tmp_path, Ends)
         with pytest.raises(RelayedError, match="the outcome is unknown"):
-            await link.ask(METHOD, CALL, b"")
+            await link.ask(WRITE, CALL, b"")
         with pytest.raises(WorkerAwayError):
             link.stream(METHOD, ())
-        with pytest.raises(WorkerAwayError):
-            await link.ask(METHOD, CALL, b"")
+        asking = asyncio.create_task(link.ask(WRITE, CALL, b""))  # it has not begun
+        assert not (await asyncio.wait([asking], timeout=0.1))[0]
+        asking.cancel()
         await ended(link, running)
 
     asyncio.run(run())
@@ -108,7 +110,7 @@ def test_calls_that_grpc_would_have_wait_end_with_their_worker(tmp_path: Path) -
 
     async def run() -> None:
         link, running = await linked(tmp_path, Leaves)
-        large = asyncio.create_task(link.ask(METHOD, CALL, bytes(MOST_BYTES + 1)))
+        large = asyncio.create_task(link.ask(WRITE, CALL, bytes(MOST_BYTES + 1)))
         upstream = link.stream(METHOD, ())
         writing = asyncio.create_task(upstream.write(b""))
         reading = asyncio.create_task(upstream.read())

@@ -65,7 +65,7 @@ class ServedDivisions:
         self._workers = workers
         self._worker = worker
         self._peers = peers
-        self._patience = (0.0 if peers is None else peers.patience) or AWAY_SECONDS
+        self._patience = (0.0 if peers is None else peers.takeover) or AWAY_SECONDS
         self._engine: Engine | None = None
         self._roots: dict[str, ServedRoot] = {}
         self._shards: dict[tuple[str, Place], LocalShard] = {}

@@ -31,9 +31,9 @@ class Peers:
         self._connections: dict[int, asyncio.Future[AskingFrames]] = {}
 
     @property
-    def patience(self) -> float:
+    def takeover(self) -> float:
         """The seconds in which a worker that has ended is replaced by another one; 0 where there is no other."""
-        return self._ways.patience
+        return self._ways.takeover
 
     async def ask(self, worker: int, letter: bytes) -> bytes:
         """The answer to a letter. Raises PeerAwayError."""

@@ -15,12 +15,10 @@ from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import words
 
 from ..callers import PROOF, Metadata
-from ..ways import OPTIONS, F
+from ..ways import OPTIONS, PATIENCE, F
 from .board import Tables
 from .entrance import proof_of
 
-# Seconds that a call waits for a partition that nobody serves: somewhat longer than a lease lasts.
-PATIENCE = 10.0
 # Seconds to connect to an owner.
 CONNECT_SECONDS = 2.0
 # Seconds until the log says why an owner cannot be reached: longer than a lease of one that has died.
@@ -63,7 +61,7 @@ class Addresses:
         ca: the certificate that has signed those of the workers; None where they have none.
     """
 
-    patience = PATIENCE
+    takeover = PATIENCE
 
     def __init__(self, secret: str, ca: Path | None) -> None:
         self._secret = secret
