@@ -29,4 +29,5 @@ def parted(ident: str | None) -> tuple[str | None, int]:
 def resumed(ident: str | None) -> tuple[str, int] | None:
     """The uid and the number in a Last-Event-ID; None if there is none, or none of ours."""
     uid, _, number = (ident or "").rpartition(":")
-    return (uid, int(number)) if uid and number.isdecimal() and len(number) <= 20 else None
+    ours = uid and number.isdecimal() and len(number) <= 20 and int(number) < 2**64
+    return (uid, int(number)) if ours else None

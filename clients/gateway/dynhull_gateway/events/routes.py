@@ -152,6 +152,8 @@ async def _require_fence(client: AsyncHullClient, reading: Reading, field: str) 
     """Refuse a fence that is not there, or has no such event yet. While the server is away the stream waits for it."""
     with suppress(UnavailableError):
         fence = await client.get_fence(reading.name)
+        if reading.uid not in ("", fence.uid):
+            reading.after = 0  # "replaced" follows, whatever the sequence
         after = reading.after or 0
         if reading.uid in ("", fence.uid) and after > fence.last_sequence:
             detail = f"{field}: {after} is after the last event, {fence.last_sequence}"
