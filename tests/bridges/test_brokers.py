@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import socketserver
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,7 @@ from brokers import broker, mosquitto, nats_server
 from patience import PATIENCE, wait_until
 from ports import free_port
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
+from server_process import run
 
 from dynhull_client import HullClient
 
@@ -81,6 +83,72 @@ def test_mqtt_has_each_event(client: HullClient, address: str, name: str, tmp_pa
         wait_until(lambda: len(subscriber.messages) == 6)
     assert [message["data"]["sequence"] for _, message in subscriber.messages] == [1, 2, 3, 4, 5, 6]
     assert {topic for topic, _ in subscriber.messages} == {"plant/enter", "plant/exit"}
+
+
+def test_mqtt_refuses(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
+    """A broker answers a publication that it refuses, too: that is no delivery."""
+    rights = tmp_path / "rights"
+    rights.write_text("topic write plant/exit\ntopic read #\n")
+    with broker(mosquitto(tmp_path, port, f"acl_file {rights}"), port):
+        subscriber = Subscriber(port)
+        to = ("--to", f"mqtt://127.0.0.1:{port}/plant/{{type}}", "--attempts", "2", *FAST)
+        with relay_process(address, tmp_path, name, *to):
+            pass_through(client, name, KEYS)
+            wait_until(lambda: acknowledged(client, name) == 6)
+        wait_until(lambda: len(subscriber.messages) == 3)
+    assert {topic for topic, _ in subscriber.messages} == {"plant/exit"}
+    listed = run("relay", "dead-letters", "list", "--state", tmp_path / "relay", "--json").stdout
+    letters = [json.loads(line) for line in listed.splitlines()]
+    assert [(each["event"]["data"]["type"], each["attempts"]) for each in letters] == [("enter", 2)] * 3
+    assert {each["reason"] for each in letters} == {"MQTT: refused: Not authorized"}
+
+
+class OldMqtt(socketserver.ThreadingTCPServer):
+    """A broker of MQTT 3.1.1, as some are: it refuses other versions. It collects topics and acknowledges."""
+
+    daemon_threads = True
+
+    def __init__(self) -> None:
+        super().__init__(("127.0.0.1", 0), OldMqttConnection)
+        self.topics: list[str] = []
+
+
+class OldMqttConnection(socketserver.StreamRequestHandler):
+    server: OldMqtt
+
+    def handle(self) -> None:
+        while head := self.rfile.read(1):
+            length, shift = 0, 0
+            while True:
+                (byte,) = self.rfile.read(1)
+                length, shift = length | (byte & 127) << shift, shift + 7
+                if byte < 128:
+                    break
+            body = self.rfile.read(length)
+            if head[0] >> 4 == 1:  # CONNECT
+                is_mine = body[6] == 4
+                self.wfile.write(bytes([0x20, 2, 0, not is_mine]))
+                if not is_mine:
+                    return
+            if head[0] >> 4 == 3:  # PUBLISH
+                end = 2 + int.from_bytes(body[:2])
+                self.server.topics.append(body[2:end].decode())
+                self.wfile.write(b"\x40\x02" + body[end : end + 2])
+
+
+def test_a_broker_that_only_knows_an_older_mqtt(client: HullClient, address: str, name: str, tmp_path: Path) -> None:
+    with OldMqtt() as old:
+        serving = threading.Thread(target=old.serve_forever, args=(0.01,))
+        serving.start()
+        try:
+            to = f"mqtt://127.0.0.1:{old.server_address[1]}/plant/{{type}}"
+            with relay_process(address, tmp_path, name, "--to", to, *FAST):
+                pass_through(client, name, KEYS)
+                wait_until(lambda: acknowledged(client, name) == 6)
+        finally:
+            old.shutdown()
+            serving.join()
+    assert sorted(old.topics) == ["plant/enter"] * 3 + ["plant/exit"] * 3
 
 
 def test_nats(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:

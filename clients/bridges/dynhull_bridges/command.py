@@ -166,7 +166,7 @@ def relay(
         dynhull relay depot yard --consumer plant --to 'mqtt://broker/plant/{fence}/{type}'
 
     An event is acknowledged after it was delivered. Whatever is killed, it arrives, perhaps twice but with the same id.
-    What fails is repeated until it succeeds; only refusals (HTTP 400 to 499) end as dead letters, see
+    What fails is repeated until it succeeds; only refusals, such as HTTP 400 to 499, end as dead letters, see
     `dynhull relay dead-letters`. Bodies are CloudEvents 1.0 in JSON; webhooks are signed as Standard Webhooks are.
 
     The relay ends when all fences are deleted, or after SIGTERM; exit code 1 if a receiver answered 410 Gone.

@@ -1,19 +1,52 @@
-"""Delivery to an MQTT broker with QoS 1: an event counts as delivered when the broker has acknowledged it."""
+"""Delivery to an MQTT broker with QoS 1: an event counts as delivered when the broker has accepted it."""
 
 import asyncio
 import ssl
 from collections.abc import Sequence
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import aiomqtt
+from aiomqtt import ProtocolVersion
+from paho.mqtt.enums import MQTTErrorCode
+from paho.mqtt.reasoncodes import ReasonCode
 
 from .letters import Letter
-from .target import NotDeliveredError, filled
+from .target import NotDeliveredError, RefusedError, filled
 from .urls import options_of, without_secrets
 
 TOPIC = "dynhull/{fence}/{type}"
 PORT, TLS_PORT = 1883, 8883
 AT_LEAST_ONCE = 1
+REFUSED = {0x87, 0x90, 0x95, 0x99}  # not authorized, topic invalid, packet too large, payload invalid: not for now only
+
+
+class _Client(aiomqtt.Client):
+    """A client that hears what the broker answers: to aiomqtt each answer to a publication is a success."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._answers: dict[int, asyncio.Future[ReasonCode]] = {}
+
+    async def send(self, topic: str, text: str) -> ReasonCode:
+        """Publish, and return the answer. A broker of MQTT 3.1.1 cannot say that it refuses."""
+        info = self._client.publish(topic, text, AT_LEAST_ONCE)
+        if info.rc != MQTTErrorCode.MQTT_ERR_SUCCESS:
+            raise aiomqtt.MqttCodeError(info.rc, "Could not publish message")
+        answer: asyncio.Future[ReasonCode] = asyncio.get_running_loop().create_future()
+        self._answers[info.mid] = answer
+        try:
+            async with asyncio.timeout(self.timeout):
+                return await answer
+        except TimeoutError:
+            raise aiomqtt.MqttError("Operation timed out") from None
+        finally:
+            del self._answers[info.mid]
+
+    def _on_publish(self, _client: Any, _data: Any, number: int, reason: ReasonCode, _properties: Any) -> None:
+        answer = self._answers.get(number)
+        if answer is not None and not answer.done():
+            answer.set_result(reason)
 
 
 class Mqtt:
@@ -38,7 +71,7 @@ class Mqtt:
         if {"+", "#"} & set(self._topic):
             raise ValueError(f"the topic {self._topic!r} has a wildcard, + or #: events go to one topic")
         self._timeout = timeout
-        self._client: aiomqtt.Client | None = None
+        self._client: _Client | None = None
         self._connecting = asyncio.Lock()
 
     async def deliver(self, letters: Sequence[Letter]) -> None:
@@ -46,10 +79,13 @@ class Mqtt:
         client = await self._connected()
         for each in letters:
             try:
-                await client.publish(filled(self._topic, each), each.text, AT_LEAST_ONCE)
+                reason = await client.send(filled(self._topic, each), each.text)
             except aiomqtt.MqttError as error:
                 await self._disconnect(client)
                 raise NotDeliveredError(f"MQTT: {error}") from None
+            if reason.is_failure:
+                kind = RefusedError if reason.value in REFUSED else NotDeliveredError
+                raise kind(f"MQTT: refused: {reason}")
 
     def place(self, letter: Letter) -> str:
         """The broker and the topic."""
@@ -60,25 +96,34 @@ class Mqtt:
         if self._client is not None:
             await self._disconnect(self._client)
 
-    async def _connected(self) -> aiomqtt.Client:
+    async def _connected(self) -> _Client:
         async with self._connecting:
             if self._client is None:
-                client = aiomqtt.Client(
-                    self._host,
-                    self._port,
-                    username=self._user,
-                    password=self._password,
-                    tls_context=self._tls,
-                    timeout=self._timeout,
-                )
                 try:
-                    await client.__aenter__()
+                    self._client = await self._connect(ProtocolVersion.V5)
                 except aiomqtt.MqttError as error:
-                    raise NotDeliveredError(f"MQTT: {error}") from None
-                self._client = client
+                    if isinstance(error.__cause__, OSError):  # nobody has answered
+                        raise NotDeliveredError(f"MQTT: {error}") from None
+                    try:
+                        self._client = await self._connect(ProtocolVersion.V311)
+                    except aiomqtt.MqttError:
+                        raise NotDeliveredError(f"MQTT: {error}") from None
             return self._client
 
-    async def _disconnect(self, client: aiomqtt.Client) -> None:
+    async def _connect(self, protocol: ProtocolVersion) -> _Client:
+        client = _Client(
+            self._host,
+            self._port,
+            username=self._user,
+            password=self._password,
+            tls_context=self._tls,
+            timeout=self._timeout,
+            protocol=protocol,
+        )
+        await client.__aenter__()
+        return client
+
+    async def _disconnect(self, client: _Client) -> None:
         """Give up a connection, unless another fence has done so already."""
         async with self._connecting:
             if self._client is client:
