@@ -328,12 +328,16 @@ def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Bro
 
 
 def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullClient, fleet: str, yard: str) -> None:
-    with opened(browser, url, fences=[yard], **PHONE) as page:
+    long = yard + "-long" * 20
+    client.create_fence(long, Circle(99, 99, 1), fleet, initial="none")
+    with opened(browser, url, fences=[yard, long], **PHONE) as page:
         wait_for_inside(page, yard, {"in": [1, 2]})
         client.put(fleet, ["x" * 60], [[2, 2]])
         expect(events(page)).to_have_count(2)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         assert page.locator(".events .scroll").evaluate("each => each.scrollWidth <= each.clientWidth")
+        names = page.locator(".table tbody th")
+        assert names.evaluate_all("all => all.map(each => each.scrollWidth <= each.clientWidth)") == [True] * 3
         assert events(page).first.bounding_box()["height"] < 150
 
 
