@@ -16,12 +16,16 @@ import pytest
 import trustme
 from cluster import processes
 from command_line import dynhull
+from forked import COMMAND
+from logged_process import logged_process
 from patience import PATIENCE, wait_until
 from postgresql import PostgreSQL, query
 from server_process import Server, server_process
 
 from dynhull_client import Batch, HullClient, HullUnsuitableError, Prefix
+from dynhull_cluster.machines.board import join
 from dynhull_cluster.placement import worker_of
+from dynhull_cluster.postgres.database import Database
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
@@ -176,6 +180,34 @@ def test_a_worker_that_gave_up_its_partitions_takes_some_when_it_is_started_agai
         there = "SELECT process FROM owners WHERE until > '-infinity' AND address <> ''"
         wait_until(lambda: not any(f" {drained} " in process for (process,) in query(url, there)) and served(url))
         assert apply_all(client, 2) == [2] * len(NAMES)
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_worker_that_is_slower_than_another_one_has_not_failed(url: str) -> None:
+    join(Database(url), 1)
+    query(
+        url,
+        """
+        CREATE FUNCTION be_faster() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN
+            INSERT INTO owners VALUES (NEW.partition, 1, 'another/0', '', '', clock_timestamp() + interval '5 s');
+            RETURN NULL;
+        END $$;
+        CREATE TRIGGER faster BEFORE INSERT ON owners FOR EACH ROW
+            WHEN (NEW.worker <> 'another/0') EXECUTE FUNCTION be_faster()
+        """,
+    )
+
+    def gives_way() -> bool:
+        query(url, "UPDATE owners SET until = until + interval '1 s'")
+        return bool(server.said("another worker has taken a partition"))
+
+    with logged_process(
+        [COMMAND, "serve", "--port", "0", "--cluster", "--journal", url, "--log-format", "json"]
+    ) as server:
+        wait_until(gives_way)
+        query(url, "UPDATE owners SET until = '-infinity'")
+        server.wait_for("a partition is served")
+        assert not server.said("a partition cannot be served")
 
 
 @pytest.fixture(scope="module")

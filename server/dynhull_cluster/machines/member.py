@@ -25,7 +25,7 @@ from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
 from dynhull_server.settings import Settings
 from dynhull_server.state.errors import words
-from dynhull_server.storage.port import TakenOverError
+from dynhull_server.storage.port import LockedError, TakenOverError
 
 from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
@@ -193,6 +193,10 @@ class Member:
 
     def _note_failure(self, what: str, number: int, error: BaseException) -> None:
         """Try it again later."""
+        if isinstance(error, LockedError):  # that is no failure
+            self._failed[what, number] = time.monotonic() + FIRST_PAUSE, FIRST_PAUSE
+            log.info("another worker has taken a partition", extra={"partition": number})
+            return
         _, pause = self._failed.get((what, number), (0.0, FIRST_PAUSE))
         self._failed[what, number] = time.monotonic() + pause, min(2 * pause, LONGEST_PAUSE)
         if isinstance(error, TakenOverError):
