@@ -94,6 +94,17 @@ def redirects_in_circles(connection: socket.socket, _: threading.Event) -> None:
     connection.sendall(f"HTTP/1.1 307 Away\r\nLocation: http://127.0.0.1:{port}/\r\nContent-Length: 0\r\n\r\n".encode())
 
 
+def refuses_and_stalls(connection: socket.socket, over: threading.Event) -> None:
+    request_of(connection)
+    connection.sendall(b"HTTP/1.1 400 No\r\nContent-Length: 9\r\n\r\n")
+    over.wait()
+
+
+def refuses_in_a_broken_encoding(connection: socket.socket, _: threading.Event) -> None:
+    request_of(connection)
+    connection.sendall(b"HTTP/1.1 400 No\r\nContent-Encoding: gzip\r\nContent-Length: 3\r\n\r\nabc")
+
+
 BAD = [
     hangs,
     never_reads,
@@ -167,6 +178,18 @@ def test_bad_endpoints_lose_nothing(client: HullClient, address: str, name: str,
         assert len(failures) == len(BAD)
         assert {line["id"] for line in failures} == {f"{client.get_fence(name).uid}-1"}
         arrived_in_order(endpoint, name)
+
+
+def test_a_refusal_counts_whatever_its_text_is(client: HullClient, address: str, name: str, tmp_path: Path) -> None:
+    """Otherwise an event would be tried for ever, and hold up those after it, for want of an explanation."""
+    pass_through(client, name, KEYS)
+    refusals = [refuses_and_stalls, refuses_in_a_broken_encoding]
+    with receiver() as endpoint, bad_then(refusals, endpoint) as url:
+        with relay_process(address, tmp_path, name, "--to", url, *PLAIN, *SHORT, "--attempts", "2") as relay:
+            wait_until(lambda: acknowledged(client, name) == LAST)
+            (dead,) = relay.said("refused: a dead letter now")
+        assert dead["error"] == "HTTP 400 No ''"
+        assert {event["data"]["sequence"] for event in endpoint.events(name)} == set(range(2, LAST + 1))
 
 
 def test_a_name_without_an_address_is_tried_again(client: HullClient, address: str, name: str, tmp_path: Path) -> None:

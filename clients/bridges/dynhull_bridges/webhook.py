@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 from http import HTTPStatus
@@ -87,8 +88,10 @@ class Webhook:
 
     async def _refuse(self, response: aiohttp.ClientResponse) -> None:
         status = response.status
-        answer = (await response.content.read(LONGEST_ANSWER)).decode(errors="replace")
-        message = f"HTTP {status} {response.reason or ''} {answer!r}"
+        answer = b""
+        with suppress(aiohttp.ClientError, TimeoutError, OSError):  # the status counts, whatever its explanation is
+            answer = await response.content.read(LONGEST_ANSWER)
+        message = f"HTTP {status} {response.reason or ''} {answer.decode(errors='replace')!r}"
         if status == HTTPStatus.GONE:
             raise GoneError(message)
         later = retry_after(response.headers.get("Retry-After"))
