@@ -2,6 +2,7 @@
 
 import pickle
 import re
+from functools import cache
 from math import inf
 
 import fence_oracle
@@ -255,15 +256,21 @@ def turned(corners):
 LARGE = {"upright": comb(60), "lying": comb(60)[:, ::-1], "diagonal": turned(comb(60))}
 
 
-@kinds
-@pytest.mark.parametrize("corners", LARGE.values(), ids=LARGE)
-def test_subjects_among_long_edges(make, corners):
-    rng = np.random.default_rng(7)
+@cache
+def among_long_edges(name):
+    """Subjects at corners, in the middle of edges and beside corners, and the keys of those inside."""
+    corners, rng = LARGE[name], np.random.default_rng(7)
     at = rng.integers(0, len(corners), 200)
     points = np.vstack([corners[at], (corners[at] + corners[at - 1]) / 2, corners[at] + rng.normal(size=(200, 2))])
     keys = [str(number) for number in range(len(points))]
     area = fence_oracle.Area(("polygons", [[corners.tolist()]]), closed=True)
-    expected = sorted(key for key, point in zip(keys, points.tolist(), strict=True) if area.holds(point))
+    return points, keys, sorted(key for key, point in zip(keys, points.tolist(), strict=True) if area.holds(point))
+
+
+@kinds
+@pytest.mark.parametrize("name", LARGE)
+def test_subjects_among_long_edges(make, name):
+    corners, (points, keys, expected) = LARGE[name], among_long_edges(name)
     index = FenceIndex(make.from_entities(keys, points))
     index.set_polygons(1, [[corners]])
     assert list(index.inside(1)) == expected

@@ -20,9 +20,11 @@ def winding(ring, p):
     px, py = p
     number = 0
     for a, b in edges(ring):
+        if not min(a[1], b[1]) <= py <= max(a[1], b[1]):
+            continue
         (ax, ay), (bx, by) = exact(a), exact(b)
         turn = (bx - ax) * (py - ay) - (by - ay) * (px - ax)
-        if turn == 0 and min(ax, bx) <= px <= max(ax, bx) and min(ay, by) <= py <= max(ay, by):
+        if turn == 0 and min(ax, bx) <= px <= max(ax, bx):
             return None
         if ay <= py < by and turn > 0:
             number += 1
