@@ -172,6 +172,8 @@ def _fork_instead(path: bytes, arguments: list[str], files: list[int]) -> int:
             first = each + 1
         os.closerange(first, resource.getrlimit(resource.RLIMIT_NOFILE)[0])
         exec(code)
+    except Exception:
+        sys.excepthook(*sys.exc_info())
     finally:
         os._exit(0)
 
