@@ -1,12 +1,14 @@
-"""Relay and server are killed while the endpoint is down: every event arrives, in order."""
+"""Relay and server are killed: every event arrives, in order, or is a dead letter once."""
 
+import json
+import shutil
 from itertools import pairwise
 from pathlib import Path
 
 from patience import wait_until
-from receiver import receiver
+from receiver import Received, receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
-from server_process import server_process
+from server_process import run, server_process
 
 from dynhull_client import HullClient
 
@@ -51,3 +53,43 @@ def test_every_event_arrives_in_order(tmp_path: Path) -> None:
             assert all(after <= before + 1 for before, after in pairwise(found)), "none before its predecessor"
             ids = {(event["id"], event["data"]["sequence"]) for event in endpoint.events(name)}
             assert len(ids) == 30
+
+
+def test_an_event_that_is_refused_again_is_one_dead_letter(tmp_path: Path) -> None:
+    """The relay is killed after it has written the dead letters, and before the server knows."""
+    data, state = ("--data", str(tmp_path / "data")), ("--state", str(tmp_path / "relay"))
+    with receiver() as endpoint:
+        to = ("--to", endpoint.url, "--unsigned", "--allow-private")
+        with server_process(*data, killed=True) as server, HullClient(server.address) as client:
+            fence(client, "depot")
+            pass_through(client, "depot", ["truck"])
+
+            def refuse(_: Received) -> tuple[int, dict[str, str]]:
+                server.process.kill()
+                server.process.wait()
+                return 422, {}
+
+            endpoint.answer = refuse
+            options = (*to, *FAST, "--attempts", 1, "--batch", 2)
+            with relay_process(server.address, tmp_path, "depot", *options, killed=True) as relay:
+                relay.wait_for("refused: a dead letter now")
+                relay.process.kill()
+        endpoint.answer = lambda _: (422, {})
+        with (
+            server_process(*data) as again,
+            HullClient(again.address) as client,
+            relay_process(again.address, tmp_path, "depot", *options),
+        ):
+            wait_until(lambda: acknowledged(client, "depot") == 2)
+        listing = ("relay", "dead-letters", "list", *state, "--json")
+        listed = [json.loads(line) for line in run(*listing).stdout.splitlines()]
+        assert [each["event"]["data"]["sequence"] for each in listed] == [1, 2]
+
+        # As earlier versions kept a second one.
+        kept = next((tmp_path / "relay" / "dead-letters").glob("*.json"))
+        shutil.copy(kept, kept.with_name(f"01234567890123456789-{kept.name}"))
+        assert [json.loads(line)["id"] for line in run(*listing).stdout.splitlines()] == [each["id"] for each in listed]
+        endpoint.answer = lambda _: (200, {})
+        assert run("relay", "dead-letters", "send", *state, *to).stdout == "2 sent\n"
+        assert [event["data"]["sequence"] for event in endpoint.events("depot")] == [1, 2]
+        assert run(*listing).stdout == ""

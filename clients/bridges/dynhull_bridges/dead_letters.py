@@ -1,5 +1,6 @@
 """Dead letters: events that a receiver refused, kept as files, and receivers that are gone."""
 
+import hashlib
 import json
 import os
 import re
@@ -10,6 +11,7 @@ from pathlib import Path
 from .letters import Letter, read_letter
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
+DIGITS_OF_A_RECEIVER = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +24,7 @@ class DeadLetter:
         reason: why it was refused the last time.
         attempts: how often it was tried.
         time: when it was given up, in seconds since 1970.
-        path: its file.
+        paths: its file; several where earlier versions kept it more than once.
     """
 
     letter: Letter
@@ -30,13 +32,20 @@ class DeadLetter:
     reason: str
     attempts: int
     time: float
-    path: Path
+    paths: tuple[Path, ...]
+
+    def remove(self) -> None:
+        """Keep it no longer."""
+        for path in self.paths:
+            path.unlink(missing_ok=True)
 
 
 class StateFolder:
     """The folder in which a relay keeps what must survive it and is not on the server.
 
-    Each dead letter is a file of its own, so that a relay may add some while others are sent again.
+    Each dead letter is a file of its own, so that a relay may add some while others are sent again. Its name is that of
+    the event and the receiver: an event that arrives again, because the relay was killed before it acknowledged it, and is
+    refused again is the same dead letter.
 
     Args:
         path: the folder; it is created when there is something to keep.
@@ -51,19 +60,24 @@ class StateFolder:
         """Keep an event that was refused. It is on the disk when this returns."""
         now = time.time()
         members = {"place": place, "reason": reason, "attempts": attempts, "time": now, "event": letter.text}
-        _store(self._letters / f"{time.time_ns():020}-{UNSAFE.sub('_', letter.id)}.json", members)
+        receiver = hashlib.sha256(place.encode()).hexdigest()[:DIGITS_OF_A_RECEIVER]
+        _store(self._letters / f"{UNSAFE.sub('_', letter.id)}-{receiver}.json", members)
 
     def dead_letters(self) -> list[DeadLetter]:
-        """All dead letters, the oldest first; ValueError names a file that is none."""
-        found = []
+        """All dead letters, the oldest first, each once; ValueError names a file that is none."""
+        found: dict[tuple[str, str], DeadLetter] = {}
         for path in sorted(self._letters.glob("*.json")):
             try:
                 kept = json.loads(path.read_text("utf-8"))
                 event = read_letter(kept["event"])
-                found.append(DeadLetter(event, kept["place"], kept["reason"], kept["attempts"], kept["time"], path))
+                identity = event.id, kept["place"]
+                others = found[identity].paths if identity in found else ()
+                found[identity] = DeadLetter(
+                    event, kept["place"], kept["reason"], kept["attempts"], kept["time"], (*others, path)
+                )
             except (KeyError, TypeError, ValueError):
                 raise ValueError(f"{path} is not a dead letter") from None
-        return found
+        return sorted(found.values(), key=lambda each: (each.time, each.letter.sequence))
 
     def gone(self) -> dict[str, str]:
         """The fences whose receiver wants nothing any more, each with the receiver, and what it answered."""

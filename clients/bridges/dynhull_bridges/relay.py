@@ -145,7 +145,7 @@ async def send_again(letters: Sequence[DeadLetter], target: Target) -> tuple[int
     try:
         for each in letters:
             await target.deliver([each.letter])
-            each.path.unlink()
+            each.remove()
             sent += 1
     except (NotDeliveredError, GoneError) as error:
         return sent, str(error)
