@@ -9,7 +9,7 @@ is near or far; what is returned is measured on the ellipsoid.
 from __future__ import annotations
 
 from functools import cache
-from math import ceil, inf, log2
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,8 @@ import numpy.typing as npt
 from ._globe import sin_cos
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from ._predicates import Floats
     from .arrays import Points
 
@@ -27,6 +29,8 @@ LEAST_RADIUS, GREATEST_RADIUS = 6335439.0, 6399594.0
 ECCENTRICITY_SQUARED = 0.0066943799901413165
 PRECISION = 1e-6  # metres along an edge: the error of a distance is at most that, and far less than that far away
 MOST_PAIRS = 1 << 18  # of a place and an edge, examined together
+EDGES_OF_A_CAP = 128
+CAP_SLACK = 1e-6  # radians, far above the errors of angles
 
 
 @cache
@@ -90,19 +94,79 @@ def distance(vertices: Points, lonlat: Points) -> Floats:
         vertices: (h, 2) vertices.
         lonlat: (k, 2) places anywhere on the globe.
     """
-    result = np.full(len(lonlat), inf)
-    if not len(vertices):
+    return Boundary([vertices]).distance(lonlat)
+
+
+class Boundary:
+    """Rings of great circles, of which `distance` looks at the edges near a place: neighbours share a cap of the globe.
+
+    Args:
+        rings: rings of (h, 2) vertices.
+
+    O(n log n) for n edges.
+    """
+
+    def __init__(self, rings: Iterable[Points]) -> None:
+        known = [ring for ring in rings if len(ring)] or [np.empty((0, 2))]
+        self._start = np.concatenate(known)
+        self._end = np.concatenate([np.roll(ring, -1, axis=0) for ring in known])
+        self._middles = self._radii = np.empty(0)
+        count = len(self._start)
+        if count <= EDGES_OF_A_CAP:
+            return
+        a, b = unit_vectors(self._start), unit_vectors(self._end)
+        order = _by_neighbourhood(a + b)
+        self._start, self._end, a, b = (each[order] for each in (self._start, self._end, a, b))
+        firsts = np.arange(0, count, EDGES_OF_A_CAP)
+        sums = np.add.reduceat(a + b, firsts)
+        lengths = np.sqrt((sums * sums).sum(axis=1, keepdims=True))
+        self._middles = sums / np.where(lengths > 0, lengths, 1)
+        middles = np.repeat(self._middles, EDGES_OF_A_CAP, axis=0)[:count]
+        farthest = np.maximum.reduceat(np.maximum(_angles(a, middles), _angles(b, middles)), firsts)
+        # A cap of less than half the globe has the whole edge if it has both ends.
+        self._radii = np.where(farthest + CAP_SLACK < np.pi / 2, farthest + CAP_SLACK, np.pi)
+
+    def distance(self, lonlat: Points) -> Floats:
+        """(k,) distances in metres of (k, 2) places anywhere on the globe, none of them inside.
+
+        Within a micrometre; inf without vertices. Of many edges only those of caps that are about as near as the
+        nearest one are looked at.
+        """
+        result = np.full(len(lonlat), inf)
+        if not len(self._start):
+            return result
+        rows = max(1, MOST_PAIRS // len(self._start))
+        pairs: list[tuple[npt.NDArray[np.intp], Points, Points]] = []
+        first = 0
+        for i in range(0, len(lonlat), rows):
+            near = self._near(lonlat[i : i + rows])
+            start, end = self._start[near], self._end[near]
+            row, edge = _candidates(lonlat[i : i + rows], start, end)
+            pairs.append((row + i - first, start[edge], end[edge]))
+            last = min(i + rows, len(lonlat))
+            if last == len(lonlat) or sum(len(each) for each, _, _ in pairs) > MOST_PAIRS:
+                together = (np.concatenate(column) for column in zip(*pairs, strict=True))
+                result[first:last] = _distances(lonlat[first:last], *together)
+                first, pairs = last, []
         return result
-    edges = vertices, np.roll(vertices, -1, axis=0)
-    rows = max(1, MOST_PAIRS // len(vertices))
-    for i in range(0, len(lonlat), rows):
-        result[i : i + rows] = _distances(lonlat[i : i + rows], *edges)
-    return result
+
+    def _near(self, places: Points) -> slice | npt.NDArray[np.bool_]:
+        """The edges among which is every one that may be the nearest to one of some places."""
+        if not len(self._radii):
+            return slice(None)
+        angles = _angles(unit_vectors(places)[:, None], self._middles)
+        most = (angles + self._radii).min(axis=1, keepdims=True)
+        caps = ((angles - self._radii) * LEAST_RADIUS <= most * GREATEST_RADIUS + PRECISION).any(axis=0)
+        return np.repeat(caps, EDGES_OF_A_CAP)[: len(self._start)]
 
 
 def along(start: Points, end: Points, share: Floats) -> Points:
     """(k, 2) places at these shares of the way along great circles."""
-    a, b = unit_vectors(start), unit_vectors(end)
+    return _between(unit_vectors(start), unit_vectors(end), share)
+
+
+def _between(a: Floats, b: Floats, share: Floats) -> Points:
+    """The same, given the directions of the ends."""
     angle = _angles(a, b)[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         weight = np.where(angle > 0, np.sin(share[:, None] * angle) / np.sin(angle), 0.0)
@@ -121,38 +185,54 @@ def edge_angles(start: Points, end: Points) -> Floats:
     return _angles(unit_vectors(start), unit_vectors(end))
 
 
-def _distances(places: Points, start: Points, end: Points) -> Floats:
-    """The least distance of each place to an edge."""
+def _by_neighbourhood(directions: Floats) -> npt.NDArray[np.intp]:
+    """The order of directions in which neighbours are close: by strips along one axis, then along another one."""
+    across, along = np.argsort(-np.ptp(directions, axis=0))[:2]
+    count = len(directions)
+    strip = EDGES_OF_A_CAP * max(1, round((count / EDGES_OF_A_CAP) ** 0.5))
+    order = np.argsort(directions[:, across], kind="stable")
+    within = np.lexsort((directions[order, along], np.arange(count) // strip))
+    return order[within]
+
+
+def _candidates(places: Points, start: Points, end: Points) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Pairs of a place and an edge, among which is one with the nearest edge of each place."""
     angles = _angles_to_edges(unit_vectors(places), unit_vectors(start), unit_vectors(end))
     nearest = angles.min(axis=1, keepdims=True)
     row, edge = np.nonzero(angles * LEAST_RADIUS <= nearest * GREATEST_RADIUS + PRECISION)
+    return row, edge
+
+
+def _distances(places: Points, row: npt.NDArray[np.intp], start: Points, end: Points) -> Floats:
+    """The least distance of each place to an edge, of pairs of a row of the places and an edge."""
     best = np.full(len(places), inf)
-    at_start, at_end = _lengths(places[row], start[edge]), _lengths(places[row], end[edge])
+    at_start, at_end = _lengths(places[row], start), _lengths(places[row], end)
     np.minimum.at(best, row, np.minimum(at_start, at_end))
     # No point of an edge is nearer than the triangle inequality allows.
-    length = GREATEST_RADIUS * edge_angles(start, end)[edge]
+    length = GREATEST_RADIUS * edge_angles(start, end)
     open_ = (at_start + at_end - length) / 2 < best[row]
-    row, edge = row[open_], edge[open_]
+    row = row[open_]
     if row.size:
-        np.minimum.at(best, row, _distances_inside(places[row], start[edge], end[edge], float(length[open_].max())))
+        np.minimum.at(best, row, _distances_inside(places[row], start[open_], end[open_], length[open_]))
     return best
 
 
-def _distances_inside(places: Points, start: Points, end: Points, longest: float) -> Floats:
+def _distances_inside(places: Points, start: Points, end: Points, lengths: Floats) -> Floats:
     """The distance of each place to its edge: bisection for the point where the distance stops falling."""
     low, high = np.zeros(len(places)), np.ones(len(places))
-    for _ in range(max(1, ceil(log2(max(longest, PRECISION) / PRECISION)))):
+    a, b = unit_vectors(start), unit_vectors(end)
+    halvings = np.maximum(1, np.ceil(np.log2(np.maximum(lengths, PRECISION) / PRECISION)))
+    for halving in range(int(halvings.max())):
         middle = (low + high) / 2
-        falls = _falls(places, start, end, middle)
-        low, high = np.where(falls, middle, low), np.where(falls, high, middle)
-    return _lengths(places, along(start, end, (low + high) / 2))
+        falls, goes_on = _falls(places, a, b, middle), halving < halvings
+        low, high = np.where(goes_on & falls, middle, low), np.where(goes_on & ~falls, middle, high)
+    return _lengths(places, _between(a, b, (low + high) / 2))
 
 
-def _falls(places: Points, start: Points, end: Points, share: Floats) -> npt.NDArray[np.bool_]:
-    """Whether the distance to a place falls on the way along its edge, at this share of it."""
-    here = along(start, end, share)
-    a, b, p = unit_vectors(start), unit_vectors(end), unit_vectors(here)
-    way = np.cross(np.cross(a, b), p)
+def _falls(places: Points, a: Floats, b: Floats, share: Floats) -> npt.NDArray[np.bool_]:
+    """Whether the distance to a place falls on the way from a to b, at this share of it."""
+    here = _between(a, b, share)
+    way = np.cross(np.cross(a, b), unit_vectors(here))
     ((sin_lon, _), (cos_lon, _)), ((sin_lat, _), (cos_lat, _)) = sin_cos(here[:, 0]), sin_cos(here[:, 1])
     east = way[:, 1] * cos_lon - way[:, 0] * sin_lon
     north = way[:, 2] * cos_lat - (way[:, 0] * cos_lon + way[:, 1] * sin_lon) * sin_lat

@@ -160,7 +160,7 @@ class FenceIndex:
             fence: the number.
             polygons: polygons, each a sequence of rings, the exterior first, then holes; each ring (k, 2) array-like,
                 in either direction, with or without the first corner at its end. Edges of a polygon may touch at their
-                ends, but those of a ring only its neighbours.
+                ends, but those of a ring only its neighbours. Or `dynhull.polygons.CheckedPolygons`.
             closed: see above, as the others.
             margin: see above.
             cross: see above.
@@ -267,6 +267,31 @@ class FenceIndex:
     def count(self, fence: int) -> int:
         """The number of keys inside, like `inside`. O(1)."""
         return self._fences.count(self._present(fence))
+
+    def distances(self, fence: int, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """The distances of points to the area of a fence, as `take` returns those of subjects. O(log n) a point.
+
+        Args:
+            fence: the number.
+            xy: (k, 2) points.
+
+        Returns:
+            (k,) each the exact value rounded once: 0.0 inside and on the boundary, inf from an empty area.
+
+        Raises:
+            KeyError: there is no such fence.
+            ValueError: a point is not finite, or the fence was set with `without_self`: it has no area of its own.
+
+        >>> import dynhull
+        >>> fences = dynhull.FenceIndex(dynhull.KeyedHull())
+        >>> fences.set_polygons(7, [[[[0, 0], [4, 0], [0, 4]]]])
+        >>> fences.distances(7, [[1, 1], [4, -3], [-3, -4]]).tolist()
+        [0.0, 3.0, 5.0]
+        """
+        distances = self._fences.distances(self._present(fence), as_points(xy, "xy"))
+        if distances is None:
+            raise ValueError(f"fence {fence} was set with without_self: each subject has an area of its own")
+        return distances
 
     def __contains__(self, fence: object) -> bool:
         """Whether there is a fence of this number."""

@@ -129,6 +129,11 @@ class Fences:
         """The number of keys inside."""
         return len(self._fences[fence].inside)
 
+    def distances(self, fence: int, places: Points) -> npt.NDArray[np.float64] | None:
+        """The distances of places to the area; None if that is the hull of the entities."""
+        each = self._fences[fence]
+        return None if each.own else np.array([each.area.distance(p) for p in as_tuples(places)], np.float64)
+
     def _set(self, number: int, fence: _Fence, inside: Keys | None) -> None:
         present = self._fences.get(number)
         if present is not None and inside is None:

@@ -288,6 +288,11 @@ class Fences:
     def count(self, fence: int) -> int:
         """The number of keys inside."""
 
+    def distances(self, fence: int, places: dynhull.arrays.Points) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        The distances of places to the area; None if that is the hull of the entities.
+        """
+
     def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]:
         """Let keys that were removed there and are new here have moved."""
 
@@ -461,9 +466,9 @@ def crossing(a: tuple[float, float], b: tuple[float, float], c: tuple[float, flo
 def orientations(a: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], b: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)], c: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int8], dict(shape=(None,))]:
     """`orientation` of each row of three arrays."""
 
-def turning_if_simple(ring: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', device='cpu', writable=False)]) -> int:
+def turnings_if_valid(rings: list[dynhull.arrays.Points]) -> list[int]:
     """
-    +1 for a ring of corners whose edges meet only at the ends of neighbours, and that has its inside on the left; -1 if on the right; 0 for any other ring.
+    Of each ring of a polygon, +1 if its inside is on the left, -1 if on the right. Empty if a ring is not simple, or is a hole that is not inside the first one or overlaps another.
     """
 
 def plain_difference_of_products(a: float, b: float, c: float, d: float) -> float:

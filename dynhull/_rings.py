@@ -41,19 +41,44 @@ class _Edges(NamedTuple):
     size: Rows
 
 
+class CheckedPolygons:
+    """Polygons with holes that have been checked: what takes polygons takes these without another look.
+
+    Args:
+        polygons: polygons, each a sequence of rings, the exterior first, then holes; each ring (k, 2) array-like.
+
+    Attributes:
+        rings: the rings of each polygon, which cannot be changed.
+
+    Raises:
+        ValueError, TypeError: as `FenceIndex.set_polygons`.
+    """
+
+    __slots__ = ("rings",)
+
+    def __init__(self, polygons: Any) -> None:
+        self.rings = [[ring.copy() for ring in polygon] for polygon in as_polygons(polygons)]
+        for polygon in self.rings:
+            for ring in polygon:
+                ring.setflags(write=False)
+
+
 def as_polygons(polygons: Any) -> list[list[Points]]:
     """Polygons as lists of rings, exterior first: (k, 2) arrays without repeated corners, the closing one included.
 
     Args:
-        polygons: polygons, each a sequence of rings, each a (k, 2) array-like of corners in either direction.
+        polygons: polygons, each a sequence of rings, each a (k, 2) array-like of corners in either direction; or
+            `CheckedPolygons`.
 
     Raises:
         ValueError: there is no polygon, or a ring is not valid. The message names polygon, ring and reason.
         TypeError: an argument is not a sequence, or a coordinate is not a number.
 
-    O(k log k) for k corners if few edges overlap in x or few in y, at worst O(k²); a valid polygon of one ring is
-    always checked in O(k log k) by the kernel.
+    O(k log k) for k corners of valid polygons, by the kernel. Without it, and to say what is wrong with others, the
+    same if few edges overlap in x or few in y, at worst O(k²).
     """
+    if isinstance(polygons, CheckedPolygons):
+        return polygons.rings
     checked = [
         _as_polygon(polygon, f"polygon {number}") for number, polygon in enumerate(_sequence(polygons, "polygons"))
     ]
@@ -70,13 +95,15 @@ def _sequence(values: Any, name: str) -> Iterable[Any]:
 
 def _as_polygon(polygon: Any, name: str) -> list[Points]:
     given = list(_sequence(polygon, name))
-    if kernel is not None and len(given) == 1:
-        given = [ring := as_points(given[0], f"{name} ring 0")]
-        if len(ring) > CORNERS_OF_A_RING and tuple(ring[0]) == tuple(ring[-1]):
-            ring = ring[1:]
-        turning = kernel.turning_if_simple(ring)
-        if turning:
-            return [ring if turning > 0 else np.ascontiguousarray(ring[::-1])]
+    if kernel is not None and given:
+        given = [as_points(ring, f"{name} ring {number}") for number, ring in enumerate(given)]
+        opened = [_without_closing_corner(ring) for ring in given]
+        turnings = kernel.turnings_if_valid(opened)
+        if turnings:
+            return [
+                ring if (turning > 0) == (number == 0) else np.ascontiguousarray(ring[::-1])
+                for number, (ring, turning) in enumerate(zip(opened, turnings, strict=True))
+            ]
     rings = [_as_ring(ring, f"{name} ring {number}") for number, ring in enumerate(given)]
     if not rings:
         raise ValueError(f"{name} has no ring: the first one is its exterior")
@@ -85,6 +112,10 @@ def _as_polygon(polygon: Any, name: str) -> list[Points]:
     if len(rings) > 1:
         _refuse_holes(rings, name)
     return rings
+
+
+def _without_closing_corner(ring: Points) -> Points:
+    return ring[1:] if len(ring) > CORNERS_OF_A_RING and tuple(ring[0]) == tuple(ring[-1]) else ring
 
 
 def _as_ring(ring: Any, name: str) -> Points:

@@ -12,13 +12,14 @@ a hull: counter-clockwise, in degrees, longitude first, as `GeoHull.vertices` re
 21100
 """
 
-from ._ellipsoid import area, diameter, distance, perimeter
+from ._ellipsoid import Boundary, area, diameter, distance, perimeter
 from ._flat_map import boundary, geojson
 from ._globe import REACH, Gnomonic, as_center, as_lonlat
 from ._globe_sketch import sketch
 
 __all__ = [
     "REACH",
+    "Boundary",
     "Gnomonic",
     "area",
     "as_center",

@@ -22,7 +22,7 @@ PACKAGES = {
     },
     "dynhull.envelope": {"Decomposition", "Frontier", "PhaseDiagram", "energy_above_hull_nd"},
     "dynhull.globe": {
-        *("REACH", "Gnomonic", "area", "as_center", "as_lonlat", "boundary"),
+        *("REACH", "Boundary", "Gnomonic", "area", "as_center", "as_lonlat", "boundary"),
         *("diameter", "distance", "geojson", "perimeter", "sketch"),
     },
     "dynhull.gjk": {"Contact", "contact", "distance_many", "intersect", "intersect_many"},

@@ -44,8 +44,8 @@ class StateFolder:
     """The folder in which a relay keeps what must survive it and is not on the server.
 
     Each dead letter is a file of its own, so that a relay may add some while others are sent again. Its name is that of
-    the event and the receiver: an event that arrives again, because the relay was killed before it acknowledged it, and is
-    refused again is the same dead letter.
+    the event and the receiver: an event that arrives and is refused again, because the relay was killed before it
+    acknowledged it, is the same dead letter.
 
     Args:
         path: the folder; it is created when there is something to keep.

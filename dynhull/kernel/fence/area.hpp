@@ -5,31 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <vector>
 
-#include "nearness.hpp"
+#include "boxes.hpp"
 
 namespace dynhull {
-
-struct Box {
-  Point least, greatest;
-
-  static Box none() { return {HIGHEST, LOWEST}; }
-  static Box of(Edge edge) {
-    return {{std::min(edge.a.x, edge.b.x), std::min(edge.a.y, edge.b.y)},
-            {std::max(edge.a.x, edge.b.x), std::max(edge.a.y, edge.b.y)}};
-  }
-  void add(Point p) {
-    least = {std::min(least.x, p.x), std::min(least.y, p.y)};
-    greatest = {std::max(greatest.x, p.x), std::max(greatest.y, p.y)};
-  }
-  bool holds(Point p) const { return (least.x <= p.x) & (p.x <= greatest.x) & (least.y <= p.y) & (p.y <= greatest.y); }
-  bool meets(const Box& other) const {
-    return (least.x <= other.greatest.x) & (other.least.x <= greatest.x) & (least.y <= other.greatest.y) &
-           (other.least.y <= greatest.y);
-  }
-};
 
 // Rings of one polygon, each closed by its first corner, with the inside on the left.
 class Polygon {
@@ -43,13 +25,23 @@ class Polygon {
     }
     starts_.push_back(static_cast<std::uint32_t>(corners_.size()));
     for (Point p : corners_) box_.add(p);
-    if (corners_.size() > FEW_CORNERS) lay_slabs();
+    if (corners_.size() <= FEW_CORNERS) return;
+    lay_slabs();
+    std::vector<std::uint32_t> edges;
+    edges.reserve(corners_.size() - rings.size());
+    any_edge([](const Box&) { return true; },
+             [&](std::uint32_t i) {
+               edges.push_back(i);
+               return false;
+             });
+    tree_ = BoxTree(std::move(edges), [&](std::uint32_t i) { return Box::of(edge(i)); });
   }
 
   const Box& box() const { return box_; }
+  std::size_t corners() const { return corners_.size(); }
   std::size_t bytes() const {
     return sizeof *this + corners_.capacity() * sizeof(Point) +
-           (starts_.capacity() + slabs_.capacity() + in_slabs_.capacity()) * sizeof(std::uint32_t);
+           (starts_.capacity() + slabs_.capacity() + in_slabs_.capacity()) * sizeof(std::uint32_t) + tree_.bytes();
   }
   bool operator==(const Polygon& other) const { return corners_ == other.corners_ && starts_ == other.starts_; }
 
@@ -57,7 +49,18 @@ class Polygon {
   template <class Visit>
   void for_each_edge(Visit visit) const {
     for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
-      for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i) visit(Edge{corners_[i], corners_[i + 1]});
+      for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i) visit(edge(i));
+  }
+  // Visits edges until a visit returns true; may leave out those whose box does not meet something: see `BoxTree`.
+  template <class Meets, class Visit>
+  bool any_edge_meeting(Meets meets, Visit visit) const {
+    return any_edge(meets, [&](std::uint32_t i) { return visit(edge(i)); });
+  }
+  // Visits edges, and may leave out those that are farther from p than `most`, which a visit may lower.
+  template <class Visit>
+  void visit_near(Point p, const double& most, Visit visit) const {
+    if (tree_.empty()) return for_each_edge(visit);
+    tree_.visit_near(p, most, [&](std::uint32_t i) { visit(edge(i)); });
   }
 
   // +1 inside, 0 on a ring, -1 outside: by the number of edges to the right of p.
@@ -81,23 +84,19 @@ class Polygon {
   bool lets_in(Point p, Point q) const {
     const Box way = Box::of({p, q});
     if (!way.meets(box_)) return false;
-    bool found = false;
     const auto enters = [&](Point at) {  // whether the segment is inside just before or after a point of a ring
       return (!(at == q) && points_inside(at, q)) || (!(at == p) && points_inside(at, p));
     };
-    for_each_edge([&](Edge edge) {
-      if (found || !way.meets(Box::of(edge))) return;
+    const auto meets = [&](const Box& box) { return way.meets(box) && may_touch_line({p, q}, 0, box); };
+    return any_edge_meeting(meets, [&](Edge edge) {
+      if (!way.meets(Box::of(edge))) return false;
       const int at_a = orientation(p, q, edge.a), at_b = orientation(p, q, edge.b);
       const int at_p = orientation(edge.a, edge.b, p), at_q = orientation(edge.a, edge.b, q);
-      if (at_a * at_b > 0 || at_p * at_q > 0) return;
-      if (at_a * at_b < 0 && at_p * at_q < 0)
-        found = !touched_where_crossed(p, q, edge);
-      else
-        found = (at_a == 0 && way.holds(edge.a) && enters(edge.a)) ||
-                (at_p == 0 && Box::of(edge).holds(p) && enters(p)) ||
-                (at_q == 0 && Box::of(edge).holds(q) && enters(q));
+      if (at_a * at_b > 0 || at_p * at_q > 0) return false;
+      if (at_a * at_b < 0 && at_p * at_q < 0) return !touched_where_crossed(p, q, edge);
+      return (at_a == 0 && way.holds(edge.a) && enters(edge.a)) || (at_p == 0 && Box::of(edge).holds(p) && enters(p)) ||
+             (at_q == 0 && Box::of(edge).holds(q) && enters(q));
     });
-    return found;
   }
 
  private:
@@ -159,18 +158,17 @@ class Polygon {
 
   // Whether the way from a point of rings to another one starts inside: on the inner side of every ring there.
   bool points_inside(Point at, Point to) const {
-    bool inside = true;
-    for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring) {
-      const std::uint32_t from = starts_[ring], last = starts_[ring + 1] - 1;
-      for (std::uint32_t i = from; inside && i < last; ++i) {
-        const Point a = corners_[i], b = corners_[i + 1];
-        if (b == at)
-          inside = opens_to(a, b, corners_[i + 1 == last ? from + 1 : i + 2], to);
-        else if (!(a == at) && Box::of({a, b}).holds(at) && orientation(a, b, at) == 0)
-          inside = orientation(a, b, to) > 0;
-      }
-    }
-    return inside;
+    const auto misses = [&](std::uint32_t i) {
+      const Point a = corners_[i], b = corners_[i + 1];
+      if (b == at) return !opens_to(a, b, corner_after(i + 1), to);
+      return !(a == at) && Box::of({a, b}).holds(at) && orientation(a, b, at) == 0 && orientation(a, b, to) <= 0;
+    };
+    return !any_edge([&](const Box& box) { return box.holds(at); }, misses);
+  }
+  // The corner that follows one that is not the first of its ring.
+  Point corner_after(std::uint32_t i) const {
+    const auto next = std::upper_bound(starts_.begin(), starts_.end(), i);
+    return i + 1 == *next ? corners_[next[-1] + 1] : corners_[i + 1];
   }
   // Whether a point is in the open angle on the left of the corner b between a and c.
   static bool opens_to(Point a, Point b, Point c, Point to) {
@@ -182,9 +180,22 @@ class Polygon {
   // Whether a corner is on both segments, which cross: the inside need not be beside the edge there.
   bool touched_where_crossed(Point p, Point q, Edge edge) const {
     const Box box = Box::of(edge);
-    return std::any_of(corners_.begin(), corners_.end(), [&](Point corner) {
-      return box.holds(corner) && orientation(edge.a, edge.b, corner) == 0 && orientation(p, q, corner) == 0;
-    });
+    return any_edge_meeting([&](const Box& other) { return box.meets(other); },
+                            [&](Edge other) {
+                              return box.holds(other.a) && orientation(edge.a, edge.b, other.a) == 0 &&
+                                     orientation(p, q, other.a) == 0;
+                            });
+  }
+
+  Edge edge(std::uint32_t i) const { return {corners_[i], corners_[i + 1]}; }
+  // As `any_edge_meeting`, by the number of the first corner.
+  template <class Meets, class Visit>
+  bool any_edge(Meets meets, Visit visit) const {
+    if (!tree_.empty()) return tree_.any(meets, visit);
+    for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
+      for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i)
+        if (visit(i)) return true;
+    return false;
   }
 
   std::vector<Point> corners_;
@@ -194,6 +205,7 @@ class Polygon {
   std::size_t count_ = 0;
   double scale_ = 0;
   std::vector<std::uint32_t> slabs_, in_slabs_;  // the first of each slab in the list of edges, and the list
+  BoxTree tree_;  // of the edges, by the numbers of their first corners, if these are not few
 };
 
 // Counter-clockwise from the least vertex, three or more.
@@ -218,6 +230,7 @@ struct Area {
   bool closed = true;
   double margin = 0;
   std::vector<Polygon> polygons = {};  // joined by "or"; none: the empty area
+  BoxTree tree = {};                   // of the polygons, if they are not few
   std::vector<Point> convex = {};      // the vertices, if there is one polygon and it is a hull
   std::size_t greatest = 0;            // the number of the greatest of them
   Edge segment = {};
@@ -227,6 +240,11 @@ struct Area {
   static Area of_polygons(std::vector<Polygon> polygons, bool closed, double margin) {
     Area area{.closed = closed, .margin = margin};
     area.polygons = std::move(polygons);
+    if (area.polygons.size() > FEW_POLYGONS) {
+      std::vector<std::uint32_t> numbers(area.polygons.size());
+      std::iota(numbers.begin(), numbers.end(), 0);
+      area.tree = BoxTree(std::move(numbers), [&](std::uint32_t i) { return area.polygons[i].box(); });
+    }
     return area;
   }
   static Area of_disk(Point center, double radius, bool closed, double margin) {
@@ -263,8 +281,11 @@ struct Area {
     if (kind == Kind::SEGMENT) return Box::of(segment).holds(p) && orientation(segment.a, segment.b, p) == 0 ? 0 : -1;
     if (!convex.empty()) return where_in_convex(convex, greatest, p);
     int where = -1;
-    for (const Polygon& polygon : polygons)
-      if (where < 1) where = std::max(where, polygon.where(p));
+    any_polygon([&](const Box& box) { return box.holds(p); },
+                [&](const Polygon& polygon) {
+                  where = std::max(where, polygon.where(p));
+                  return where > 0;
+                });
     return where;
   }
   bool holds(Point p) const { return where(p) >= (closed ? 0 : 1); }
@@ -275,8 +296,13 @@ struct Area {
     for (const Polygon& polygon : polygons) polygon.for_each_edge(visit);
   }
 
+  std::size_t corners() const {
+    std::size_t corners = 0;
+    for (const Polygon& polygon : polygons) corners += polygon.corners();
+    return corners;
+  }
   std::size_t bytes() const {
-    std::size_t bytes = sizeof *this + convex.capacity() * sizeof(Point);
+    std::size_t bytes = sizeof *this + convex.capacity() * sizeof(Point) + tree.bytes();
     for (const Polygon& polygon : polygons) bytes += polygon.bytes();
     return bytes;
   }
@@ -286,7 +312,10 @@ struct Area {
   // The same for a p that is not inside.
   double distance_to_boundary(Point p) const {
     if (kind == Kind::DISK) return where(p) >= 0 ? 0 : distance_to_circle(p, center, radius);
-    return distance_to_nearest(p, [&](auto visit) { for_each_edge(visit); });
+    return distance_to_nearest(p, [&](const double& most, auto visit) {
+      if (kind == Kind::SEGMENT) visit(segment);
+      visit_near(p, most, [&](const Polygon& polygon) { polygon.visit_near(p, most, visit); });
+    });
   }
 
   // Whether the segment from p to q, which differ, has a point of the area.
@@ -296,15 +325,30 @@ struct Area {
       return closed ? more <= 0 : more < 0;
     }
     if (holds(p) || holds(q)) return true;
-    bool met = false;
-    if (closed)
-      for_each_edge([&](Edge edge) { met = met || segments_meet({p, q}, edge); });
-    else
-      met = std::any_of(polygons.begin(), polygons.end(), [&](const Polygon& each) { return each.lets_in(p, q); });
-    return met;
+    if (kind == Kind::SEGMENT) return segments_meet({p, q}, segment);
+    const Box way = Box::of({p, q});
+    const auto near = [&](const Box& box) { return way.meets(box) && may_touch_line({p, q}, 0, box); };
+    return any_polygon(near, [&](const Polygon& polygon) {
+      if (!closed) return polygon.lets_in(p, q);
+      return polygon.any_edge_meeting(near, [&](Edge edge) { return segments_meet({p, q}, edge); });
+    });
   }
 
  private:
+  static constexpr std::size_t FEW_POLYGONS = 16;
+
+  // See `BoxTree`.
+  template <class Meets, class Visit>
+  bool any_polygon(Meets meets, Visit visit) const {
+    if (tree.empty()) return std::any_of(polygons.begin(), polygons.end(), visit);
+    return tree.any(meets, [&](std::uint32_t i) { return visit(polygons[i]); });
+  }
+  template <class Visit>
+  void visit_near(Point p, const double& most, Visit visit) const {
+    for (std::size_t i = 0; tree.empty() && i < polygons.size(); ++i) visit(polygons[i]);
+    if (!tree.empty()) tree.visit_near(p, most, [&](std::uint32_t i) { visit(polygons[i]); });
+  }
+
   static bool segments_meet(Edge s, Edge t) {
     if (!Box::of(s).meets(Box::of(t))) return false;
     if (t.a == t.b) return orientation(s.a, s.b, t.a) == 0;

@@ -78,12 +78,13 @@ struct AboutDistance {
   }
 };
 
-// The distance from p to the nearest of some segments, rounded once. Infinite if there are none.
+// The distance from p to the nearest of some segments, rounded once. Infinite if there are none. `for_each` is called
+// with a distance and a visit, and may leave out segments that are farther than that; a visit may lower it.
 template <class ForEach>
 double distance_to_nearest(Point p, ForEach for_each) {
   double most = INFINITE, nearest = INFINITE;
-  for_each([&](Edge edge) { most = std::min(most, AboutDistance(p, edge).most); });
-  for_each([&](Edge edge) {
+  for_each(most, [&](Edge edge) { most = std::min(most, AboutDistance(p, edge).most); });
+  for_each(most, [&](Edge edge) {
     if (AboutDistance(p, edge).least <= most) nearest = std::min(nearest, distance_to_segment(p, edge));
   });
   return nearest;

@@ -286,7 +286,8 @@ class Reports : protected Zoning {
       });
       return;
     }
-    if (everyone_) {
+    // With few subjects it takes less than the zones of the boundary.
+    if (everyone_ || slots_->size() < fences_[handle]->area->corners()) {
       slots_->for_each([&](std::uint32_t slot) {
         if (members_.has(subjects_[slot].inside, handle)) visit(slot);
       });

@@ -15,9 +15,6 @@ struct Strip {
 
 inline bool edge_less(const Edge& e, const Edge& f) { return e.a == f.a ? e.b < f.b : e.a < f.a; }
 
-constexpr double STRIP_BOUND = 1e-14;  // relative, far above the rounding of a few operations
-constexpr double STRIP_SLACK = 1e-280;
-
 inline Box around(const Strip& strip) {
   const double reach = std::max(strip.radius, 0.0) + strip.margin;
   Box box = Box::of(strip.edge);
@@ -31,23 +28,18 @@ inline Box around(const Strip& strip) {
 // False only if no point of the box is in the strip.
 inline bool may_touch(const Strip& strip, const Box& box) {
   if (!around(strip).meets(box)) return false;
-  const Point a = strip.edge.a;
-  const Point center = {box.least.x / 2 + box.greatest.x / 2, box.least.y / 2 + box.greatest.y / 2};
-  const double half_x = std::max(box.greatest.x - center.x, center.x - box.least.x);
-  const double half_y = std::max(box.greatest.y - center.y, center.y - box.least.y);
   if (strip.radius >= 0) {
+    const Point a = strip.edge.a;
+    const Point center = {box.least.x / 2 + box.greatest.x / 2, box.least.y / 2 + box.greatest.y / 2};
+    const double half_x = std::max(box.greatest.x - center.x, center.x - box.least.x);
+    const double half_y = std::max(box.greatest.y - center.y, center.y - box.least.y);
     const double farthest = std::hypot(std::abs(center.x - a.x) + half_x, std::abs(center.y - a.y) + half_y);
     const double nearest =
         std::hypot(std::max(std::abs(center.x - a.x) - half_x, 0.0), std::max(std::abs(center.y - a.y) - half_y, 0.0));
     const double error = STRIP_BOUND * (farthest + strip.radius + strip.margin) + STRIP_SLACK;
     return !(farthest + error < strip.radius) && !(nearest - error > strip.radius + strip.margin);
   }
-  const double ux = strip.edge.b.x - a.x, uy = strip.edge.b.y - a.y;
-  const double vx = center.x - a.x, vy = center.y - a.y;
-  const double margin = strip.margin > 0 ? strip.margin * std::hypot(ux, uy) : 0;
-  const double reach = std::abs(ux) * half_y + std::abs(uy) * half_x + margin;
-  const double error = STRIP_BOUND * (std::abs(ux * vy) + std::abs(uy * vx) + reach) + STRIP_SLACK;
-  return !(std::abs(ux * vy - uy * vx) - reach > error);
+  return may_touch_line(strip.edge, strip.margin, box);
 }
 
 inline Strip strip_of(const Area& area, Edge edge) {

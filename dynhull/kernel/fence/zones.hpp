@@ -79,7 +79,7 @@ struct alignas(LINE) Zone {
   Point anchor() const { return anchor_of(box); }
   // The distance from a point of the zone to the nearest of some pieces, if all others are farther. Rounded once.
   std::optional<double> distance(std::span<const Piece> run, Point p) const {
-    const double nearest = distance_to_nearest(p, [&](auto visit) {
+    const double nearest = distance_to_nearest(p, [&](const double&, auto visit) {
       for (const Piece& piece : run) visit(piece.edge);
     });
     const double to_border =

@@ -72,6 +72,18 @@ class FenceIndex {
     return packed(alone(ALL_ROWS, [&](Fences& fences) { return fences.inside(fence); }));
   }
 
+  // The distances of some places to the area; None around the subjects' own hull.
+  nb::object distances(std::int64_t fence, const Rows& places) {
+    const auto area = alone(0, [&](Fences& fences) { return fences.area(fence); });
+    if (!area) return nb::none();
+    const std::size_t count = places.shape(0);
+    const Output<double> distances(count);
+    beside_others(count, [&] {
+      for (std::size_t i = 0; i < count; ++i) distances.data()[i] = area->distance(points_of(places)[i]);
+    });
+    return nb::cast(distances.array());
+  }
+
   // Lets keys that were removed from the hull of another index and are new here have moved. Returns which rows have.
   // The hulls are locked one after the other.
   nb::object carry(FenceIndex& source, const nb::object& keys) {

@@ -6,7 +6,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "../fence/simple_ring.hpp"
+#include "../fence/valid_rings.hpp"
 #include "../static/chan.hpp"
 #include "../static/static_hull.hpp"
 #include "fences.hpp"
@@ -30,10 +30,16 @@ SignArray orientations(const Rows& a, const Rows& b, const Rows& c) {
   return output.array();
 }
 
-int turning(const Rows& ring) {
+std::vector<int> turnings(const std::vector<Rows>& rings) {
+  std::vector<Point> corners;
+  std::vector<std::size_t> sizes;
+  for (const Rows& ring : rings) {
+    corners.insert(corners.end(), points_of(ring), points_of(ring) + ring.shape(0));
+    sizes.push_back(ring.shape(0));
+  }
   std::optional<nb::gil_scoped_release> release;
-  if (ring.shape(0) > FEW_ROWS) release.emplace();
-  return turning_if_simple({points_of(ring), ring.shape(0)});
+  if (corners.size() > FEW_ROWS) release.emplace();
+  return RingSweep(corners, sizes).turnings();
 }
 
 std::optional<PointArray> convex_hull(const Rows& xy, std::optional<bool> discard, std::optional<bool> threads) {
@@ -190,6 +196,10 @@ void add_fences(nb::module_& module) {
       .def("inside", &FenceIndex::inside, nb::sig("def inside(self, fence: int) -> dynhull.keys.Keys"), "fence"_a,
            "The keys inside, in order.")
       .def("count", &FenceIndex::count, "fence"_a, "The number of keys inside.")
+      .def("distances", &FenceIndex::distances,
+           nb::sig("def distances(self, fence: int, places: dynhull.arrays.Points) -> "
+                   "numpy.typing.NDArray[numpy.float64] | None"),
+           "fence"_a, "places"_a, "The distances of places to the area; None if that is the hull of the entities.")
       .def("carry", &FenceIndex::carry,
            nb::sig("def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]"),
            "source"_a, "keys"_a, "Let keys that were removed there and are new here have moved.")
@@ -299,9 +309,10 @@ void add_predicates(nb::module_& module) {
               "d: tuple[float, float], z: tuple[float, float]) -> int"),
       "a"_a, "b"_a, "c"_a, "d"_a, "z"_a, "The sign of height(ab) - height(cd) at z, for a < b < z <= c < d.");
   module.def("orientations", &orientations, "a"_a, "b"_a, "c"_a, "`orientation` of each row of three arrays.");
-  module.def("turning_if_simple", &turning, "ring"_a,
-             "+1 for a ring of corners whose edges meet only at the ends of neighbours, and that has its inside on the "
-             "left; -1 if on the right; 0 for any other ring.");
+  module.def("turnings_if_valid", &turnings,
+             nb::sig("def turnings_if_valid(rings: list[dynhull.arrays.Points]) -> list[int]"), "rings"_a,
+             "Of each ring of a polygon, +1 if its inside is on the left, -1 if on the right. Empty if a ring is not "
+             "simple, or is a hole that is not inside the first one or overlaps another.");
   module.def("plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
              "a * b - c * d with three roundings, as the predicates' filters compute it: tests the compiler's flags.");
 }

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError, words_for_callers
-from ..state.fences.config import FenceConfig
+from ..state.fences.checked import CheckedArea, check_polygons
+from ..state.fences.config import FenceConfig, PolygonArea
 from ..state.fences.event_block import EventBlock
 from ..state.fences.fence import Fence
 from ..state.fences.fence_leg import members
@@ -182,12 +183,14 @@ class Fences:
     async def create(self, name: str, config: FenceConfig) -> LiveFence:
         """Create a fence, or raise the error that refuses it."""
         engine = self._engine
-        request = CreateFence(Waiter(), name, engine.time(), config, engine.birth(), rows=self._rows(config))
+        checked = await self._checked(config)
+        request = CreateFence(Waiter(), name, engine.time(), config, engine.birth(), checked, rows=self._rows(config))
         return self.live(await engine.ask(request))
 
     async def replace(self, name: str, config: FenceConfig) -> LiveFence:
         """Replace the area and the settings of a fence, or raise the error that refuses it."""
-        request = ReplaceFence(Waiter(), name, self._engine.time(), config, rows=self._rows(config))
+        checked = await self._checked(config)
+        request = ReplaceFence(Waiter(), name, self._engine.time(), config, checked, rows=self._rows(config))
         return self.live(await self._engine.ask(request))
 
     async def delete(self, name: str) -> None:
@@ -217,6 +220,21 @@ class Fences:
                 live.moved()
                 if fence.ended:
                     del self._live[fence]
+
+    async def _checked(self, config: FenceConfig) -> CheckedArea | None:
+        """The polygons of an area, checked while other requests run; None for other areas.
+
+        On the globe they are checked about the centre that the subjects have now; if that moves, once more.
+        """
+        area = config.area
+        if not isinstance(area, PolygonArea):
+            return None
+        try:
+            center = None if config.kind == "prefix" else self._engine.core.get(config.subjects).state.center
+        except HullNotFoundError:
+            center = None
+        checked: CheckedArea = await self._engine.aside(partial(check_polygons, area, center))
+        return checked
 
     def _rows(self, config: FenceConfig) -> int:
         """The number of subjects, about."""

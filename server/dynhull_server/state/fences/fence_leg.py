@@ -184,7 +184,7 @@ class FenceLeg:
         points = keyed(subjects.hull.state).positions(keys)
         delays = {} if self.fence.delays is None else self.fence.delays.of(subjects.hull.name)
         outside = np.array([found[key][0] is EventType.EXIT or key in delays for key in key_list(keys)], np.bool_)
-        distances = subjects.distances(self.row.config, self.area, keys, points, outside)
+        distances = subjects.distances(self, keys, points, outside)
         hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
         columns = zip(key_list(keys), points.tolist(), distances, event_times, strict=True)
         for key, (x, y), distance, event_time in columns:

@@ -18,6 +18,7 @@ from ..events import DeleteHull, Recenter, Request
 from ..hull import Hull
 from ..hull_state import Counts
 from ..trip import Leg
+from .checked import CheckedArea
 from .config import FenceConfig
 from .delaying import end_all, end_some
 from .delays import Delays
@@ -180,10 +181,10 @@ class FenceWork(FencedTrip):
             fence.pair = Pair(fence.area, self._hull(config.subjects), config.near)
             fence.pair.look()
         leg = FenceLeg(fence, created=True)
-        fence.subjects = {each.hull.name: each for each in self._subjects(config)}
+        fence.subjects = {each.hull.name: each for each in self._subjects(config, request.checked)}
         try:
             for subjects in fence.subjects.values():
-                lay_area(subjects, number, config, fence.area)
+                lay_area(subjects, number, config, fence.area, request.checked)
                 self._inside += subjects.index.count(number)
         except BaseException:
             self._drop(fence)
@@ -219,9 +220,9 @@ class FenceWork(FencedTrip):
         area = self._area(config)
         require_frames(config, area, None if config.kind == "prefix" else self._hull(config.subjects))
         if not fence.subjects and config.kind == "prefix":  # nobody is there to refuse an invalid area
-            check(config, area)
+            check(config, area, request.checked)
         for subjects in fence.subjects.values():
-            lay_area(subjects, fence.number, config, area)
+            lay_area(subjects, fence.number, config, area, request.checked)
             self.applied = True
         if fence.pair is not None and area is not None:
             self._replace_pair(fence.pair, Pair(area, fence.pair.other, config.near), leg, request.time)
@@ -261,7 +262,7 @@ class FenceWork(FencedTrip):
         _require_whole(hull)
         return hull
 
-    def _subjects(self, config: FenceConfig) -> list[Subjects]:
+    def _subjects(self, config: FenceConfig, checked: CheckedArea | None) -> list[Subjects]:
         """The hulls whose keys a new fence compares, by name."""
         known = {name: subjects for line in self.lines for name, subjects in line.subjects.items()}
         for leg in self.fence_legs.values():
@@ -279,7 +280,7 @@ class FenceWork(FencedTrip):
         for hull in keyed:
             require_frames(config, hull, None)
         if not keyed and config.kind == "prefix":
-            check(config, self._area(config))
+            check(config, self._area(config), checked)
         return [known.get(hull.name) or Subjects(hull) for hull in keyed]
 
     def _pass_time(self, request: PassTime, fence: Fence) -> None:

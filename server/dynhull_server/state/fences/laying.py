@@ -6,6 +6,7 @@ from dynhull import FenceIndex, KeyedHull
 
 from ..errors import InvalidFenceError
 from ..hull import Hull
+from .checked import CheckedArea
 from .config import CircleArea, FenceConfig, PolygonArea
 from .subjects import Subjects, area_vertices, lay
 
@@ -14,18 +15,20 @@ POINT_BYTES = 16
 RING = re.compile(r"polygon (\d+)(?: ring (\d+):?)? (.*)", re.DOTALL)
 
 
-def check(config: FenceConfig, area: Hull | None) -> None:
+def check(config: FenceConfig, area: Hull | None, checked: CheckedArea | None) -> None:
     """Raise InvalidFenceError if the area of a fence without subjects is invalid."""
     try:
-        lay(FenceIndex(KeyedHull("str")), 0, config, area_vertices(config, area))
+        lay(FenceIndex(KeyedHull("str")), 0, config, area_vertices(config, area), checked=checked)
     except ValueError as error:
         raise _invalid(config, str(error)) from None
 
 
-def lay_area(subjects: Subjects, number: int, config: FenceConfig, area: Hull | None) -> None:
+def lay_area(
+    subjects: Subjects, number: int, config: FenceConfig, area: Hull | None, checked: CheckedArea | None
+) -> None:
     """Add the area of a fence, or replace it, or raise InvalidFenceError."""
     try:
-        subjects.lay(number, config, area_vertices(config, area))
+        subjects.lay(number, config, area_vertices(config, area), checked)
     except ValueError as error:
         raise _invalid(config, str(error)) from None
 

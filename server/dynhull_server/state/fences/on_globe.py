@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import chain
 
 import numpy as np
 
@@ -82,13 +81,6 @@ def outline(frame: Gnomonic, vertices: Points) -> Points:
     """The vertices of a geographic hull in the plane, from the lexicographically smallest there."""
     places = frame.project_all(vertices)
     return np.roll(places, -int(np.lexsort(places.T[::-1])[0]), axis=0) if len(places) else places
-
-
-def metres(rings: Rings, places: Points) -> list[float]:
-    """The distances of places outside of an area to it."""
-    found = [distance(ring, places) for ring in chain.from_iterable(rings)]
-    nearest: list[float] = np.min(found, axis=0).tolist()
-    return nearest
 
 
 def compared(a: Points, b: Points, limit: float, center: Center) -> tuple[bool, float]:

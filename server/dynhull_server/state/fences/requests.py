@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..events import Birth, Request
+from .checked import CheckedArea
 from .config import FenceConfig
 
 if TYPE_CHECKING:
@@ -35,17 +36,30 @@ class FenceRequest(Request):
 
 @dataclass(slots=True, eq=False)
 class CreateFence(FenceRequest):
-    """Create a fence. The result is the Fence."""
+    """Create a fence. The result is the Fence.
+
+    Attributes:
+        config: its settings.
+        birth: its identity.
+        checked: the polygons of its area, if they have been checked.
+    """
 
     config: FenceConfig
     birth: Birth
+    checked: CheckedArea | None = None
 
 
 @dataclass(slots=True, eq=False)
 class ReplaceFence(FenceRequest):
-    """Replace the area and the settings of a fence. The result is the Fence."""
+    """Replace the area and the settings of a fence. The result is the Fence.
+
+    Attributes:
+        config: its settings.
+        checked: the polygons of its area, if they have been checked.
+    """
 
     config: FenceConfig
+    checked: CheckedArea | None = None
 
 
 @dataclass(slots=True, eq=False)

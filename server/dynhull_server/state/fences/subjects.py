@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,20 +10,23 @@ import numpy.typing as npt
 
 from dynhull import Crossings, FenceIndex, KeyedHull
 from dynhull.arrays import Points
-from dynhull.globe import Gnomonic
-from dynhull.keys import KeyType, PackedKeys, key_list
+from dynhull.globe import Boundary, Gnomonic
+from dynhull.keys import PackedKeys, key_list
 
+from ..batch import NO_POINTS
 from ..contents.keyed import Keyed, stored_times
 from ..contents.live import AnyKeyedHull
 from ..hull import Hull
 from ..hull_state import HullState
 from ..records import Keys, Times
-from .config import CircleArea, FenceConfig, HullArea
-from .on_globe import metres, outline, projected, require_circle, rings_of
+from .checked import CheckedArea
+from .config import Area, CircleArea, FenceConfig, HullArea
+from .on_globe import outline, projected, require_circle, rings_of
 from .records import Key
 
 if TYPE_CHECKING:
     from .fence import Fence
+    from .fence_leg import FenceLeg
 
 
 # The number of no fence, and the least distance.
@@ -47,6 +51,7 @@ class Subjects:
         self.index = FenceIndex(indexed(hull.state))
         self.fences: dict[int, Fence] = {}
         self.delaying: set[Fence] = set()
+        self._boundaries: dict[int, tuple[Area, Boundary]] = {}  # of areas on the globe that somebody has left
         self.follow_state()
 
     def follow_state(self) -> None:
@@ -59,6 +64,7 @@ class Subjects:
         """Forget a fence, which the index has dropped; without any, nothing is compared any more."""
         del self.fences[fence.number]
         self.delaying.discard(fence)
+        self._boundaries.pop(fence.number, None)
         if not self.fences:
             self.detach()
 
@@ -69,9 +75,11 @@ class Subjects:
         assert isinstance(contents, Keyed)
         contents.mirror = None
 
-    def lay(self, number: int, config: FenceConfig, vertices: Points | None) -> None:
+    def lay(
+        self, number: int, config: FenceConfig, vertices: Points | None, checked: CheckedArea | None = None
+    ) -> None:
         """Add the area of a fence, or replace it; ValueError if it is invalid."""
-        lay(self.index, number, config, vertices, frame=frame_of(self.hull.state))
+        lay(self.index, number, config, vertices, frame=frame_of(self.hull.state), checked=checked)
 
     def take(self, replaced: FenceConfig | None = None, area: Hull | None = None) -> Crossings:
         """The crossings since they were last taken: in degrees and metres if the hull is geographic.
@@ -100,8 +108,7 @@ class Subjects:
             hull = fence.area if replaced is None else area
             away = (crossings.fences == number) & (distances > 0) & (distances < np.inf)
             if away.any():
-                rings = rings_of(config.area, area_vertices(config, hull))
-                distances[away] = metres(rings, points[away])
+                distances[away] = self._metres(number, config, hull, points[away])
         return replace(crossings, points=points, previous=before, distances=distances)
 
     def note_delays(self, fence: "Fence") -> None:
@@ -117,41 +124,47 @@ class Subjects:
         assert isinstance(contents, Keyed)
         return stored_times(contents.hull.times(keys)) if contents.timed else None
 
-    def distances(
-        self, config: FenceConfig, area: Hull | None, keys: Keys, points: Points, outside: npt.NDArray[np.bool_]
-    ) -> list[float]:
-        """The distances from keys that are there to the area of a fence.
+    def distances(self, leg: "FenceLeg", keys: Keys, points: Points, outside: npt.NDArray[np.bool_]) -> list[float]:
+        """The distances from keys that are there to the area of a fence, which has been laid.
 
         Args:
-            config: the settings of the fence.
-            area: the hull that is its area, None for other areas.
+            leg: the fence after the trip.
             keys: n keys.
             points: (n, 2) their positions.
             outside: (n,) which of them are on the outer side; others may be outside by less than the margin.
         """
+        config = leg.row.config
         if not config.margin and not outside.any():
             return [0.0] * len(keys)
-        own = isinstance(config.area, HullArea) and config.area.without_self
-        vertices = area_vertices(config, area)
+        distances: list[float]
         if self.hull.state.center is not None:  # there are no margins
             found = np.zeros(len(keys))
-            empty = vertices is not None and not len(vertices)
-            found[outside] = np.inf if empty else metres(rings_of(config.area, vertices), points[outside])
-            distances: list[float] = found.tolist()
-            return distances
-        if own:  # each is compared with all others: so they are asked, between two changes
-            index, number, bare = self.index, SPARE, replace(config, margin=LEAST, crosses=False)
+            found[outside] = self._metres(leg.row.number, config, leg.area, points[outside])
+            distances = found.tolist()
+        elif isinstance(config.area, HullArea) and config.area.without_self:
+            distances = self._distances_to_others(config, keys)
         else:
-            kind: KeyType = "str" if isinstance(keys, PackedKeys) else "int"
-            index, number = FenceIndex(KeyedHull.from_entities(keys, points, None, kind)), 0
-            bare = replace(config, margin=0.0, crosses=False)
-        lay(index, number, bare, vertices, keys)  # as if all were inside: those leave that are outside
+            distances = self.index.distances(leg.row.number, points).tolist()
+        return distances
+
+    def _distances_to_others(self, config: FenceConfig, keys: Keys) -> list[float]:
+        """The distance from each of some keys to the hull of all others."""
+        bare = replace(config, margin=LEAST, crosses=False)
+        lay(self.index, SPARE, bare, NO_POINTS, keys)  # as if all were inside: those leave that are outside
         try:
-            left = index.take()
+            left = self.index.take()
         finally:
-            index.drop(number)
+            self.index.drop(SPARE)
         far = dict(zip(key_list(left.keys), left.distances.tolist(), strict=True))
         return [far.get(key, 0.0) for key in key_list(keys)]
+
+    def _metres(self, number: int, config: FenceConfig, area: Hull | None, places: Points) -> npt.NDArray[np.float64]:
+        """The distances of places outside of the area of a fence on the globe to it."""
+        known, boundary = self._boundaries.get(number, (None, None))
+        if boundary is None or known is not config.area or isinstance(known, HullArea):
+            boundary = Boundary(chain.from_iterable(rings_of(config.area, area_vertices(config, area))))
+            self._boundaries[number] = config.area, boundary
+        return boundary.distance(places)
 
     def keys(self, keys: Collection[Key]) -> Keys:
         """Keys of the hull's kind, ascending."""
@@ -172,6 +185,7 @@ def lay(
     vertices: Points | None,
     inside: Keys | None = None,
     frame: Gnomonic | None = None,
+    checked: CheckedArea | None = None,
 ) -> None:
     """Add the area of a fence, or replace it.
 
@@ -182,6 +196,7 @@ def lay(
         vertices: the vertices of the hull that is its area, None for other areas.
         inside: the keys that are inside; None if the area decides.
         frame: the projection of the subjects of a geographic hull, None for a plane.
+        checked: the polygons of the area, if they have been checked, which counts in the same projection only.
 
     Raises:
         ValueError: the area is invalid.
@@ -201,6 +216,9 @@ def lay(
             without_self=area.without_self,
             inside=inside,
         )
+    elif checked is not None and checked.center == (None if frame is None else frame.center):
+        polygons = checked.polygons()
+        index.set_polygons(number, polygons, closed=closed, margin=margin, cross=cross, inside=inside)
     elif frame is not None:
         if isinstance(area, CircleArea):
             require_circle(frame, area)
@@ -209,8 +227,7 @@ def lay(
     elif isinstance(area, CircleArea):
         index.set_circle(number, area.x, area.y, area.radius, closed=closed, margin=margin, cross=cross, inside=inside)
     else:
-        polygons = rings_of(area, None)
-        index.set_polygons(number, polygons, closed=closed, margin=margin, cross=cross, inside=inside)
+        index.set_polygons(number, rings_of(area, None), closed=closed, margin=margin, cross=cross, inside=inside)
 
 
 def keyed(state: HullState) -> AnyKeyedHull:
