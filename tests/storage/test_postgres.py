@@ -393,6 +393,7 @@ class Rewriting(Proxy):
 
     def __init__(self, url, pattern, words):
         self._pattern, self._words = re.compile(pattern, re.DOTALL), words
+        self.changes = 0
         home = re.search(r"host=([^&]*)", url).group(1)
         super().__init__(f"{home}/.s.PGSQL.5432")
         host, port = self.address.split(":")
@@ -401,7 +402,9 @@ class Rewriting(Proxy):
     def _forward(self, source, sink):
         with suppress(OSError):
             while data := source.recv(65536):
-                sink.sendall(self._pattern.sub(self._words, data))
+                changed, count = self._pattern.subn(self._words, data)
+                self.changes += count
+                sink.sendall(changed)
         shut(source)
         shut(sink)
 
@@ -415,6 +418,13 @@ def test_sessions_of_newer_versions_have_no_timeout_for_transactions_either(url,
         pytest.raises(StorageError, match='unrecognized configuration parameter "transaction_timeout"'),
     ):
         on(newer.url).open(no_progress)
+
+
+def test_tables_are_created_in_few_turns(postgres):
+    """Other workers wait for them, though not for long, and the database may be far away."""
+    with closing(Rewriting(postgres.new_database(), b"Z\0\0\0\5", b"Z\0\0\0\5")) as proxy:  # it is ready for a query
+        join(Database(proxy.url), 16)
+        assert 0 < proxy.changes < 25
 
 
 def test_poolers_are_refused(url):

@@ -131,9 +131,10 @@ def join(database: Database, partitions: int) -> Cluster:
         hold(connection, database)
         there = partitions_of(connection, database) or partitions
         prepare(connection, database, there)
-        for each in TABLES:
-            connection.execute(each.encode())
-        connection.execute(GONE)
+        with connection.pipeline():
+            for each in TABLES:
+                connection.execute(each.encode())
+            connection.execute(GONE)
         secret = _secret(connection)
     return Cluster(there, secret)
 

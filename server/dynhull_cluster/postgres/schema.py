@@ -190,11 +190,12 @@ def prepare(connection: Connection, database: Database, partitions: int) -> None
                 f"{user} may not create the schema {SCHEMA} in {database}: have its owner say "
                 f"GRANT CREATE ON DATABASE {base} TO {user}"
             ) from None
-        for statement in _tables():
-            connection.execute(statement.encode())
-        connection.execute("INSERT INTO format (format, partitions) VALUES (%s, %s)", [FORMAT, partitions])
-        for partition in range(partitions):
-            put_totals(connection, partition, Totals())
+        with connection.pipeline():  # others wait for it, and not for long
+            for statement in _tables():
+                connection.execute(statement.encode())
+            connection.execute("INSERT INTO format (format, partitions) VALUES (%s, %s)", [FORMAT, partitions])
+            for partition in range(partitions):
+                put_totals(connection, partition, Totals())
         return
     if present != partitions:
         raise StorageError(f"{database} is divided among {_servers(present)}: {_remedy(present)}")
