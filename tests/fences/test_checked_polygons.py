@@ -51,7 +51,7 @@ CHAINS = {
 @compiled
 @pytest.mark.parametrize("at", CHAINS.values(), ids=CHAINS)
 def test_thousands_of_holes_that_touch(at):
-    """A check that compares the holes with all corners takes minutes."""
+    """Each touches its neighbours, or the exterior between two of its corners or at one."""
     holes = [[(x, y), (x + 1, y), (x + 0.5, y + 0.5)] for x, y in at] if at[0][1] else []
     holes = holes or [[(x, y), (x + 0.5, y + 1), (x - 0.5, y + 1)] for x, y in at[1:-1]]
     floor = [(float(k), 0.0) for k in range(2001)]
