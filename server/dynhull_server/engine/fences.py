@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from .engine import Engine
 
 T = TypeVar("T")
+# The checks of polygons at one time. Invalid ones may take long, and large reads have the same threads.
+MOST_CHECKS = 2
 
 
 class LiveFence:
@@ -148,6 +150,7 @@ class Fences:
         self._engine = engine
         self._storage = storage
         self._live: dict[Fence, LiveFence] = {}
+        self._checks = asyncio.Semaphore(MOST_CHECKS)
         self.events: Counter[int] = Counter()
         self.stirred: dict[Fence, None] = {}
         self.watched: dict[int, LiveFence] = {}
@@ -233,7 +236,8 @@ class Fences:
             center = None if config.kind == "prefix" else self._engine.core.get(config.subjects).state.center
         except HullNotFoundError:
             center = None
-        checked: CheckedArea = await self._engine.aside(partial(check_polygons, area, center))
+        async with self._checks:
+            checked: CheckedArea = await self._engine.aside(partial(check_polygons, area, center))
         return checked
 
     def _rows(self, config: FenceConfig) -> int:
