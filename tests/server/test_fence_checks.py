@@ -10,6 +10,7 @@ from live_engine import engine_in_memory
 
 from dynhull import _rings
 from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.fences import MOST_CHECKS
 from dynhull_server.state.errors import InvalidFenceError
 from dynhull_server.state.fences.config import FenceConfig, PolygonArea
 from dynhull_server.state.records import HullSettings
@@ -53,3 +54,34 @@ def test_turns_check_no_polygons(monkeypatch: pytest.MonkeyPatch, kind: str) -> 
     asyncio.run(run())
     assert len(threads) == 4
     assert all(thread.startswith("read") for thread in threads)
+
+
+def test_checks_whose_callers_have_left_leave_threads_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[str] = []
+    go_on = threading.Event()
+
+    def slow(*_: Any) -> Any:
+        begun.append(threading.current_thread().name)
+        go_on.wait()
+        raise ValueError("no polygon")
+
+    monkeypatch.setattr(_rings, "_as_polygon", slow)
+
+    async def run() -> None:
+        async with engine_in_memory() as engine:
+            await engine.create("fleet", HullSettings("str"))
+            config = FenceConfig(area(SQUARE), "hull", "fleet")
+            for number in range(5):
+                caller = asyncio.create_task(engine.fences.create(f"fence-{number}", config))
+                while len(begun) < min(number + 1, MOST_CHECKS):
+                    await asyncio.sleep(0)
+                await asyncio.wait([caller], timeout=0.05)
+                caller.cancel()
+                await asyncio.wait([caller])
+            assert await engine.aside(lambda: "read") == "read"
+            go_on.set()
+            with pytest.raises(InvalidFenceError):
+                await engine.fences.create("fence", config)
+
+    asyncio.run(run())
+    assert len(begun) == MOST_CHECKS + 1

@@ -236,8 +236,10 @@ class Fences:
             center = None if config.kind == "prefix" else self._engine.core.get(config.subjects).state.center
         except HullNotFoundError:
             center = None
-        async with self._checks:
-            checked: CheckedArea = await self._engine.aside(partial(check_polygons, area, center))
+        await self._checks.acquire()
+        checking = asyncio.ensure_future(self._engine.aside(partial(check_polygons, area, center)))
+        checking.add_done_callback(lambda _: self._checks.release())
+        checked: CheckedArea = await asyncio.shield(checking)  # a caller who leaves does not end it, nor free its thread
         return checked
 
     def _rows(self, config: FenceConfig) -> int:
