@@ -337,6 +337,7 @@ def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullC
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         assert page.locator(".events .scroll").evaluate("each => each.scrollWidth <= each.clientWidth")
         names = page.locator(".table tbody th")
+        expect(names).to_have_count(3)
         assert names.evaluate_all("all => all.map(each => each.scrollWidth <= each.clientWidth)") == [True] * 3
         assert events(page).first.bounding_box()["height"] < 150
 

@@ -239,9 +239,8 @@ class Fences:
         await self._checks.acquire()
         checking = asyncio.ensure_future(self._engine.aside(partial(check_polygons, area, center)))
         checking.add_done_callback(lambda _: self._checks.release())
-        checked: CheckedArea = await asyncio.shield(
-            checking
-        )  # a caller who leaves does not end it, nor free its thread
+        # A caller who leaves does not end it, nor free its thread.
+        checked: CheckedArea = await asyncio.shield(checking)
         return checked
 
     def _rows(self, config: FenceConfig) -> int:
