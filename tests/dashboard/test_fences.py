@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from chromium import chromium
-from dashboard_process import dashboard_process, opened, wait_for_vertices
+from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
@@ -87,10 +87,6 @@ def description(page: Page) -> Locator:
 def pick(page: Page, fence: str) -> None:
     page.get_by_label("Pick fences").fill(fence)
     page.get_by_label("Pick fences").press("Enter")
-
-
-def let_go(page: Page, name: str) -> None:
-    page.get_by_role("button", name=f"Remove {name}", exact=True).click()
 
 
 def wait_for_fence(page: Page, name: str, what: str, expected: object) -> None:
@@ -196,6 +192,7 @@ def test_fences_are_picked_and_let_go_and_watched_once_for_all(
             let_go(page, yard)
             let_go(page, fleet)
             expect(page.get_by_role("heading", name="Events")).to_be_hidden()
+            expect(page.get_by_role("button", name=f"Remove {fleet}", exact=True)).to_have_count(0)
         wait_until(lambda: scrape(server[1])["dynhull_watchers"] == 0)
 
 

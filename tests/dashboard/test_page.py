@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import chromium
-from dashboard_process import dashboard_process, opened, wait_for_vertices
+from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
@@ -97,10 +97,6 @@ def description(page: Page) -> Locator:
 
 def picture(page: Page) -> bytes:
     return page.locator(".plane").screenshot()
-
-
-def let_go(page: Page, name: str) -> None:
-    page.get_by_role("button", name=f"Remove {name}").click()
 
 
 def pick(page: Page, name: str) -> None:

@@ -75,3 +75,11 @@ def wait_for_vertices(page: Page, name: str, vertices: list[list[float]]) -> Non
     """Wait until the page shows this polygon."""
     same = f"([name, vertices]) => JSON.stringify(({VERTICES})(name)) == JSON.stringify(vertices)"
     page.wait_for_function(same, arg=[name, vertices])
+
+
+def let_go(page: Page, name: str) -> None:
+    """Press the button that removes a hull or a fence.
+
+    In one step: between the press and the release of a pointer, the button moves if something above it goes.
+    """
+    page.get_by_role("button", name=f"Remove {name}", exact=True).dispatch_event("click")
