@@ -127,10 +127,13 @@ def test_calls_that_grpc_would_have_wait_end_with_their_worker(tmp_path: Path) -
 
 
 def test_what_a_worker_sent_before_it_ended_arrives(tmp_path: Path) -> None:
+    sent = asyncio.Event()
+
     async def serve(requests: Any, context: Any) -> None:
         async for request in requests:
             for _ in range(3):
                 await context.write(request)
+            sent.set()
 
     async def run() -> None:
         worker = grpc.aio.server()
@@ -142,6 +145,7 @@ def test_what_a_worker_sent_before_it_ended_arrives(tmp_path: Path) -> None:
         upstream = link.stream(METHOD, ())
         assert await upstream.write(b"answer")
         assert await upstream.read() == b"answer"
+        await sent.wait()
         leaving.pop().close()
         await worker.stop(None)
         async with asyncio.timeout(PATIENCE):
