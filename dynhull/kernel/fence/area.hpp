@@ -25,7 +25,7 @@ class Polygon {
     }
     starts_.push_back(static_cast<std::uint32_t>(corners_.size()));
     for (Point p : corners_) box_.add(p);
-    if (corners_.size() <= FEW_CORNERS) return;
+    if (few()) return;
     lay_slabs();
     std::vector<std::uint32_t> edges;
     edges.reserve(corners_.size() - rings.size());
@@ -59,7 +59,7 @@ class Polygon {
   // Visits edges, and may leave out those that are farther from p than `most`, which a visit may lower.
   template <class Visit>
   void visit_near(Point p, const double& most, Visit visit) const {
-    if (tree_.empty()) return for_each_edge(visit);
+    if (few()) return for_each_edge(visit);
     tree_.visit_near(p, most, [&](std::uint32_t i) { visit(edge(i)); });
   }
 
@@ -101,6 +101,7 @@ class Polygon {
 
  private:
   static constexpr std::size_t FEW_CORNERS = 24, CORNERS_OF_A_SLAB = 4, ENTRIES_OF_A_CORNER = 8;
+  bool few() const { return corners_.size() <= FEW_CORNERS; }  // asked of what is read anyway, not of the tree
 
   // Flips `inside` if the edge crosses the ray from p to the right. False if p is on the edge.
   static bool passes(Point a, Point b, Point p, bool& inside) {
@@ -191,7 +192,7 @@ class Polygon {
   // As `any_edge_meeting`, by the number of the first corner.
   template <class Meets, class Visit>
   bool any_edge(Meets meets, Visit visit) const {
-    if (!tree_.empty()) return tree_.any(meets, visit);
+    if (!few() && !tree_.empty()) return tree_.any(meets, visit);
     for (std::size_t ring = 0; ring + 1 < starts_.size(); ++ring)
       for (std::uint32_t i = starts_[ring]; i + 1 < starts_[ring + 1]; ++i)
         if (visit(i)) return true;
@@ -230,12 +231,12 @@ struct Area {
   bool closed = true;
   double margin = 0;
   std::vector<Polygon> polygons = {};  // joined by "or"; none: the empty area
-  BoxTree tree = {};                   // of the polygons, if they are not few
   std::vector<Point> convex = {};      // the vertices, if there is one polygon and it is a hull
   std::size_t greatest = 0;            // the number of the greatest of them
   Edge segment = {};
   Point center = {};
   double radius = 0;
+  BoxTree tree = {};  // of the polygons, if they are not few; last, because areas of one are read without it
 
   static Area of_polygons(std::vector<Polygon> polygons, bool closed, double margin) {
     Area area{.closed = closed, .margin = margin};
@@ -336,17 +337,18 @@ struct Area {
 
  private:
   static constexpr std::size_t FEW_POLYGONS = 16;
+  bool few() const { return polygons.size() <= FEW_POLYGONS; }
 
   // See `BoxTree`.
   template <class Meets, class Visit>
   bool any_polygon(Meets meets, Visit visit) const {
-    if (tree.empty()) return std::any_of(polygons.begin(), polygons.end(), visit);
+    if (few()) return std::any_of(polygons.begin(), polygons.end(), visit);
     return tree.any(meets, [&](std::uint32_t i) { return visit(polygons[i]); });
   }
   template <class Visit>
   void visit_near(Point p, const double& most, Visit visit) const {
-    for (std::size_t i = 0; tree.empty() && i < polygons.size(); ++i) visit(polygons[i]);
-    if (!tree.empty()) tree.visit_near(p, most, [&](std::uint32_t i) { visit(polygons[i]); });
+    for (std::size_t i = 0; few() && i < polygons.size(); ++i) visit(polygons[i]);
+    if (!few()) tree.visit_near(p, most, [&](std::uint32_t i) { visit(polygons[i]); });
   }
 
   static bool segments_meet(Edge s, Edge t) {
