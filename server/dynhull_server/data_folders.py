@@ -6,6 +6,8 @@ from pathlib import Path
 
 import typer
 
+from dynhull_cli.plural import plural
+
 from .exports import WRITERS
 from .failure import code_of, fail, text_of
 from .progress import progress_bar
@@ -80,8 +82,8 @@ def _hulls(report: copies.Report) -> str:
 
 def hulls_counted(hulls: int, shards: int) -> str:
     """The number of hulls, and that of the shards that some of them are divided among."""
-    counts = [(hulls, "hull"), *([(shards, "shard")] if shards else [])]
-    return ", ".join(f"{count:,} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
+    counted = plural(hulls, "hull")
+    return f"{counted}, {plural(shards, 'shard')}" if shards else counted
 
 
 def export_hull(data: Path, name: str, file: Path) -> None:

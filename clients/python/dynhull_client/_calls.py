@@ -880,12 +880,11 @@ def watch(
             hull reaches beyond them, for hulls too large to send.
         follow: whether the watch survives the deletion of the hull: it returns a `Deleted` event, and a Snapshot when
             there is a new hull of that name. It also waits for a hull that does not exist yet. Without it,
-            HullNotFoundError ends the watch. With `directions`, `layer` or `max_vertices`, the watch notices only a
-            deletion that happens while it is connected.
+            HullNotFoundError ends the watch.
         reconnect: whether the watch continues after a lost connection, however long that takes, with the changes since
             then, or with a snapshot if the server no longer has them. Until the first event it is tried again as
-            other reads are (`retries` of the client). Without it,
-            UnavailableError ends the watch, as does RevisionForgottenError if the server cannot continue from a copy.
+            other reads are (`retries` of the client). Without it, UnavailableError ends the watch, as does
+            RevisionForgottenError if the server cannot continue from a copy.
         timeout: seconds after which the watch ends with DeadlineError; None for never.
     """
     request = pb.WatchRequest(

@@ -347,8 +347,10 @@ struct Area {
   }
   template <class Visit>
   void visit_near(Point p, const double& most, Visit visit) const {
-    for (std::size_t i = 0; few() && i < polygons.size(); ++i) visit(polygons[i]);
-    if (!few()) tree.visit_near(p, most, [&](std::uint32_t i) { visit(polygons[i]); });
+    if (few())
+      for (const Polygon& polygon : polygons) visit(polygon);
+    else
+      tree.visit_near(p, most, [&](std::uint32_t i) { visit(polygons[i]); });
   }
 
   static bool segments_meet(Edge s, Edge t) {

@@ -25,6 +25,12 @@ struct Box {
     add(other.least);
     add(other.greatest);
   }
+  Point center() const { return {least.x / 2 + greatest.x / 2, least.y / 2 + greatest.y / 2}; }
+  // From the centre to the farther side along each axis.
+  Point half() const {
+    const Point middle = center();
+    return {std::max(greatest.x - middle.x, middle.x - least.x), std::max(greatest.y - middle.y, middle.y - least.y)};
+  }
   bool holds(Point p) const { return (least.x <= p.x) & (p.x <= greatest.x) & (least.y <= p.y) & (p.y <= greatest.y); }
   bool meets(const Box& other) const {
     return (least.x <= other.greatest.x) & (other.least.x <= greatest.x) & (least.y <= other.greatest.y) &
@@ -37,13 +43,11 @@ constexpr double STRIP_SLACK = 1e-280;
 
 // False only if every point of a box is farther than `margin` from the line through an edge.
 inline bool may_touch_line(Edge edge, double margin, const Box& box) {
-  const Point center = {box.least.x / 2 + box.greatest.x / 2, box.least.y / 2 + box.greatest.y / 2};
-  const double half_x = std::max(box.greatest.x - center.x, center.x - box.least.x);
-  const double half_y = std::max(box.greatest.y - center.y, center.y - box.least.y);
+  const Point center = box.center(), half = box.half();
   const double ux = edge.b.x - edge.a.x, uy = edge.b.y - edge.a.y;
   const double vx = center.x - edge.a.x, vy = center.y - edge.a.y;
   const double wide = margin > 0 ? margin * std::hypot(ux, uy) : 0;
-  const double reach = std::abs(ux) * half_y + std::abs(uy) * half_x + wide;
+  const double reach = std::abs(ux) * half.y + std::abs(uy) * half.x + wide;
   const double error = STRIP_BOUND * (std::abs(ux * vy) + std::abs(uy * vx) + reach) + STRIP_SLACK;
   return !(std::abs(ux * vy - uy * vx) - reach > error);
 }
@@ -107,8 +111,8 @@ class BoxTree {
     if (part.is_leaf()) return;
     const bool wide = box.greatest.x - box.least.x > box.greatest.y - box.least.y;
     const auto middle = [&](std::uint32_t item) {
-      const Box each = box_of(item);
-      return wide ? each.least.x / 2 + each.greatest.x / 2 : each.least.y / 2 + each.greatest.y / 2;
+      const Point center = box_of(item).center();
+      return wide ? center.x : center.y;
     };
     const auto begin = items_.begin();
     std::nth_element(begin + static_cast<std::ptrdiff_t>(part.first),

@@ -30,12 +30,10 @@ inline bool may_touch(const Strip& strip, const Box& box) {
   if (!around(strip).meets(box)) return false;
   if (strip.radius >= 0) {
     const Point a = strip.edge.a;
-    const Point center = {box.least.x / 2 + box.greatest.x / 2, box.least.y / 2 + box.greatest.y / 2};
-    const double half_x = std::max(box.greatest.x - center.x, center.x - box.least.x);
-    const double half_y = std::max(box.greatest.y - center.y, center.y - box.least.y);
-    const double farthest = std::hypot(std::abs(center.x - a.x) + half_x, std::abs(center.y - a.y) + half_y);
+    const Point center = box.center(), half = box.half();
+    const double farthest = std::hypot(std::abs(center.x - a.x) + half.x, std::abs(center.y - a.y) + half.y);
     const double nearest =
-        std::hypot(std::max(std::abs(center.x - a.x) - half_x, 0.0), std::max(std::abs(center.y - a.y) - half_y, 0.0));
+        std::hypot(std::max(std::abs(center.x - a.x) - half.x, 0.0), std::max(std::abs(center.y - a.y) - half.y, 0.0));
     const double error = STRIP_BOUND * (farthest + strip.radius + strip.margin) + STRIP_SLACK;
     return !(farthest + error < strip.radius) && !(nearest - error > strip.radius + strip.margin);
   }

@@ -49,9 +49,13 @@ class Access:
     read: tuple[str, ...]
     write: tuple[str, ...]
 
+    def may_read(self, name: str) -> bool:
+        """Whether what has this name may be read."""
+        return name.startswith(self.read)
+
     def require_read(self, name: str) -> None:
         """Raise PermissionDeniedError if the hull may not be read."""
-        if not name.startswith(self.read):
+        if not self.may_read(name):
             raise PermissionDeniedError("read", name)
 
     def require_write(self, name: str) -> None:
@@ -108,7 +112,7 @@ class Rights:
 
     def may_read(self, name: str) -> bool:
         """Whether the name may be told."""
-        return name.startswith(self._access.read)
+        return self._access.may_read(name)
 
     def readable(self, prefix: str) -> list[str]:
         """The prefixes of the readable names that begin with `prefix`."""

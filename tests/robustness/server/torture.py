@@ -66,6 +66,7 @@ from timed import ModelledHull, Shuttle, TimedWriter, wall
 from timeline import FLEETS, SECOND, TIMED
 
 HULL = "tortured"
+POINT_WRITERS = 2
 WORKERS = ("--workers", "2", "--gateways", "2")
 DISK = "64m"
 PAGE_BYTES = 8192  # of the database
@@ -126,7 +127,6 @@ class Torture:
         folder: Path,
         seed: int,
         breath: float,
-        writers: int = 2,
         options: Sequence[str] = (),
         journal: str = "",
     ) -> None:
@@ -144,7 +144,7 @@ class Torture:
             if kind in TIMED and not kind.geographic and not kind.max_points:
                 config.shards = self.shards
             persist(self._stub.CreateHull, pb.CreateHullRequest(name=kind.name, config=config))
-        points = [PointWriter(self.shared, i, HULL, seed + i) for i in range(writers)]
+        points = [PointWriter(self.shared, i, HULL, seed + i) for i in range(POINT_WRITERS)]
         timed = [TimedWriter(self.shared, kind, seed + i) for i, kind in enumerate(TIMED)]
         shuttles = [Shuttle(self.shared, i, seed + i) for i in range(2)]
         self.hulls = [ModelledHull(self.shared, writer.kind, [writer]) for writer in timed]

@@ -154,10 +154,9 @@ async def _require_fence(client: AsyncHullClient, reading: Reading, field: str) 
         fence = await client.get_fence(reading.name)
         if reading.uid not in ("", fence.uid):
             reading.after = 0  # "replaced" follows, whatever the sequence
-        after = reading.after or 0
-        if reading.uid in ("", fence.uid) and after > fence.last_sequence:
-            detail = f"{field}: {after} is after the last event, {fence.last_sequence}"
-            raise ProblemError(409, detail, "SEQUENCE_AHEAD", field=field, value=str(after))
+        elif reading.after is not None and reading.after > fence.last_sequence:
+            detail = f"{field}: {reading.after} is after the last event, {fence.last_sequence}"
+            raise ProblemError(409, detail, "SEQUENCE_AHEAD", field=field, value=str(reading.after))
 
 
 def _admit(request: Request) -> None:
