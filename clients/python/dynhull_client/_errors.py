@@ -40,6 +40,11 @@ class DynhullError(Exception):
         self.oldest = _number(metadata.get("oldest"))
         self.batch = _number(metadata.get("batch"))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What pickle and copy make it again from: process pools hand errors on."""
+        more = {name: value for name, value in vars(self).items() if name != "metadata"}
+        return type(self), (str(self), self.code, self.reason, dict(self.metadata)), more
+
 
 class InvalidRequestError(DynhullError, ValueError):
     """A field of the request has a value that is not allowed; nothing has changed."""
