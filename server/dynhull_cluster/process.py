@@ -21,6 +21,7 @@ from dynhull_server.rpc.call_counts import CallCounts
 from dynhull_server.rpc.calls import refusals_elsewhere
 from dynhull_server.rpc.metrics import BUCKETS
 from dynhull_server.rpc.refusal_log import RefusalLog
+from dynhull_server.setting_sources import warn_of_service_links
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite.disk import Disk
@@ -43,6 +44,7 @@ log = logging.getLogger(__name__)
 def run(settings: Settings) -> None:
     """Serve with several processes, then return; what prevents that ends the process."""
     logs.configure(settings.log_level, settings.log_format, "supervisor")
+    warn_of_service_links()
     try:
         asyncio.run(_serve(settings))
     except StartFailedError as error:  # that process has said why

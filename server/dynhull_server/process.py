@@ -18,6 +18,7 @@ from .engine.division import Divisions
 from .failure import code_of, fail, text_of
 from .malloc import return_large_blocks
 from .progress import progress_bar
+from .setting_sources import warn_of_service_links
 from .settings import Settings
 from .storage.port import Storage, StorageError
 
@@ -39,6 +40,7 @@ def run(
         divisions: returns what runs hulls over shards, None for a server without.
     """
     logs.configure(settings.log_level, settings.log_format)
+    warn_of_service_links()
     return_large_blocks()
     share_processors(settings)
     allow_connections(settings.max_connections)

@@ -4,7 +4,9 @@ Apart from the settings themselves: help and shell completion need only their na
 pydantic-settings.
 """
 
+import logging
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -20,6 +22,12 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
+# Beside a Service named dynhull, Kubernetes gives every container DYNHULL_PORT=tcp://ADDRESS:PORT and others of this form.
+SERVICE_LINK = re.compile(r"(tcp|udp|sctp)://")
+
+log = logging.getLogger(__name__)
+
+
 class SettingsError(Exception):
     """Invalid settings; the message has one line for each."""
 
@@ -28,6 +36,8 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
     """The settings from flags, environment and file, or raise SettingsError."""
     read_file(file)
     _refuse_ignored(flags)
+
+    ignored = set(service_links())
 
     class Sources(Settings, BaseSettings):
         model_config = SettingsConfigDict(env_prefix=PREFIX, toml_file=file)
@@ -38,7 +48,11 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
         ) -> tuple[PydanticBaseSettingsSource, ...]:
             """Flags take precedence over the environment, and the environment over the file."""
             named = dict(zip(("init_settings", "env_settings"), sources, strict=False)) | more
-            return named["init_settings"], named["env_settings"], TomlConfigSettingsSource(settings_cls)
+
+            def environment() -> dict[str, Any]:
+                return {name: value for name, value in named["env_settings"]().items() if name not in ignored}
+
+            return named["init_settings"], environment, TomlConfigSettingsSource(settings_cls)  # type: ignore[return-value]
 
     try:
         return Sources(**flags)
@@ -51,17 +65,35 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
 def origins(flags: Mapping[str, Any], file: Path | None) -> dict[str, str]:
     """The origin of each setting."""
     in_file = read_file(file)
-    variables = {name.upper() for name in os.environ}
+    variables, ignored = {name.upper() for name in os.environ}, service_links()
     origins = {}
     for name in Settings.model_fields:
         variable = f"{PREFIX}{name.upper()}"
         if name in flags:
             origins[name] = "flag"
-        elif variable in variables:
+        elif variable in variables and name not in ignored:
             origins[name] = variable
         else:
             origins[name] = str(file) if name in in_file else "default"
     return origins
+
+
+def service_links() -> dict[str, str]:
+    """The values that Kubernetes has put in place of settings: links to its Services. They are ignored."""
+    given = {name.upper(): value for name, value in os.environ.items()}
+    values = {name: given.get(f"{PREFIX}{name.upper()}", "") for name in Settings.model_fields}
+    return {name: value for name, value in values.items() if SERVICE_LINK.match(value)}
+
+
+def warn_of_service_links() -> None:
+    """Log what is ignored."""
+    for name, value in service_links().items():
+        log.warning(
+            "%s%s is ignored: its value is a link of Kubernetes to a Service; enableServiceLinks: false leaves it out",
+            PREFIX,
+            name.upper(),
+            extra={"value": value},
+        )
 
 
 def _refuse_ignored(flags: Mapping[str, Any]) -> None:

@@ -48,6 +48,25 @@ def test_what_config_shows_is_a_file_for_config(tmp_path: Path) -> None:
     assert settings["create_on_write"] == ("true", str(file))
 
 
+def test_links_of_kubernetes_to_services_are_no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DYNHULL_PORT", "tcp://10.96.0.12:50051")
+    monkeypatch.setenv("DYNHULL_PORT_50051_TCP", "tcp://10.96.0.12:50051")
+    monkeypatch.setenv("DYNHULL_METRICS_PORT", "udp://10.96.0.13:9000")  # of a Service dynhull-metrics
+    settings = shown()
+    assert settings["port"] == ("50051", "default")
+    assert settings["metrics_port"] == ("", "default")
+    command = [COMMAND, "serve", "--port", "0", "--in-memory"]
+    with Process(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline().startswith("dynhull serving on")
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+        first, second, third, *_ = process.stderr
+    assert "DYNHULL_PORT is ignored" in first
+    assert "10.96.0.12" in first
+    assert "DYNHULL_METRICS_PORT is ignored" in second
+    assert "serving" in third
+
+
 def test_the_server_uses_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "dynhull.toml"
     file.write_text("max_hulls = 1\n")
