@@ -8,7 +8,7 @@ import typer
 
 from dynhull_cli.plural import plural
 
-from .exports import WRITERS
+from .exports import WRITERS, complete_file
 from .failure import code_of, fail, text_of
 from .progress import progress_bar
 from .state.contents import replayed
@@ -95,8 +95,8 @@ def export_hull(data: Path, name: str, file: Path) -> None:
         for note in found.notes:
             typer.echo(note, err=True)
         contents = joined([replayed(kept, settings).stored() for settings, kept in found.kepts])
-        with progress_bar("points") as progress:
-            WRITERS[file.suffix](file, contents, progress, geographic=found.row.settings.geographic)
+        with complete_file(file) as unfinished, progress_bar("points") as progress:
+            WRITERS[file.suffix](unfinished, contents, progress, geographic=found.row.settings.geographic)
     points = "1 point" if len(contents) == 1 else f"{len(contents):,} points"
     typer.echo(f"{file}: {points} of {name} at revision {found.revision}")
 

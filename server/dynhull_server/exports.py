@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 import numpy as np
@@ -13,10 +15,26 @@ from dynhull.keys import PackedKeys, key_list
 
 from .state.records import FOREVER, NO_TIME, Contents, Times
 from .storage.port import Progress
+from .storage.sqlite.disk import make_durable
 
 ROWS_A_STEP = 100_000
 HALF_TURN = 180.0
 LARGEST_JSON_INTEGER = 2**53  # readers with doubles for numbers round larger ones
+
+
+@contextmanager
+def complete_file(file: Path) -> Iterator[Path]:
+    """A file for the block to write: with its end, and not before, it is on the disk under its final name."""
+    target = file.resolve()  # a symbolic link stays one
+    unfinished = target.with_name(f"{target.name}.unfinished-{token_hex(4)}")
+    try:
+        yield unfinished
+        make_durable(unfinished)
+        unfinished.replace(target)
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise
+    make_durable(target.parent)
 
 
 def write_csv(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:

@@ -1,11 +1,12 @@
 """Backup, restore, check and export, as commands, beside servers that run or were killed."""
 
+import resource
 import signal
 import sqlite3
 import subprocess
 import sys
 from collections import Counter
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -368,6 +369,43 @@ def test_export_and_import(tmp_path, suffix):
         dynhull("export", "to", tmp_path / "again.csv", "--data", data)
     again = np.loadtxt(tmp_path / "again.csv", delimiter=",", skiprows=1)
     np.testing.assert_array_equal(sorted_rows(again), sorted_rows(given))
+
+
+@pytest.fixture
+def large(tmp_path):
+    """A folder with a hull of 20,000 points."""
+    storage, _ = opened(tmp_path / "data")
+    storage.commit([Create(HullRow(1, "fleet", "0123", 12.5))])
+    storage.commit([Append(1, [record(1, 20_000)])])
+    storage.close()
+    return tmp_path / "data"
+
+
+@contextmanager
+def full_beyond(size):
+    """No file can be written beyond a size, as on a disk that is full then."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet", "geojson"])
+def test_an_export_that_fails_leaves_what_was_there(tmp_path, large, suffix):
+    folder = tmp_path / "exported"
+    folder.mkdir()
+    file, link = folder / f"fleet.{suffix}", folder / f"link.{suffix}"
+    file.write_text("of yesterday")
+    link.symlink_to(file)
+    with full_beyond(2**16):
+        refused("export", "fleet", link, "--data", large, says="File too large")
+    assert link.read_text() == "of yesterday"
+    assert sorted(folder.iterdir()) == [file, link]
+    done("export", "fleet", link, "--data", large, says=f"{link}: 20,000 points of fleet at revision 1")
+    assert link.is_symlink()
+    assert file.stat().st_size > 2**16
 
 
 def sorted_rows(points):

@@ -1,6 +1,5 @@
 """Copying and checking a data folder, also while a server uses it."""
 
-import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -17,7 +16,7 @@ from ..rows.ledger import Group, Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
-from .disk import Access, Disk
+from .disk import Access, Disk, make_durable
 from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
 from .migration import make_tables, migrate
@@ -286,7 +285,7 @@ def _new(source: object, target: Path) -> Iterator[sqlite3.Connection]:
     try:
         with closing(sqlite3.connect(unfinished, isolation_level=None)) as connection:
             yield connection
-        _make_durable(unfinished)
+        make_durable(unfinished)
     except BaseException as error:
         for file in target.glob(f"{UNFINISHED}*"):
             file.unlink()
@@ -296,8 +295,8 @@ def _new(source: object, target: Path) -> Iterator[sqlite3.Connection]:
             raise StorageError(f"{source} cannot be copied to {target}: {error}") from error
         raise
     unfinished.rename(target / DATABASE)
-    _make_durable(target)
-    _make_durable(target.absolute().parent)
+    make_durable(target)
+    make_durable(target.absolute().parent)
 
 
 def _claim(target: Path) -> bool:
@@ -312,15 +311,6 @@ def _claim(target: Path) -> bool:
     if any(target.iterdir()):
         raise StorageError(f"{target} is not empty: name an empty folder, or one that does not exist yet")
     return False
-
-
-def _make_durable(path: Path) -> None:
-    """Sync the content of a file, or the names in a folder."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 @contextmanager

@@ -64,3 +64,12 @@ class Disk:
         """A connection to a database, usable from any thread, by one at a time."""
         address = f"{database.absolute().as_uri()}?{access.value}"
         return sqlite3.connect(address, uri=True, isolation_level=None, check_same_thread=False, timeout=30)
+
+
+def make_durable(path: Path) -> None:
+    """Sync the content of a file, or the names in a folder."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
