@@ -22,6 +22,10 @@ LOOKAHEAD = 2**20
 # Milliseconds that a new connection has for the HTTP/2 handshake.
 HANDSHAKE_TIMEOUT = 10_000
 
+# Calls that may wait to be taken up. gRPC refuses some of more than that, and all of more than twice as many, without a
+# reason; by default already some of a thousand.
+PENDING = 20_000
+
 # Messages up to this many bytes beyond the limit are read, so that the refusal can have details.
 REFUSED_BYTES = 64 * 2**20
 
@@ -103,6 +107,8 @@ def grpc_server(settings: Settings, *, shared_port: bool = False) -> grpc.aio.Se
             ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
             ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
             ("grpc.max_allowed_incoming_connections", settings.max_connections),
+            ("grpc.server.max_pending_requests", PENDING),
+            ("grpc.server.max_pending_requests_hard_limit", 2 * PENDING),
         ]
     )
 

@@ -1,11 +1,13 @@
-"""Clients that do not read: they cost the server no memory, and their calls end with an error that says why."""
+"""Bursts of calls are answered; clients that do not read cost no memory, and their calls end with a reason."""
+
+import asyncio
 
 import grpc
 import numpy as np
 from metrics import measured, scrape
 from refusal import refusal
 
-from dynhull_client import HullClient, HullCopy
+from dynhull_client import AsyncHullClient, HullClient, HullCopy
 from dynhull_client._messages import decode_event
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -15,6 +17,7 @@ SMALL_WINDOW = [("grpc.http2.bdp_probe", 0)]
 VERTICES = 1_000
 STALLED = 40
 WARM_UP, BATCHES = 150, 600
+BURST = 5_000
 
 
 def ring(i: int) -> np.ndarray:
@@ -32,6 +35,20 @@ def turn(client: HullClient, begin: int, end: int) -> None:
 
 def resident(address: str) -> float:
     return scrape(address)["process_resident_memory_bytes"]
+
+
+async def burst(address: str, name: str) -> int:
+    """Put BURST keys in as many calls at once; returns how many keys the hull has then."""
+    async with AsyncHullClient(address) as client:
+        await client.create_hull(name, keyed="int")
+        async with asyncio.TaskGroup() as calls:
+            for i in range(BURST):
+                calls.create_task(client.put(name, [i], [[i, i]]))
+        return (await client.get_hull(name)).info.points
+
+
+def test_a_burst_of_calls_is_answered(address: str, name: str) -> None:
+    assert asyncio.run(burst(address, name)) == BURST
 
 
 def test_watchers_that_do_not_read_cost_no_memory() -> None:
