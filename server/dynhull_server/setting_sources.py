@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
-# Beside a Service named dynhull, Kubernetes gives every container DYNHULL_PORT=tcp://ADDRESS:PORT and others of this form.
+# Kubernetes gives every container DYNHULL_PORT=tcp://ADDRESS:PORT, and more of this form, of a Service named dynhull.
 SERVICE_LINK = re.compile(r"(tcp|udp|sctp)://")
 
 log = logging.getLogger(__name__)

@@ -14,11 +14,7 @@ import dynhull_client
 from dynhull_client import DynhullError, HullClient, HullNotFoundError, UnavailableError
 
 METADATA = {"field": "points", "row": "3", "value": "nan", "first_row": "1", "oldest": "7", "last": "9", "fence": "a"}
-KINDS = [
-    each
-    for each in vars(dynhull_client).values()
-    if isinstance(each, type) and issubclass(each, DynhullError)
-]
+KINDS = [each for each in vars(dynhull_client).values() if isinstance(each, type) and issubclass(each, DynhullError)]
 WAYS: list[Callable[[Any], Any]] = [
     *(lambda error, protocol=protocol: pickle.loads(pickle.dumps(error, protocol)) for protocol in range(6)),
     copy.copy,
