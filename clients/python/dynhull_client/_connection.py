@@ -31,6 +31,14 @@ OPTIONS = [
     # Finds a restarted server within a second; by default gRPC may take two minutes.
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 1000),
+    # Notices within twenty seconds that a connection is dead, though nobody has closed it.
+    ("grpc.keepalive_time_ms", 10_000),
+    ("grpc.keepalive_timeout_ms", 10_000),
+    ("grpc.http2.ping_timeout_ms", 10_000),  # of other pings, which a ping of keepalive would wait for
+    ("grpc.keepalive_permit_without_calls", 1),
+    ("grpc.http2.max_pings_without_data", 0),
+    # A connection of its own: one that is dead would be shared with all new clients of the process.
+    ("grpc.use_local_subchannel_pool", 1),
 ]
 
 Result = TypeVar("Result")
