@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster cluster ray simulate mutants coverage peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster cluster ray simulate mutants coverage flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -156,6 +156,12 @@ cluster: .venv/.test  ## all tests of several processes and machines; `make test
 
 ray: .venv/.test  ## all tests of Ray: Datasets, and as a launcher of servers; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray
+
+N ?= 20
+BUSY ?= 0
+
+flakes: .venv/.test .venv/.peers  ## the suite N times in random order, beside BUSY busy processes: which tests fail, and how often
+	$(BIN)/python tests/flakes.py --runs $(N) --busy $(BUSY) --seed $(SEED) -- $(WORKERS)
 
 SEED ?= 1
 MUTANTS ?= 200

@@ -2,6 +2,8 @@ import gc
 import re
 from collections import Counter
 from collections.abc import Generator, Iterator
+from itertools import chain, groupby
+from random import Random
 
 import divided_shape
 import pytest
@@ -36,6 +38,7 @@ settings.load_profile("dynhull")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--shape", choices=SHAPES, default="process", help="how the servers of the tests run")
+    parser.addoption("--order-seed", type=int, help="run the modules, and the tests in each, in a random order")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -82,8 +85,20 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def shuffled(items: list[pytest.Item], seed: int) -> list[pytest.Item]:
+    """The items in a random order, those of a module together: they share its fixtures."""
+    draw = Random(seed)
+    modules = [list(group) for _, group in groupby(items, lambda item: item.path)]
+    draw.shuffle(modules)
+    for each in modules:
+        draw.shuffle(each)
+    return [*chain.from_iterable(modules)]
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the long tests: at the end, all workers should have something to do."""
+    if (seed := config.getoption("--order-seed")) is not None:
+        items[:] = shuffled(items, seed)
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if servers.shape != "process":
         for each in items:
