@@ -99,8 +99,9 @@ def test_hulls_are_listed_in_pages_of_all_workers(place: Place, client: HullClie
 @pytest.mark.parametrize(("first", "other"), [(ZERO, ONE), (ONE, ZERO), (ONE, WITH_ONE)])
 def test_hulls_of_any_workers_are_separated(client: HullClient, first: str, other: str) -> None:
     found = client.separate(first, other)
-    expected = max_margin(client.get_hull(first).vertices, client.get_hull(other).vertices)
-    assert (found.distance, found.revision, found.other_revision) == (expected.margin, 1, 1)
+    hull, second = client.get_hull(first), client.get_hull(other)
+    expected = max_margin(hull.vertices, second.vertices)
+    assert (found.distance, found.revision, found.other_revision) == (expected.margin, hull.revision, second.revision)
     assert np.array_equal(found.normal, expected.normal)
     assert np.array_equal(found.closest, expected.points)
 
@@ -130,8 +131,9 @@ def test_what_needs_one_worker_says_so(client: HullClient) -> None:
         client.create_fence("north/fence", SQUARE, ONE)
     with pytest.raises(InvalidRequestError, match='with several workers, a prefix has a "/"'):
         client.create_fence("north/fence", SQUARE, Prefix("north"))
+    before = {name: client.get_hull(name).revision for name in (ONE, WITH_ONE)}
     applied = client.transfer({ONE: Batch(insert=[[11, 1]]), WITH_ONE: Batch(insert=[[21, 1]])})
-    assert {each.revision for each in applied.values()} == {2}
+    assert {name: each.revision - 1 for name, each in applied.items()} == before
     client.transfer({ONE: Batch(delete=[[11, 1]]), WITH_ONE: Batch(delete=[[21, 1]])})
 
 
@@ -142,6 +144,9 @@ def test_fences_of_all_workers(client: HullClient) -> None:
         client.put(f"{group}/keyed", ["k"], [[1, 1]])
     assert [each.name for each in client.list_fences()] == ["fleet/fence", "north/fence"]
     assert [each.inside for each in client.list_fences()] == [1, 1]
+    for group in ("fleet", "north"):
+        client.delete_fence(f"{group}/fence")
+        client.delete_hull(f"{group}/keyed")
 
 
 def test_reads_of_all_workers_are_answered_in_order(client: HullClient) -> None:

@@ -339,3 +339,4 @@ def test_a_refusal_names_no_fence_that_the_caller_may_not_read(guarded: Server) 
                 with pytest.raises(HullFencedError, match=fence):
                     getattr(root, refused.__name__)("fleet/truck-9")
             root.delete_fence(fence)
+        root.delete_hull("fleet/truck-9")
