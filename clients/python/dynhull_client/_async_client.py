@@ -9,12 +9,12 @@ from . import _fences as fences
 from . import _layers as peeling
 from . import _quarantine as quarantine
 from . import _uses as uses
+from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
 from ._async_pipeline import AsyncPipeline
 from ._async_watch import AsyncFenceWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call
-from ._connection import AsyncConnection
 from ._fence_messages import Fence
 from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
 from ._ingest import Ingest
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import TracebackType
 
     import numpy.typing as npt
 
+    from ._async_connection import AsyncConnection
     from ._calls import Ingesting
-    from ._connection import AsyncConnection
     from ._messages import Ingested
 
 
@@ -27,6 +30,8 @@ class AsyncIngest:
         self._connection = connection.blocking()
         self._name = ingesting.name
         self._ingest = Ingest(self._connection, ingesting)
+        # Of its own, as those that threads share could all wait for a server that does not read.
+        self._thread = ThreadPoolExecutor(1, f"ingest to {ingesting.name}")
 
     @property
     def summary(self) -> Ingested | None:
@@ -45,21 +50,28 @@ class AsyncIngest:
         remove: Any = None,
     ) -> None:
         """Send a batch; arguments and errors as for `Ingest.apply`."""
-        await asyncio.to_thread(
-            self._ingest.apply, insert, delete, move, keys=keys, points=points, times=times, remove=remove
+        await self._in_thread(
+            partial(self._ingest.apply, insert, delete, move, keys=keys, points=points, times=times, remove=remove)
         )
 
     def __repr__(self) -> str:
         return f"<AsyncIngest to {self._name!r}>"
 
     async def __aenter__(self) -> Self:
-        await asyncio.to_thread(self._ingest.__enter__)
+        self._ingest.__enter__()
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        leave = partial(self._ingest.__exit__, kind, error, traceback)
         try:
-            await asyncio.to_thread(self._ingest.__exit__, kind, error, traceback)
+            if error is None:
+                await self._in_thread(leave)
+            else:
+                leave()
         finally:
-            self._connection.close()
+            self._connection.close()  # ends what waits in the thread
+
+    async def _in_thread(self, function: Callable[[], None]) -> None:
+        await asyncio.get_running_loop().run_in_executor(self._thread, function)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
 import grpc
@@ -11,7 +10,8 @@ import grpc
 from . import _calls as calls
 from . import _layers as peeling
 from . import _uses as uses
-from ._errors import DynhullError, error_of
+from ._async_connection import end
+from ._errors import DynhullError
 from ._methods import answer_of, described, documented
 from ._outcomes import settle
 from ._pipeline import CLOSED
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
+    from ._async_connection import AsyncConnection
     from ._calls import Call, Piping
-    from ._connection import AsyncConnection
     from ._questions import Answered
 
 P = ParamSpec("P")
@@ -128,9 +128,7 @@ class AsyncPipeline:
             outcome.cancel()
         self._notify()
         if self._task is not None:
-            self._task.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._task
+            await end(self._task)
 
     async def _run(self) -> None:
         """One connection after another, each begun when there is something to ask."""
@@ -141,25 +139,18 @@ class AsyncPipeline:
             self._connections += 1
             answered, pause = self._questions.lost(lost)
             self._settle(answered)
-            await asyncio.sleep(pause)
+            await self._connection.pause(pause)
 
     async def _connect(self) -> DynhullError:
         """Send reads and receive answers; returns the error that ended the connection."""
+
+        async def hear(response: pb.QueryResponse) -> bool:
+            self._settle(self._questions.answer(response))
+            return self._questions.refusal is None
+
         requests = self._requests(self._connections)
-        try:
-            call = self._connection.begin(self._connection.stub.Query, requests, None)
-        except DynhullError as error:
-            return error
-        try:
-            async for response in call:  # `read` leaves out answers that are there when a write has failed
-                self._settle(self._questions.answer(response))
-                if self._questions.refusal is not None:
-                    return self._questions.refusal
-        except grpc.RpcError as failure:
-            return error_of(failure)
-        finally:
-            call.cancel()
-        return DynhullError("the server ended the call", await call.code(), "", {})
+        lost = await self._connection.converse(self._connection.stub.Query, requests, hear)
+        return self._questions.refusal or lost
 
     def _settle(self, answered: Answered) -> None:
         settle(answered)

@@ -9,8 +9,9 @@ from typing import Any, Self
 
 import grpc
 
+from ._async_connection import AsyncConnection, unless
 from ._calls import Watching
-from ._connection import AsyncConnection
+from ._connection import client_is_closed
 from ._errors import DynhullError, error_of
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
@@ -43,9 +44,7 @@ class AsyncFollower(AsyncIterator[Happening]):
     async def __anext__(self) -> Happening:
         while not self._arrived:
             if self._call is None:
-                with suppress(TimeoutError):
-                    async with asyncio.timeout(self._place.pause):
-                        await self._closed.wait()
+                await unless(self._closed, self._connection.pause(self._place.pause))
             if self._closed.is_set() or self._place.ended:
                 raise StopAsyncIteration
             if self._call is None:
@@ -66,7 +65,8 @@ class AsyncFollower(AsyncIterator[Happening]):
                 self._arrived.extend(self._place.end(error_of(failure)))
             except asyncio.CancelledError:
                 if not self._closed.is_set():
-                    raise
+                    self._call = None
+                    self._arrived.extend(self._place.end(client_is_closed()))
         return self._arrived.popleft()
 
     async def close(self) -> None:

@@ -8,10 +8,9 @@ from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
 
-import grpc
-
+from ._async_connection import end, unless
 from ._calls import Writing, last_sequence
-from ._errors import DynhullError, error_of
+from ._errors import DynhullError
 from ._gathering import put_parts, remove_parts
 from ._outcomes import settle
 from ._window import Window
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
-    from ._connection import AsyncConnection
+    from ._async_connection import AsyncConnection
     from ._gathering import Part
     from ._messages import Applied
     from ._window import Settled
@@ -40,7 +39,7 @@ class AsyncWriter:
         self._opening = asyncio.Lock()
         self._turn = asyncio.Condition()
         self._connections = 0
-        self._closed = False
+        self._closed = asyncio.Event()
         self._window: Window[asyncio.Future[Applied]] | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -85,12 +84,14 @@ class AsyncWriter:
             window.hurry(monotonic())
             self._turn.notify_all()
             begun = window.begun
-            await self._turn.wait_for(lambda: window.settled >= begun or window.failure or self._closed)
+            await self._turn.wait_for(lambda: window.settled >= begun or window.failure or self._closed.is_set())
             window.raise_refusal()
+            if window.settled < begun:
+                raise RuntimeError(CLOSED)
 
     async def close(self) -> None:
         """Wait like `flush`, then end the writer. A second call does nothing."""
-        if self._closed:
+        if self._closed.is_set():
             return
         try:
             await self.flush()
@@ -114,14 +115,14 @@ class AsyncWriter:
 
     async def _add(self, parts: list[Part], sequence: int | None) -> asyncio.Future[Applied]:
         window = self._window
-        if window is None or self._closed:
+        if window is None or self._closed.is_set():
             window = await self._open()
         number = window.number(parts, sequence)
         async with self._turn:
             for part in parts:
                 if not window.admits(part):
                     await self._turn.wait_for(partial(self._may_put, window, part))
-                if self._closed:
+                if self._closed.is_set():
                     raise RuntimeError(CLOSED)
                 outcome = window.put(part, monotonic(), number)
             if window.ready:  # otherwise each put would wake the sender in vain
@@ -129,29 +130,30 @@ class AsyncWriter:
         return outcome
 
     def _may_put(self, window: Window[asyncio.Future[Applied]], part: Part) -> bool:
-        return window.admits(part) or window.failure is not None or self._closed
+        return window.admits(part) or window.failure is not None or self._closed.is_set()
 
     async def _open(self) -> Window[asyncio.Future[Applied]]:
         async with self._opening:
-            if self._closed:
-                raise RuntimeError(CLOSED)
             if self._window is None:
-                begin = await self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
+                asking = self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
+                begin = await unless(self._closed, asking)
+                if self._closed.is_set() or begin is None:
+                    raise RuntimeError(CLOSED)
                 self._window = Window(self._writing, begin, asyncio.get_running_loop().create_future)
                 self._task = asyncio.create_task(self._run(self._window), name=f"writer to {self._writing.name}")
+            if self._closed.is_set():
+                raise RuntimeError(CLOSED)
             return self._window
 
     async def _end(self) -> None:
-        async with self._opening, self._turn:
-            self._closed = True
+        self._closed.set()
+        async with self._turn:
             left = [] if self._window is None else self._window.abandon()
             self._turn.notify_all()
         for outcome in left:
             outcome.cancel()
         if self._task is not None:
-            self._task.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._task
+            await end(self._task)
 
     async def _run(self, window: Window[asyncio.Future[Applied]]) -> None:
         """One connection after another, until the writer is closed or has failed."""
@@ -166,28 +168,20 @@ class AsyncWriter:
             _settle(settled)
             if pause is None:
                 return
-            await asyncio.sleep(pause)
+            await self._connection.pause(pause)
 
     async def _connect(self, window: Window[asyncio.Future[Applied]]) -> DynhullError:
         """Send batches and read acknowledgements; returns the error that ended the connection."""
+
+        async def hear(response: pb.StreamResponse) -> bool:
+            async with self._turn:
+                settled = window.acknowledge(response)
+                self._turn.notify_all()
+            _settle(settled)
+            return not window.failure
+
         requests = self._requests(window, self._connections)
-        try:
-            call = self._connection.begin(self._connection.stub.Stream, requests, None)
-        except DynhullError as error:
-            return error
-        try:
-            async for response in call:  # `read` leaves out acknowledgements that are there when a write has failed
-                async with self._turn:
-                    settled = window.acknowledge(response)
-                    self._turn.notify_all()
-                _settle(settled)
-                if window.failure:
-                    break
-        except grpc.RpcError as failure:
-            return error_of(failure)
-        finally:
-            call.cancel()
-        return DynhullError("the server ended the stream", await call.code(), "", {})
+        return await self._connection.converse(self._connection.stub.Stream, requests, hear)
 
     async def _requests(
         self, window: Window[asyncio.Future[Applied]], connection: int
@@ -198,7 +192,7 @@ class AsyncWriter:
             async with self._turn:
                 request = None
                 while request is None:
-                    if self._closed or window.failure or self._connections != connection:
+                    if self._closed.is_set() or window.failure or self._connections != connection:
                         return
                     request = window.take(monotonic())
                     if request is None:

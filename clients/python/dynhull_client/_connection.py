@@ -1,11 +1,9 @@
 """A channel to a server, and calls on it."""
 
-import asyncio
-import time
 from collections.abc import Callable
 from copy import copy
 from functools import partial
-from threading import Event
+from threading import Condition, Event
 from types import SimpleNamespace
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -51,10 +49,10 @@ class Connection:
         address: host:port.
         stub: the methods of both services, whose names differ.
         retries: how often a call that reached no server is repeated.
-        blocking: makes a BlockingConnection with the same arguments, for use in threads.
     """
 
     _grpc: ClassVar[Any]
+    _event: ClassVar[type[Any]]
 
     def __init__(
         self,
@@ -70,7 +68,7 @@ class Connection:
         self.address, encrypted = target(address)
         if tls is None and encrypted:
             tls = grpc.ssl_channel_credentials()
-        self.blocking = partial(
+        self._blocking = partial(
             BlockingConnection,
             self.address,
             timeout=timeout,
@@ -82,7 +80,7 @@ class Connection:
         self._timeout = timeout
         self.retries = retries
         self._wait_for_ready = wait_for_ready
-        self._closed = Event()  # shared with those of other tokens
+        self._closed = self._event()  # shared with those of other tokens
         self._metadata = _authorization(token)
         if tls is None:
             self._channel = self._grpc.insecure_channel(self.address, OPTIONS)
@@ -95,17 +93,14 @@ class Connection:
         """The same connection for a caller with another token; None for none."""
         other = copy(self)
         other._metadata = _authorization(token)
-        other.blocking = partial(self.blocking, token=token)
+        other._blocking = partial(self._blocking, token=token)
         return other
 
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
         """Begin a call: a method of the stub with a message, or with an iterator of messages."""
         if self._closed.is_set():
-            raise DynhullError("the client is closed", grpc.StatusCode.CANCELLED, "", {})
+            raise client_is_closed()
         return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
-
-    def _begin(self, call: Call[Any], attempts: Attempts) -> Any:
-        return self.begin(getattr(self.stub, call.method), call.request, attempts.timeout())
 
     def _attempts(self, call: Call[Any]) -> Attempts:
         return Attempts(call, self._timeout if call.timeout is None else call.timeout, self.retries)
@@ -123,45 +118,61 @@ def _authorization(token: str | None) -> tuple[tuple[str, str], ...]:
     return (("authorization", f"Bearer {token}"),)
 
 
+def client_is_closed() -> DynhullError:
+    """What calls of a closed client end with."""
+    return DynhullError("the client is closed", grpc.StatusCode.CANCELLED, "", {})
+
+
 class BlockingConnection(Connection):
     """A connection whose calls block the thread. Threads may share it."""
 
     _grpc: ClassVar[Any] = grpc
+    _event = Event
 
-    def answer(self, call: Call[Result]) -> Result:
-        """Make a call, again if it may be repeated, and return its answer."""
+    def __init__(self, address: str, **options: Any) -> None:
+        super().__init__(address, **options)
+        self._news = Condition()
+
+    def answer(
+        self,
+        call: Call[Result],
+        hold: Callable[[Any], None] | None = None,
+        ended: Callable[[], bool] = lambda: False,
+    ) -> Result:
+        """Make a call, again if it may be repeated, and return its answer.
+
+        Args:
+            call: the call.
+            hold: called with what cancels each attempt, if another thread may.
+            ended: whether the caller does not wait any more; `wake` has it asked again.
+        """
         attempts = self._attempts(call)
         while True:
+            method = getattr(self.stub, call.method)
             try:
-                begun = self._begin(call, attempts)
-                return call.decode(list(begun) if call.in_parts else begun)
+                if hold is None:
+                    begun = self.begin(method, call.request, attempts.timeout())
+                    return call.decode(list(begun) if call.in_parts else begun)
+                hold(begun := self.begin(method.future, call.request, attempts.timeout()))
+                return call.decode(begun.result())
+            except grpc.FutureCancelledError:
+                raise error_of(begun) from None
             except grpc.RpcError as failure:
                 call, pause = attempts.after(call, error_of(failure))
-            time.sleep(pause)
+            self.pause(pause, ended)
+
+    def pause(self, seconds: float, ended: Callable[[], bool]) -> None:
+        """Wait before a new attempt, while the connection is open and `ended` returns False."""
+        with self._news:
+            self._news.wait_for(lambda: self._closed.is_set() or ended(), seconds)
+
+    def wake(self) -> None:
+        """Have those who pause ask again whether they go on."""
+        with self._news:
+            self._news.notify_all()
 
     def close(self) -> None:
         """End the connection and the calls on it."""
         self._closed.set()
+        self.wake()
         self._channel.close()
-
-
-class AsyncConnection(Connection):
-    """A connection of one event loop."""
-
-    _grpc: ClassVar[Any] = grpc.aio
-
-    async def answer(self, call: Call[Result]) -> Result:
-        """Make a call, again if it may be repeated, and return its answer."""
-        attempts = self._attempts(call)
-        while True:
-            try:
-                begun = self._begin(call, attempts)
-                return call.decode([part async for part in begun] if call.in_parts else await begun)
-            except grpc.RpcError as failure:
-                call, pause = attempts.after(call, error_of(failure))
-            await asyncio.sleep(pause)
-
-    async def close(self) -> None:
-        """End the connection and the calls on it."""
-        self._closed.set()
-        await self._channel.close()

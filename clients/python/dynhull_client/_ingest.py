@@ -122,5 +122,5 @@ class Ingest:
 def _result(call: Any) -> Any:
     try:
         return call.result()
-    except grpc.RpcError:
+    except (grpc.RpcError, grpc.FutureCancelledError):
         raise error_of(call) from None

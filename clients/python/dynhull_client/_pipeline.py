@@ -127,6 +127,7 @@ class Pipeline:
             self._turn.notify_all()
             if self._call is not None:
                 self._call.cancel()
+        self._connection.wake()
         for outcome, _ in left:
             outcome.cancel()
         if self._thread is not None:
@@ -136,9 +137,8 @@ class Pipeline:
         """One connection after another, each begun when there is something to ask."""
         pause = 0.0
         while True:
+            self._connection.pause(pause, lambda: self._closed)
             with self._turn:
-                if self._turn.wait_for(lambda: self._closed, pause):
-                    return
                 self._turn.wait_for(lambda: self._closed or not self._questions.empty)
                 if self._closed:
                     return

@@ -43,7 +43,7 @@ class Follower(Iterator[Happening]):
             if self._place.ended:
                 raise StopIteration
             if self._call is None:
-                self._closed.wait(self._place.pause)
+                self._connection.pause(self._place.pause, self._closed.is_set)
                 self._begin()
             try:
                 self._arrived.extend(self._place.take(next(self._call)))
@@ -57,6 +57,7 @@ class Follower(Iterator[Happening]):
     def close(self) -> None:
         """End the watch."""
         self._closed.set()
+        self._connection.wake()
         call = self._call
         if call is not None:
             call.cancel()

@@ -119,6 +119,8 @@ class Writer:
             begun = window.begun
             self._turn.wait_for(lambda: window.settled >= begun or window.failure or self._closed)
             window.raise_refusal()
+            if window.settled < begun:
+                raise RuntimeError(CLOSED)
 
     def close(self) -> None:
         """Wait like `flush`, then end the writer. A second call does nothing."""
@@ -165,23 +167,42 @@ class Writer:
 
     def _open(self) -> Window[Future[Applied]]:
         with self._opening:
-            if self._closed:
-                raise RuntimeError(CLOSED)
             if self._window is None:
-                begin = self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
-                self._window = Window(self._writing, begin, Outcome)
-                name = f"writer to {self._writing.name}"
-                self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
-                self._thread.start()
+                try:
+                    asking = last_sequence(self._writing.name, self._writing.producer)
+                    begin = self._connection.answer(asking, self._hold, lambda: self._closed)
+                except DynhullError:
+                    if self._closed:
+                        raise RuntimeError(CLOSED) from None
+                    raise
+                with self._turn:
+                    if not self._closed:
+                        self._begin(begin)
+            if self._window is None or self._closed:
+                raise RuntimeError(CLOSED)
             return self._window
 
+    def _begin(self, sequence: int) -> None:
+        self._window = Window(self._writing, sequence, Outcome)
+        name = f"writer to {self._writing.name}"
+        self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
+        self._thread.start()
+
+    def _hold(self, call: Any) -> None:
+        """Have the end of the writer cancel a call."""
+        with self._turn:
+            self._call = call
+            if self._closed:
+                call.cancel()
+
     def _end(self) -> None:
-        with self._opening, self._turn:
+        with self._turn:
             self._closed = True
             left = [] if self._window is None else self._window.abandon()
             self._turn.notify_all()
             if self._call is not None:
                 self._call.cancel()
+        self._connection.wake()
         for outcome in left:
             outcome.cancel()
         if self._thread is not None:
@@ -200,18 +221,13 @@ class Writer:
             settle(settled)
             if pause is None:
                 return
-            with self._turn:
-                if self._turn.wait_for(lambda: self._closed, pause):
-                    return
+            self._connection.pause(pause, lambda: self._closed)
 
     def _connect(self, window: Window[Future[Applied]]) -> DynhullError:
         """Send batches and read acknowledgements; returns the error that ended the connection."""
         requests = self._requests(window, self._connections)
         try:
-            with self._turn:
-                self._call = call = self._connection.begin(self._connection.stub.Stream, requests, None)
-                if self._closed:
-                    call.cancel()
+            self._hold(call := self._connection.begin(self._connection.stub.Stream, requests, None))
             for response in call:
                 with self._turn:
                     settled = window.acknowledge(response)

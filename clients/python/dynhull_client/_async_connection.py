@@ -1,0 +1,143 @@
+"""A channel to a server, and calls on it, with asyncio."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from contextlib import suppress
+from types import TracebackType
+from typing import Any, ClassVar, Self, TypeVar
+from weakref import WeakSet
+
+import grpc
+
+from ._calls import Call
+from ._connection import BlockingConnection, Connection, client_is_closed
+from ._errors import DynhullError, error_of
+
+Result = TypeVar("Result")
+
+
+class CallErrors:
+    """What a call on gRPC's asyncio ends with: an error of ours, or the cancellation of the task that waits for it.
+
+    gRPC does not keep these apart. It may go on, or raise another error, although the task was cancelled, because it
+    waits in tasks of its own, which catch the cancellation (`UnaryUnaryCall._invoke`, `StreamStreamCall._prepare_rpc`);
+    and it raises CancelledError where nobody cancelled the task, but the channel was closed.
+    """
+
+    def __enter__(self) -> Self:
+        task = asyncio.current_task()
+        assert task is not None  # only tasks await calls
+        self._task = task
+        self._before = task.cancelling()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._task.cancelling() > self._before:
+            if not isinstance(error, asyncio.CancelledError):
+                raise asyncio.CancelledError from error
+        elif isinstance(error, asyncio.CancelledError):
+            raise client_is_closed() from None
+        elif isinstance(error, grpc.RpcError):
+            raise error_of(error) from None
+
+
+class AsyncConnection(Connection):
+    """A connection of one event loop."""
+
+    _grpc: ClassVar[Any] = grpc.aio
+    _event = asyncio.Event
+
+    def __init__(self, address: str, **options: Any) -> None:
+        super().__init__(address, **options)
+        self._others: WeakSet[BlockingConnection] = WeakSet()  # shared with those of other tokens
+
+    def blocking(self) -> BlockingConnection:
+        """A connection like this one for threads, which ends with this one."""
+        other = self._blocking()
+        self._others.add(other)
+        return other
+
+    async def answer(self, call: Call[Result]) -> Result:
+        """Make a call, again if it may be repeated, and return its answer."""
+        attempts = self._attempts(call)
+        while True:
+            method = getattr(self.stub, call.method)
+            try:
+                with CallErrors():
+                    begun = self.begin(method, call.request, attempts.timeout())
+                    response = [part async for part in begun] if call.in_parts else await begun
+                return call.decode(response)
+            except DynhullError as error:
+                call, pause = attempts.after(call, error)
+            await self.pause(pause)
+
+    async def pause(self, seconds: float) -> None:
+        """Wait before a new attempt, while the connection is open."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self._closed.wait()
+
+    async def converse(
+        self, method: Any, requests: AsyncIterator[Any], hear: Callable[[Any], Awaitable[bool]]
+    ) -> DynhullError:
+        """Make a call with many requests and responses, until it ends.
+
+        Args:
+            method: the method of the stub.
+            requests: the requests.
+            hear: called with each response; returns whether the call goes on.
+
+        Returns:
+            What ended the call.
+        """
+        try:
+            with CallErrors():
+                call = self.begin(method, None, None)
+                sending = asyncio.create_task(_send(call, requests))
+                try:
+                    async for response in call:  # `read` leaves out responses that are there when a write has failed
+                        if not await hear(response):
+                            break
+                finally:
+                    call.cancel()
+                    await end(sending)  # a task of gRPC's own may wait for ever for a call that has ended
+        except DynhullError as error:
+            return error
+        return DynhullError("the server ended the call", grpc.StatusCode.OK, "", {})
+
+    async def close(self) -> None:
+        """End the connection and the calls on it."""
+        self._closed.set()
+        for each in list(self._others):
+            each.close()
+        await self._channel.close()
+
+
+async def end(task: asyncio.Task[Any]) -> None:
+    """Cancel a task and wait for its end; if this is cancelled, too, only the former."""
+    task.cancel()
+    await asyncio.wait([task])
+
+
+async def unless(ended: asyncio.Event, work: Coroutine[Any, Any, Result]) -> Result | None:
+    """The result of work; None if `ended` is set before, which cancels it."""
+    working, ending = asyncio.create_task(work), asyncio.create_task(ended.wait())
+    try:
+        await asyncio.wait([working, ending], return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        await end(ending)
+        await end(working)
+        failure = None if working.cancelled() else working.exception()  # noted, also where this is cancelled
+    if failure is not None:
+        raise failure
+    return None if working.cancelled() else working.result()
+
+
+async def _send(call: Any, requests: AsyncIterator[Any]) -> None:
+    """Send requests until the call ends, which its responses explain."""
+    with suppress(grpc.RpcError, asyncio.InvalidStateError):  # the latter where the call has ended already
+        async for request in requests:
+            await call.write(request)
+        await call.done_writing()
