@@ -319,7 +319,7 @@ class FenceIndex:
         Raises:
             ValueError: `source` is this index, or the keys of the hulls are of different types.
 
-        O(k) for k keys and the subjects that have left.
+        O(k) for k keys, the subjects that have left there and those that have come or moved here since the last `take`.
 
         >>> import dynhull
         >>> yard, road = dynhull.KeyedHull(), dynhull.KeyedHull()

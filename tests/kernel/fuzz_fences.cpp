@@ -444,13 +444,20 @@ class Transfers {
       std::vector<std::string> names;
       for (std::size_t row = 0; row < keys.size(); ++row) names.emplace_back(keys.bytes_of(row));
       Departures departures = source.hull.fences->departures(names), arrived;
+      std::vector<std::size_t> found;
+      std::vector<Arrival> arrivals;
       target.hull.entities.find(keys, [&](std::size_t row, std::uint32_t, std::uint32_t slot) {
         const auto departure = departures.find(names[row]);
         if (slot == NONE || departure == departures.end()) return;
-        if (!target.hull.fences->arrive(slot, departure->second)) return;
-        carried.insert(rows[row]);
-        arrived.insert(departures.extract(departure));
+        found.push_back(row);
+        arrivals.push_back({slot, &departure->second});
       });
+      const std::vector<bool> fresh = target.hull.fences->arrive(arrivals);
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        if (!fresh[i]) continue;
+        carried.insert(rows[found[i]]);
+        arrived.insert(departures.extract(names[found[i]]));
+      }
       source.hull.fences->give(arrived);
     });
     std::set<std::string> expected;

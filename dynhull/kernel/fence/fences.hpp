@@ -19,6 +19,11 @@ struct Departure {
   std::vector<std::int64_t> inside;
 };
 using Departures = std::unordered_map<std::string, Departure>;  // by key, as bytes
+// A subject that may be new, and where it comes from.
+struct Arrival {
+  std::uint32_t slot;
+  Departure* departure;
+};
 
 class Fences : public OwnHull {
  public:
@@ -106,26 +111,14 @@ class Fences : public OwnHull {
     return found;
   }
 
-  // Lets a subject that is new have come from there. Returns whether it is; the departure keeps the fences of this
-  // index.
-  bool arrive(std::uint32_t slot, Departure& departure) {
-    ready();
-    Change* const change = there(slot) ? change_of(slot) : nullptr;
-    if (change == nullptr || !change->fresh || change->carried) return false;
-    std::erase_if(departure.inside, [&](std::int64_t number) {
-      const auto entry = numbers_.find(number);
-      return entry == numbers_.end() || fences_[entry->second]->own;
-    });
-    for (const std::int64_t number : departure.inside) {
-      const std::uint32_t handle = numbers_.at(number);
-      if (members_.has(subjects_[slot].inside, handle)) continue;
-      members_.add(subjects_[slot].inside, handle);
-      ++fences_[handle]->count;
-    }
-    change->before = departure.before;
-    change->carried = true;
-    carries_ = true;
-    return true;
+  // Lets subjects that are new, each by its slot with where it comes from, have come from there. Their departures keep
+  // the fences of this index. Returns which of them are new, by row.
+  std::vector<bool> arrive(std::span<const Arrival> arrivals) {
+    ready();  // once for all: this looks at whatever has changed
+    std::vector<bool> arrived(arrivals.size());
+    for (std::size_t row = 0; row < arrivals.size(); ++row)
+      arrived[row] = arrive(arrivals[row].slot, *arrivals[row].departure);
+    return arrived;
   }
 
   // Forgets subjects that have gone over.
@@ -221,6 +214,25 @@ class Fences : public OwnHull {
 
  private:
   const Fence& fence(std::int64_t number) const { return *fences_[numbers_.at(number)]; }
+
+  bool arrive(std::uint32_t slot, Departure& departure) {
+    Change* const change = there(slot) ? change_of(slot) : nullptr;
+    if (change == nullptr || !change->fresh || change->carried) return false;
+    std::erase_if(departure.inside, [&](std::int64_t number) {
+      const auto entry = numbers_.find(number);
+      return entry == numbers_.end() || fences_[entry->second]->own;
+    });
+    for (const std::int64_t number : departure.inside) {
+      const std::uint32_t handle = numbers_.at(number);
+      if (members_.has(subjects_[slot].inside, handle)) continue;
+      members_.add(subjects_[slot].inside, handle);
+      ++fences_[handle]->count;
+    }
+    change->before = departure.before;
+    change->carried = true;
+    carries_ = true;
+    return true;
+  }
 
   // If memory does not suffice, what is left of a new fence goes when the zones are made anew.
 

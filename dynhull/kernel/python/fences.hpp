@@ -99,16 +99,23 @@ class FenceIndex {
     if (departures.empty()) return nb::cast(carried.array());
     Departures arrived;
     hull_->alone(names.size(), [&](Entities& entities, FramedTree&) {
+      std::vector<std::size_t> rows;
+      std::vector<Arrival> arrivals;
       given.with(hull_->strings(), [&](const auto& batch) {
         entities.find(batch, [&](std::size_t row, std::uint32_t, std::uint32_t slot) {
           const auto departure = departures.find(names[row]);
           if (slot == NONE || departure == departures.end()) return;
-          arrived.reserve(arrived.size() + 1);
-          if (!fences_->arrive(slot, departure->second)) return;
-          carried.data()[row] = true;
-          arrived.insert(departures.extract(departure));
+          rows.push_back(row);
+          arrivals.push_back({slot, &departure->second});
         });
       });
+      arrived.reserve(arrivals.size());
+      const std::vector<bool> fresh = fences_->arrive(arrivals);
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (!fresh[i]) continue;
+        carried.data()[rows[i]] = true;
+        arrived.insert(departures.extract(names[rows[i]]));
+      }
     });
     source.alone(names.size(), [&](Fences& fences) { fences.give(arrived); });
     return nb::cast(carried.array());

@@ -128,7 +128,7 @@ class FencedTrip(Trip):
         super()._write_together(request)
         hulls = [hull for part in request.parts if (hull := self._by_name[part.name].after) is not None]
         changed = {
-            hull.name: of_batch(hull, applied, self._journals[hull.name], self._expired.get(hull.name, ()))
+            hull.name: of_batch(hull, applied, self._journals[hull.name], self._expired.get(hull.name, frozenset()))
             for hull, applied in zip(hulls, request.result, strict=True)
             if not applied.duplicate
         }
@@ -190,7 +190,7 @@ class FencedTrip(Trip):
         """Make the events of a change of the keys of a hull, or of the areas of its fences with these revisions."""
         crossed = set()
         if crossings is not None and len(crossings):
-            if changed is not None and changed.expired:
+            if changed is not None and changed.expired and swap is not EXPIRY:  # which says it of all
                 crossings = with_expiries(crossings, changed.expired)
             apart = self._apart(crossings, origins)
             if apart is not None:

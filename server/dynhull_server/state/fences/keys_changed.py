@@ -1,6 +1,7 @@
 """What a batch or an expiry has done to the keys of a hull."""
 
 from collections.abc import Collection, Container, Iterable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -27,7 +28,7 @@ class KeysChanged:
     """
 
     rows: KeyRows | None = None
-    expired: Collection[Key] = ()
+    expired: AbstractSet[Key] = frozenset()
     fewer: bool = False
     _removed: set[Key] | None = field(default=None, init=False)
 
@@ -59,7 +60,7 @@ class KeysChanged:
         return [key for key, each in zip(key_list(keys), written.tolist(), strict=True) if each]
 
 
-def of_batch(hull: Hull, applied: Applied, journal: Sequence[Record], expired: Collection[Key] = ()) -> KeysChanged:
+def of_batch(hull: Hull, applied: Applied, journal: Sequence[Record], expired: AbstractSet[Key] = frozenset()) -> KeysChanged:
     """What an applied batch, the last one of the journal, has done to keys."""
     rows = journal[-1].rows
     fewer = hull.row.settings.window is not None and (applied.evicted or applied.expired)
@@ -70,13 +71,13 @@ def of_expiry(hull: Hull) -> KeysChanged:
     """What an expiry has done to keys."""
     contents = hull.state.contents
     ended = contents.ended if isinstance(contents, Keyed) else ()
-    return KeysChanged(None, ended, hull.row.settings.window is not None)
+    return KeysChanged(None, frozenset(ended), hull.row.settings.window is not None)
 
 
-def with_expiries(crossings: Crossings, expired: Collection[Key]) -> Crossings:
-    """The crossings; keys whose time had come were not removed by the batch that followed at once."""
+def with_expiries(crossings: Crossings, expired: AbstractSet[Key]) -> Crossings:
+    """The crossings; keys whose time had come were not removed by the batch that followed at once. O(crossings)."""
     gone = np.flatnonzero(crossings.causes & Cause.REMOVED)
-    ended = gone[[crossings.keys[row] in expired for row in gone.tolist()]] if len(gone) else gone
+    ended = gone[np.fromiter((key in expired for key in key_list(take_keys(crossings.keys, gone))), np.bool_, len(gone))]
     causes = crossings.causes.copy()
     causes[ended] ^= np.uint8(Cause.REMOVED | Cause.EXPIRED)
     return replace(crossings, causes=causes)
