@@ -1,4 +1,4 @@
-"""Writes to hulls without fences cost what they did before there were fences: not one instruction of Python more."""
+"""What fences cost: writes without any, not one instruction of Python more; keys that expire, each the same."""
 
 import sys
 from types import FrameType
@@ -11,8 +11,19 @@ from live_engine import LIMITS
 from dynhull import FenceIndex
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.contents import keyed as keyed_contents
 from dynhull_server.state.core import Core
-from dynhull_server.state.events import Birth, Commit, Committed, CreateHull, WriteBatch
+from dynhull_server.state.events import (
+    Birth,
+    Commit,
+    Committed,
+    Compute,
+    Computed,
+    CreateHull,
+    Event,
+    Tick,
+    WriteBatch,
+)
 from dynhull_server.state.fences.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.requests import CreateFence, DeleteFence
 from dynhull_server.state.fences.subjects import keyed
@@ -24,10 +35,17 @@ FAR, NEAR = (np.random.default_rng(seed).random((64, 2)) + 10 * seed for seed in
 
 def asked(core: Core, request: Any) -> None:
     """Carry out a request; every commit succeeds at once."""
-    for effect in core.step(request):
-        if isinstance(effect, Commit) and effect.ticket is not None:
-            core.step(Committed(effect.ticket))
+    carry_out(core, request)
     assert request.error is None
+
+
+def carry_out(core: Core, event: Event) -> None:
+    for effect in core.step(event):
+        if isinstance(effect, Compute):
+            effect.ticket.run()
+            carry_out(core, Computed(effect.ticket))
+        if isinstance(effect, Commit) and effect.ticket is not None:
+            carry_out(core, Committed(effect.ticket))
 
 
 def write(points: np.ndarray) -> WriteBatch:
@@ -84,3 +102,33 @@ def test_a_hull_without_fences_does_not_pay_for_those_of_others(*, immediate: bo
     assert instructions(core) == never
     assert not core.busy
     FenceIndex(keyed(core.get("fleet").state)).detach()  # refused while the kernel keeps a journal for another one
+
+
+class Counted(int):
+    """A key that counts how often it is compared."""
+
+    compared = 0
+
+    def __eq__(self, other: object) -> bool:
+        Counted.compared += 1
+        return int(self) == other
+
+    __hash__ = int.__hash__
+
+
+def test_keys_that_expire_in_a_fence_are_not_compared_with_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    core, keys = Core(LIMITS), np.arange(1000, dtype=np.uint64)
+    asked(core, CreateHull(None, "fleet", Birth("fleet", 1.0), HullSettings("int")))
+    config = FenceConfig(CircleArea(0.5, 0.5, 2.0), "hull", "fleet")
+    asked(core, CreateFence(None, "here", 1, config, Birth("here", 1.0)))
+    ends = np.full(len(keys), 10**6)
+    points = np.random.default_rng(0).random((len(keys), 2))
+    put = WriteBatch(64, lambda: KeyedBatch("int", keys, points, keys[:0], deadlines=ends))
+    put.to, put.name, put.rows = None, "fleet", 64
+    monkeypatch.setattr(keyed_contents, "key_list", lambda some: [Counted(key) for key in some.tolist()])
+    asked(core, put)
+    Counted.compared = 0
+    carry_out(core, Tick(1.0, 2 * 10**6))
+    assert len(core.get("fleet").state.hull) == 0
+    assert Counted.compared <= 2 * len(keys)
+    assert core.fence("here").last == 1 + 2 * len(keys)
