@@ -2,7 +2,7 @@
 
 All keys of a hull have one deadline, without a fence and with one that a fifth of them are inside of, while another
 process writes to a hull of its own, one write after the other, from before that moment. Columns: keys, seconds from the
-deadline until the hull is empty, processor time of the server from then until it is at rest again, and the writes of the
+deadline until the hull is empty, processor time of the server from then until it rests again, and the writes of the
 other from the deadline on: their latency, median and longest. The last row of each pair has the ratios.
 """
 
@@ -78,7 +78,7 @@ def expired(folder: Path, n: int, rate: float, *, fenced: bool) -> tuple[float, 
             other.stdout.readline()
             time.sleep(max(deadline - time.time(), 0))
             cpu = server_seconds(pid)
-            while stub.GetHull(pb.GetHullRequest(name=NAME)).info.point_count:
+            while stub.GetHull(pb.GetHullRequest(name=NAME)).hull.point_count:
                 time.sleep(0.01)
             took = time.time() - deadline
             times = sorted(map(float, other.communicate("")[0].split()))
