@@ -60,7 +60,9 @@ class KeysChanged:
         return [key for key, each in zip(key_list(keys), written.tolist(), strict=True) if each]
 
 
-def of_batch(hull: Hull, applied: Applied, journal: Sequence[Record], expired: AbstractSet[Key] = frozenset()) -> KeysChanged:
+def of_batch(
+    hull: Hull, applied: Applied, journal: Sequence[Record], expired: AbstractSet[Key] = frozenset()
+) -> KeysChanged:
     """What an applied batch, the last one of the journal, has done to keys."""
     rows = journal[-1].rows
     fewer = hull.row.settings.window is not None and (applied.evicted or applied.expired)
@@ -77,7 +79,9 @@ def of_expiry(hull: Hull) -> KeysChanged:
 def with_expiries(crossings: Crossings, expired: AbstractSet[Key]) -> Crossings:
     """The crossings; keys whose time had come were not removed by the batch that followed at once. O(crossings)."""
     gone = np.flatnonzero(crossings.causes & Cause.REMOVED)
-    ended = gone[np.fromiter((key in expired for key in key_list(take_keys(crossings.keys, gone))), np.bool_, len(gone))]
+    ended = gone[
+        np.fromiter((key in expired for key in key_list(take_keys(crossings.keys, gone))), np.bool_, len(gone))
+    ]
     causes = crossings.causes.copy()
     causes[ended] ^= np.uint8(Cause.REMOVED | Cause.EXPIRED)
     return replace(crossings, causes=causes)
