@@ -18,7 +18,8 @@ from dynhull_server.state.errors import words
 from dynhull_server.storage.port import StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors, storage_error
-from ..postgres.ownership import CHANNEL, LEASE, is_known_dead, this_process
+from ..postgres.ownership import CHANNEL, LEASE
+from ..postgres.processes import is_known_dead, this_process
 from ..postgres.schema import hold, partitions_of, prepare
 
 # Seconds between looks at the tables, and until a look that gets no answer is given up.

@@ -31,7 +31,7 @@ from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
 from ..journal import database_of
 from ..metrics import merged
-from ..postgres.ownership import is_known_dead
+from ..postgres.processes import is_known_dead
 from ..postgres.storage import PostgresStorage
 from ..worker import own_settings
 from .addresses import Addresses

@@ -11,15 +11,12 @@ run equally fast.
 """
 
 import logging
-import os
-import socket
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 from psycopg.errors import LockNotAvailable
 
@@ -27,6 +24,7 @@ from dynhull_server.state.errors import words
 from dynhull_server.storage.port import LockedError, StorageError, TakenOverError
 
 from .database import Connection, Database, as_storage_errors
+from .processes import is_known_dead, this_process, this_worker
 
 # Seconds of a lease, between renewals, and by which an owner ends its own lease earlier.
 LEASE, RENEWAL, MARGIN = 5.0, 1.0, 0.5
@@ -50,41 +48,6 @@ class _Owner:
     process: str
     until: str
     free: bool
-
-
-def this_worker() -> str:
-    """This process, for people."""
-    return f"process {os.getpid()} on {socket.gethostname()}"
-
-
-def this_process() -> str:
-    """This process, so that others on the same machine can tell whether it runs; empty where they cannot."""
-    try:
-        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
-        namespace = Path("/proc/self/ns/pid").readlink()
-        return f"{boot} {namespace} {os.getpid()} {_begun(os.getpid())}"
-    except OSError:
-        return ""
-
-
-def is_known_dead(process: str) -> bool:
-    """Whether a process has certainly ended: it was of this machine, and its number is free or that of another one."""
-    own = this_process().split()
-    other = process.split()
-    if not other or own[:2] != other[:2]:
-        return False
-    try:
-        return _begun(int(other[2])) != other[3]
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-
-
-def _begun(process: int) -> str:
-    """When a process began, in ticks since the start of the machine; "" of one that has ended and is not yet reaped."""
-    state, *fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return "" if state in "ZX" else fields[18]
 
 
 def _now() -> float:

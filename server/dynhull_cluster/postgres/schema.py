@@ -24,7 +24,7 @@ from dynhull_server.storage.rows.tables import (
 from dynhull_server.storage.rows.totals import COPIES, Totals
 
 from .database import SCHEMA, Connection, Database
-from .ownership import is_known_dead
+from .processes import is_known_dead
 
 # The first format in PostgreSQL, and the statements that lead from each format to the next one.
 FIRST_FORMAT = 8
