@@ -47,7 +47,10 @@ from dynhull_server.state.records import (
 )
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite import copies
+from dynhull_server.storage.sqlite.log import FRAME_HEADER_BYTES
+from dynhull_server.storage.sqlite.log import HEADER_BYTES as LOG_HEADER_BYTES
 
+NEXT_START = "the server that runs does not read its log again, but the next one would find"
 UNFINISHED = "is an unfinished copy: remove it, and copy again"
 
 
@@ -297,6 +300,57 @@ def test_check_beside_a_server(paths):
     append(storage, 6, 9)
     storage.close()
     assert served(data, 9).notes == []
+
+
+def test_check_beside_a_server_says_of_the_log_what_the_next_start_would(paths, tmp_path):
+    """A bit of each word of headers, and of pages, is another one for a moment: the server does not read them again."""
+    data, *_ = paths
+    with server_process("--data", str(data), "--log-level", "error", killed=True) as server:
+        with HullClient(server.address) as client:
+            client.create_hull("fleet")
+            for x in range(3):
+                client.apply("fleet", insert=[[x, 0]])
+        log = data / LOG
+        content = log.read_bytes()
+        page_bytes = int.from_bytes(content[8:12])
+        frames = range(LOG_HEADER_BYTES, len(content), FRAME_HEADER_BYTES + page_bytes)
+        ends = [start for start in frames if int.from_bytes(content[start + 4 : start + 8])]
+        places = [*range(0, LOG_HEADER_BYTES, 4)]
+        for start in {frames[0], *ends[-2:], frames[-1]}:
+            places += [*range(start, start + FRAME_HEADER_BYTES, 4), start + FRAME_HEADER_BYTES + page_bytes // 2]
+        words = {}
+        for place in places:
+            with log.open("r+b") as file:
+                file.seek(place)
+                file.write(bytes([content[place] ^ 16]))
+                file.flush()
+                crash = killed(data, tmp_path / str(place))
+                words[place] = verdict(lambda: copies.check(data, no_progress).notes), verdict(lambda: started(crash))
+                file.seek(place)
+                file.write(content[place : place + 1])
+        assert verdict(lambda: copies.check(data, no_progress).notes) == ""
+        server.process.kill()
+    for beside, start in words.values():
+        assert beside.replace(str(data), "") == (start and f"{NEXT_START}: {start}")
+    assert sum("restore" in start for _, start in words.values()) > len(places) / 3
+
+
+def verdict(examined):
+    """What is found wrong with a folder; empty for nothing."""
+    try:
+        return "; ".join(examined())
+    except StorageError as error:
+        return str(error)
+
+
+def started(folder):
+    """What a start on a folder complains about, without the path of the folder."""
+    try:
+        storage, contents = opened(folder)
+    except StorageError as error:
+        raise StorageError(str(error).replace(str(folder), "")) from error
+    storage.close()
+    return [note.replace(str(folder), "") for note in contents.notes]
 
 
 def test_check_says_what_is_damaged(paths):

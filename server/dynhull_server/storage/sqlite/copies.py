@@ -89,7 +89,7 @@ def check(path: Path, progress: Progress) -> Report:
     Raises:
         StorageError: the folder has no database, or cannot be read at all.
     """
-    with _opened(path) as opened:
+    with _opened(path, log_in_use=True) as opened:
         findings = examine(opened.connection, opened.version, opened.own, progress)
         report = _report(findings, opened.notes)
         if report.fatal:
@@ -314,12 +314,14 @@ def _claim(target: Path) -> bool:
 
 
 @contextmanager
-def _opened(path: Path, *, accept_loss: bool = False, unused: bool = False) -> Iterator[_Opened]:
+def _opened(
+    path: Path, *, accept_loss: bool = False, unused: bool = False, log_in_use: bool = False
+) -> Iterator[_Opened]:
+    """Open a folder. The log of one in use is examined with `log_in_use` only: a copy has what SQLite reads of it."""
     folder = Folder(path, Disk())
     with ExitStack() as stack:
         notes: list[str] = []
         own = None
-        # A log in use cannot be examined, and need not be: its server has examined it.
         if stack.enter_context(folder.alone()):
             try:
                 notes, own = folder.check_log()
@@ -329,6 +331,8 @@ def _opened(path: Path, *, accept_loss: bool = False, unused: bool = False) -> I
                 notes = [f"copied without what is lost: {error}"]
         elif unused:
             raise LockedError(f"a server uses {path}: stop it first")
+        elif log_in_use:
+            notes = folder.check_log_in_use()
         if not folder.disk.size(folder.database):
             raise StorageError(f"{path} is no data folder: it has no {DATABASE}")
         # Without a log, SQLite need not create files to read the database.

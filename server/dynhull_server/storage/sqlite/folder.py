@@ -10,6 +10,7 @@ from ..rows.tables import UnreadableError
 from ..rows.totals import Totals, totals_from
 from .disk import Access, Disk
 from .log import check_log
+from .log_index import read_index
 from .readers import SQLiteReader
 
 DATABASE = "dynhull.db"
@@ -18,7 +19,10 @@ LOCK = "dynhull.lock"
 UNFINISHED = "unfinished.db"
 UNFINISHED_WORDS = "is an unfinished copy: remove it, and copy again"
 
+NEXT_START = "the server that runs does not read its log again, but the next one would find"
 CACHE_KILOBYTES = 2000
+# How often a log in use is read until it has not begun anew in between.
+ATTEMPTS = 100
 
 
 class Folder:
@@ -31,6 +35,7 @@ class Folder:
     Attributes:
         database: the database file.
         log: the database's write-ahead log.
+        index: the index of the log, while a server uses it.
 
     Raises:
         StorageError: the path is that of a file.
@@ -43,6 +48,7 @@ class Folder:
         self.disk = disk
         self.database = path / DATABASE
         self.log = path / f"{DATABASE}-wal"
+        self.index = path / f"{DATABASE}-shm"
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -97,6 +103,30 @@ class Folder:
         own = self._own_totals()
         note = check_log(self.disk, self.log, own)
         return ([] if note is None else [note]), own
+
+    def check_log_in_use(self) -> list[str]:
+        """Examine the log as the next start would, while a server writes to it; what it writes now is left out.
+
+        Not for a process that has the database open.
+
+        Raises:
+            StorageError: the log begins anew faster than it can be read.
+            DamagedError: the next start would find that acknowledged batches are lost.
+        """
+        for _ in range(ATTEMPTS):
+            before = read_index(self.disk, self.index)
+            try:
+                note = check_log(self.disk, self.log, self._own_totals(), before and (before.last or None))
+                failure = None
+            except DamagedError as error:
+                note, failure = None, error
+            after = read_index(self.disk, self.index)
+            if before is None or after is None or not before.is_of_same_use(after):
+                continue
+            if failure is not None:
+                raise DamagedError(f"{NEXT_START}: {failure}")
+            return [] if note is None else [f"{NEXT_START}: {note}"]
+        raise StorageError(f"the log of {self.path} changes faster than it can be read: try again, or stop the server")
 
     def _own_totals(self) -> Totals | None:
         """The totals in the database file, without its log; None if they cannot be read."""

@@ -13,6 +13,7 @@ import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import IO
 
@@ -36,13 +37,14 @@ UNSYNCED = (MODES[Durability.INTERVAL], MODES[Durability.NONE])
 Words = npt.NDArray[np.uint32]
 
 
-def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
+def check_log(disk: Disk, path: Path, own: Totals | None, last: int | None = None) -> str | None:
     """A message about what was lost at the end of the log; None if nothing was, or if no log is needed.
 
     Args:
         disk: the disk it is on.
         path: the log.
         own: the totals in the database file, as of the last checkpoint.
+        last: the last frame to examine, where others may be written at this moment.
 
     Raises:
         DamagedError: the log is damaged, and acknowledged batches are lost.
@@ -64,7 +66,7 @@ def check_log(disk: Disk, path: Path, own: Totals | None) -> str | None:
             if own is not None and not in_use:
                 return None  # a new log, without acknowledged commits
             raise DamagedError(f"the header of {path} is damaged, so its commits cannot be read: {REMEDY}")
-        damage = _damage(_frames(file, page_bytes), (salts[0], salts[1]), state, order)
+        damage = _damage(islice(_frames(file, page_bytes), last), (salts[0], salts[1]), state, order)
     if damage is None:
         return None
     frame, commits, others_follow = damage
