@@ -29,7 +29,7 @@ from dynhull_server.storage.sqlite.folder import Folder
 from dynhull_server.storage.worker_folders import divide, worker_folder, write_manifest
 
 from .child_process import ChildProcess, StartFailedError
-from .machines.entrance import checked_certificate
+from .machines.entrance import checked_certificate, require_own_address
 from .metrics import registry_of
 from .sockets import socket_folder
 
@@ -59,6 +59,8 @@ async def _serve(settings: Settings) -> None:
         tokens = token_file(settings)
         tls_context(settings)
         checked_certificate(settings)
+        if settings.cluster:
+            require_own_address(settings)
         port = opened.enter_context(_reserved_port(settings.host, settings.port))
         workers, gateways = settings.workers or 1, settings.gateways or 1
         in_folder = not settings.in_memory and settings.journal is None

@@ -10,6 +10,7 @@ from .addresses import is_database
 from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"  # of environment variables
+EVERY_ADDRESS = "0.0.0.0", "::"  # what listens there does so on all addresses of the machine
 
 
 class Settings(BaseModel):
@@ -54,6 +55,11 @@ class Settings(BaseModel):
     )
     cluster_host: str = Field(
         "127.0.0.1", description="Address of this machine at which the other servers of the cluster reach its workers."
+    )
+    max_clock_difference: float = Field(
+        1.0,
+        gt=0,
+        description="Seconds by which the clock of this machine may differ from that of the database of the cluster.",
     )
     cluster_ca: Path | None = Field(
         None,
@@ -150,6 +156,8 @@ class Settings(BaseModel):
             raise ValueError("--cluster needs --journal: the servers share a database")
         if self.cluster_ca and not self.tls_cert:
             raise ValueError("--cluster-ca needs --tls-cert and --tls-key")
+        if self.cluster_host.strip("[]") in EVERY_ADDRESS:
+            raise ValueError(f"--cluster-host {self.cluster_host} is no address for others: give one of this machine")
         if self.cluster and not is_loopback(self.cluster_host) and self.cluster_ca is None and not self.insecure:
             raise ValueError(
                 f"--cluster-host {self.cluster_host} can be reached by other machines: give --cluster-ca, or "

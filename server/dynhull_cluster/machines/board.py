@@ -1,7 +1,7 @@
 """What the processes of a cluster know of each other: small tables that each of them reads, twice a second at least.
 
 Nothing here decides who owns a partition, which is for `postgres.ownership`. A worker that does not renew its row in
-`workers` gets no partitions, by the clock of PostgreSQL and nobody else's, and that is all that this clock is for.
+`workers` gets no partitions, by the clock of PostgreSQL and nobody else's. That of each worker is compared with it, in `joining`.
 """
 
 import asyncio
@@ -21,6 +21,7 @@ from ..postgres.database import Connection, Database, as_storage_errors, storage
 from ..postgres.ownership import CHANNEL, LEASE
 from ..postgres.processes import is_known_dead, this_process
 from ..postgres.schema import hold, partitions_of, prepare
+from .joining import PRESENT, RENEW, clock_difference
 
 # Seconds between looks at the tables, and until a look that gets no answer is given up.
 LOOK, PATIENCE = 0.5, 10.0
@@ -28,8 +29,6 @@ LOOK, PATIENCE = 0.5, 10.0
 GAP = 2.0
 # Seconds that a worker which ends takes to say so.
 LAST_SECONDS = 1.0
-# Seconds after which a worker that does not renew its row is one no longer.
-PRESENT = 5
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +37,7 @@ TABLES = (
     "ALTER TABLE cluster ADD COLUMN IF NOT EXISTS database text",
     "CREATE TABLE IF NOT EXISTS workers (worker text PRIMARY KEY, draining boolean, process text, seen timestamptz)",
     "ALTER TABLE workers ADD COLUMN IF NOT EXISTS process text NOT NULL DEFAULT ''",
+    "ALTER TABLE workers ADD COLUMN IF NOT EXISTS host text NOT NULL DEFAULT ''",
     "CREATE TABLE IF NOT EXISTS heirs (partition integer PRIMARY KEY, worker text, process text, epoch bigint)",
     "CREATE TABLE IF NOT EXISTS wishes (partition integer PRIMARY KEY, worker text NOT NULL)",
 )
@@ -52,11 +52,6 @@ WORKERS = (
 ).encode()
 WISHES = b"SELECT partition, worker FROM wishes"
 HEIRS = b"SELECT partition, worker, process, epoch FROM heirs"
-RENEW = (
-    b"INSERT INTO workers (worker, draining, process, seen) VALUES (%s, %s, %s, clock_timestamp()) "
-    b"ON CONFLICT (worker) DO UPDATE SET seen = clock_timestamp(), process = excluded.process, "
-    b"draining = excluded.draining OR (workers.draining AND workers.process = excluded.process)"
-)
 OFFER = (
     b"INSERT INTO heirs VALUES (%s, %s, %s, %s) ON CONFLICT (partition) "
     b"DO UPDATE SET worker = excluded.worker, process = excluded.process, epoch = excluded.epoch"
@@ -168,18 +163,24 @@ class Board:
         database: the database.
         changed: called with the tables after each look.
         worker: the worker whose row it renews; empty for a process that only reads.
+        host: where the worker listens for the others.
 
     Attributes:
         tables: the last tables.
         leaving: whether the worker gives up its partitions, and takes no others.
+        clock_difference: seconds by which the clock of a worker's machine is ahead of that of the database.
     """
 
-    def __init__(self, database: Database, changed: Callable[[Tables], None], worker: str = "") -> None:
+    def __init__(
+        self, database: Database, changed: Callable[[Tables], None], worker: str = "", host: str = ""
+    ) -> None:
         self.tables = Tables({}, {}, {}, {})
         self.leaving = False
+        self.clock_difference = 0.0
         self._database = database
         self._changed = changed
         self._worker = worker
+        self._host = host
         self._since: dict[int, tuple[str, float]] = {}
         self._renewed = 0.0, False
         self._looked = 0.0
@@ -272,7 +273,10 @@ class Board:
         now = time.monotonic()
         renewed, leaving = self._renewed
         if self._worker and (now >= renewed + LOOK or leaving != self.leaving):
-            await connection.execute(RENEW, [self._worker, self.leaving, this_process()])
+            before = time.time()
+            said = await connection.execute(RENEW, [self._worker, self.leaving, this_process(), self._host])
+            ((there,),) = await said.fetchall()
+            self.clock_difference = clock_difference(before, there, time.time())
             self._renewed = now, self.leaving
         async with connection.pipeline():
             cursors = [await connection.execute(sql) for sql in ALL]

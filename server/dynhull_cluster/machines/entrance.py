@@ -1,6 +1,7 @@
 """How gateways and the owners of other partitions reach the owner of a partition."""
 
 import hmac
+import ipaddress
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -37,6 +38,25 @@ def checked_certificate(settings: Settings) -> tuple[Path, Path] | None:
     assert settings.tls_key is not None
     require_accepted(settings.tls_cert, settings.tls_key, settings.cluster_ca, settings.cluster_host)
     return settings.tls_cert, settings.tls_key
+
+
+def require_own_address(settings: Settings) -> None:
+    """Refuse an address that this machine does not have. A name may get one later, and is tried with each partition.
+
+    Raises:
+        OSError: nothing can listen there.
+    """
+    host = settings.cluster_host
+    try:
+        ipaddress.ip_address(host.strip("[]"))
+    except ValueError:
+        return
+    _require_listening(host)
+
+
+def _require_listening(host: str) -> None:
+    if reason := why_not(host, 0):
+        raise OSError(f"cannot listen on --cluster-host {host}: {reason}")
 
 
 class PartitionEntrance:
@@ -78,8 +98,7 @@ class PartitionEntrance:
         """Listen on two free ports of the address for the cluster."""
         settings = self._settings
         host = settings.cluster_host
-        if reason := why_not(host, 0):
-            raise OSError(f"cannot listen on --cluster-host {host}: {reason}")
+        _require_listening(host)
         credentials, tls = None, None
         if (files := checked_certificate(settings)) is not None:
             credentials, tls = grpc_credentials(*files, None), server_context(*files, None)

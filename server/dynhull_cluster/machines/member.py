@@ -39,11 +39,13 @@ from .ahead import FAILURES, Ahead, Served
 from .board import Board, Cluster, Tables, join
 from .claims import shares
 from .entrance import PartitionEntrance
+from .joining import admit, require_right_clock
 
 # Seconds before a partition that could not be taken is tried again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
 # What may fail.
 READ_AHEAD, TAKE = "a partition cannot be read ahead", "a partition cannot be served"
+CLOCK = "clock of the machine"
 # Seconds that gateways get to receive what their calls have ended with, before another worker may have the partition.
 LAST_STATUSES = 0.03
 
@@ -66,7 +68,7 @@ class Member:
         self._settings = settings
         self._worker = worker
         self._database = database_of(settings)
-        self._board = Board(self._database, self._decide, worker)
+        self._board = Board(self._database, self._decide, worker, settings.cluster_host)
         self._supervisor = Supervisor(Clock(), lambda _: None, end_process)
         self._cluster = Cluster(0, "")
         self._addresses = Addresses("", None)
@@ -79,15 +81,19 @@ class Member:
         self._settled = asyncio.Event()
         self.address = settings.cluster_host
         self.registry = CollectorRegistry(auto_describe=False)
-        self.registry.register(_Collector(self._served))
+        self.registry.register(_Collector(self._served, self._board))
 
     async def start(self) -> None:
         """Join the cluster, and take what is free.
 
         Raises:
-            StorageError: the database cannot be used.
+            StorageError: the database cannot be used, or the machine may not join.
         """
-        self._cluster = await asyncio.to_thread(join, self._database, self._settings.partitions)
+        settings = self._settings
+        self._cluster = await asyncio.to_thread(join, self._database, settings.partitions)
+        await asyncio.to_thread(
+            admit, self._database, self._worker, settings.cluster_host, settings.max_clock_difference
+        )
         self._addresses = Addresses(self._cluster.secret, self._settings.cluster_ca)
         self._peers = Peers(self._addresses)
         self._supervisor.every(0.0, "board", self._board.run)
@@ -124,6 +130,7 @@ class Member:
     def _decide(self, tables: Tables) -> None:
         """Begin to take, to read ahead and to let go, after each look at the tables."""
         self._addresses.learn(tables)
+        self._watch_clock()
         count = self._cluster.partitions
         holders = self._board.holders(count)
         own = tables.workers.get(self._worker)
@@ -153,6 +160,18 @@ class Member:
                 self._begin(gone, self._let_go(gone, wanted[gone]))
         self._looked.set()
         self._settled.set()
+
+    def _watch_clock(self) -> None:
+        """Say it when the clock of this machine has become wrong, or right again; what it serves is not affected."""
+        try:
+            self._require_right_clock()
+        except StorageError as error:
+            self._supervisor.failed(CLOCK, error)
+        else:
+            self._supervisor.succeeded(CLOCK)
+
+    def _require_right_clock(self) -> None:
+        require_right_clock(self._board.clock_difference, self._settings.max_clock_difference)
 
     def _may_try(self, what: str, number: int) -> bool:
         """Whether there is no reason to wait before something that has failed is tried again."""
@@ -204,6 +223,8 @@ class Member:
         log.error(what, extra={"partition": number, "reason": words(error)})
 
     def _make(self, number: int) -> Served:
+        """A server for a partition. It goes on with the clock of this machine, which has to be right."""
+        self._require_right_clock()
         divisions = ServedDivisions(self._settings, number, self._cluster.partitions, self._peers)
         entrance = PartitionEntrance(self._settings, number, self._cluster.secret, peer_handler(divisions.receive))
         storage = PostgresStorage(
@@ -246,8 +267,9 @@ class Member:
 class _Collector(Collector):
     """The metrics of all partitions of a process."""
 
-    def __init__(self, served: dict[int, Server]) -> None:
+    def __init__(self, served: dict[int, Server], board: Board) -> None:
         self._served = served
+        self._board = board
 
     def describe(self) -> Iterator[Metric]:
         """Nothing: the names are those that the partitions have."""
@@ -257,4 +279,9 @@ class _Collector(Collector):
         """The metrics of each partition, and how many there are."""
         served = dict(self._served)
         yield GaugeMetricFamily("dynhull_partitions", "Partitions that the process serves.", value=len(served))
+        yield GaugeMetricFamily(
+            "dynhull_clock_difference_seconds",
+            "Seconds by which the clock of the machine is ahead of that of the database, at the least.",
+            value=self._board.clock_difference,
+        )
         yield from merged({str(number): list(each.registry.collect()) for number, each in served.items()}, "partition")

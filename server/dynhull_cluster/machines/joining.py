@@ -1,0 +1,115 @@
+"""Whether a machine may join a cluster: its clock is right, and the others reach it as it reaches them.
+
+The clock of the database is the one that machines have in common. It is compared because a partition that moves goes on
+with the clock of its new machine: one that is ahead would expire what the others keep.
+"""
+
+import socket
+import time
+from contextlib import closing
+
+from dynhull_server.settings import is_loopback
+from dynhull_server.storage.port import StorageError
+
+from ..postgres.database import Connection, Database, as_storage_errors
+from ..postgres.processes import shares_loopback, this_process
+from ..postgres.schema import hold
+
+# Seconds between looks whether a worker out of reach is there.
+LOOK = 0.25
+# Seconds after which a worker that does not renew its row is one no longer.
+PRESENT = 5
+
+RENEW = (
+    b"INSERT INTO workers (worker, draining, process, host, seen) VALUES (%s, %s, %s, %s, clock_timestamp()) "
+    b"ON CONFLICT (worker) DO UPDATE SET seen = clock_timestamp(), process = excluded.process, host = excluded.host, "
+    b"draining = excluded.draining OR (workers.draining AND workers.process = excluded.process) "
+    b"RETURNING extract(epoch FROM clock_timestamp())::float8"
+)
+OTHERS = (
+    f"SELECT worker, process, host, seen::text FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
+    "AND worker <> %s ORDER BY worker"
+).encode()
+
+
+def admit(database: Database, worker: str, host: str, limit: float) -> None:
+    """Put a worker into the tables of a cluster, if all workers that are present can reach each other.
+
+    Args:
+        database: the database, which is prepared.
+        worker: the worker.
+        host: where it listens for the others.
+        limit: how many seconds the clock of this machine may be off.
+
+    Raises:
+        StorageError: the clock is wrong, workers are out of reach, or the database cannot be used.
+    """
+    seen: dict[str, str] = {}
+    with as_storage_errors(), closing(database.connect("dynhull start")) as connection:
+        require_right_clock(_measured(connection), limit)
+        while apart := _admit(connection, database, worker, host):
+            for other, (where, when) in apart.items():
+                if seen.setdefault(other, when) != when:  # it has not died in between
+                    raise StorageError(_out_of_reach(other, where, host))
+            time.sleep(LOOK)
+
+
+def clock_difference(before: float, there: float, after: float) -> float:
+    """Seconds by which the clock of this machine is ahead of another one, at the least; negative if it is behind.
+
+    Args:
+        before: the time here, before the other clock was read.
+        there: the time there.
+        after: the time here, afterwards; however long that took, no difference is seen where there is none.
+    """
+    return max(before - there, 0.0) + min(after - there, 0.0)
+
+
+def require_right_clock(difference: float, limit: float) -> None:
+    """Raise StorageError if the clock of this machine is off by more than the limit."""
+    if abs(difference) > limit:
+        raise StorageError(
+            f"the clock of this machine is {abs(difference):.1f} s {'ahead of' if difference > 0 else 'behind'} that of "
+            f"the database, and its windows would be wrong by that: set it, or raise --max-clock-difference"
+        )
+
+
+def _measured(connection: Connection) -> float:
+    before = time.time()
+    ((there,),) = connection.execute("SELECT extract(epoch FROM clock_timestamp())::float8").fetchall()
+    return clock_difference(before, there, time.time())
+
+
+def _admit(connection: Connection, database: Database, worker: str, host: str) -> dict[str, tuple[str, str]]:
+    """Put the worker into the tables, unless some others are out of reach; their hosts, and when they were seen."""
+    with connection.transaction():
+        hold(connection, database)  # two that join at once see each other
+        apart = {
+            other: (where, when)
+            for other, process, where, when in connection.execute(OTHERS, [worker]).fetchall()
+            if not shares_loopback(process) and (_is_only_here(host) or (where and _is_only_here(where)))
+        }
+        if not apart:
+            connection.execute(RENEW, [worker, False, this_process(), host])
+    return apart
+
+
+def _is_only_here(host: str) -> bool:
+    """Whether only this machine can reach a host; also one whose name the machine resolves to its loopback address."""
+    try:
+        places = socket.getaddrinfo(host.strip("[]"), 0, type=socket.SOCK_STREAM)
+    except OSError:
+        return is_loopback(host)
+    return all(is_loopback(str(address[0])) for *_, address in places)
+
+
+def _out_of_reach(other: str, where: str, host: str) -> str:
+    if _is_only_here(host):
+        return (
+            f"worker {other} of this cluster is on another machine, which cannot reach --cluster-host {host}: "
+            "give the address of this machine"
+        )
+    return (
+        f"worker {other} of this cluster is on another machine and listens on {where}, which this one cannot reach: "
+        "start it again with the address of its machine as --cluster-host"
+    )
