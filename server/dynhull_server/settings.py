@@ -10,7 +10,7 @@ from .addresses import is_database
 from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"  # of environment variables
-EVERY_ADDRESS = "0.0.0.0", "::"  # what listens there does so on all addresses of the machine
+EVERY_ADDRESS = "0.0.0.0", "::"  # noqa: S104  (to refuse them)
 
 
 class Settings(BaseModel):

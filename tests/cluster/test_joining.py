@@ -71,7 +71,7 @@ def test_a_clock_that_becomes_wrong_is_said(postgres: PostgreSQL, tmp_path: Path
     follows = [*at("+0"), f"FAKETIME_TIMESTAMP_FILE={clock}", "FAKETIME_NO_CACHE=1"]
     follows.remove("FAKETIME=+0")
     options = ("--metrics-port", "0", *machine(url), "--log-level", "warning")
-    said = "the clock of this machine is "
+    said = "set it, or raise --max-clock-difference' work='clock of the machine'"
     with (
         server_process(*options, wrap=follows, complaints=said) as server,
         HullClient(server.address) as client,

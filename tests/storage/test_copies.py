@@ -325,22 +325,27 @@ def test_check_beside_a_server_says_of_the_log_what_the_next_start_would(paths, 
                 file.write(bytes([content[place] ^ 16]))
                 file.flush()
                 crash = killed(data, tmp_path / str(place))
-                words[place] = verdict(lambda: copies.check(data, no_progress).notes), verdict(lambda: started(crash))
+                words[place] = verdict(checked, data), verdict(started, crash)
                 file.seek(place)
                 file.write(content[place : place + 1])
-        assert verdict(lambda: copies.check(data, no_progress).notes) == ""
+        assert verdict(checked, data) == ""
         server.process.kill()
     for beside, start in words.values():
         assert beside.replace(str(data), "") == (start and f"{NEXT_START}: {start}")
     assert sum("restore" in start for _, start in words.values()) > len(places) / 3
 
 
-def verdict(examined):
+def verdict(examine, folder):
     """What is found wrong with a folder; empty for nothing."""
     try:
-        return "; ".join(examined())
+        return "; ".join(examine(folder))
     except StorageError as error:
         return str(error)
+
+
+def checked(folder):
+    """What a check complains about that is no reason against serving."""
+    return copies.check(folder, no_progress).notes
 
 
 def started(folder):

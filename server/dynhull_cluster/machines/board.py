@@ -1,7 +1,7 @@
 """What the processes of a cluster know of each other: small tables that each of them reads, twice a second at least.
 
 Nothing here decides who owns a partition, which is for `postgres.ownership`. A worker that does not renew its row in
-`workers` gets no partitions, by the clock of PostgreSQL and nobody else's. That of each worker is compared with it, in `joining`.
+`workers` gets no partitions, by the clock of PostgreSQL and nobody else's, with which `joining` compares that of each.
 """
 
 import asyncio
@@ -171,9 +171,7 @@ class Board:
         clock_difference: seconds by which the clock of a worker's machine is ahead of that of the database.
     """
 
-    def __init__(
-        self, database: Database, changed: Callable[[Tables], None], worker: str = "", host: str = ""
-    ) -> None:
+    def __init__(self, database: Database, changed: Callable[[Tables], None], worker: str = "", host: str = "") -> None:
         self.tables = Tables({}, {}, {}, {})
         self.leaving = False
         self.clock_difference = 0.0

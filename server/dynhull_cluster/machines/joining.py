@@ -68,9 +68,10 @@ def clock_difference(before: float, there: float, after: float) -> float:
 def require_right_clock(difference: float, limit: float) -> None:
     """Raise StorageError if the clock of this machine is off by more than the limit."""
     if abs(difference) > limit:
+        side = "ahead of" if difference > 0 else "behind"
         raise StorageError(
-            f"the clock of this machine is {abs(difference):.1f} s {'ahead of' if difference > 0 else 'behind'} that of "
-            f"the database, and its windows would be wrong by that: set it, or raise --max-clock-difference"
+            f"the clock of this machine is {abs(difference):.1f} s {side} that of the database, and its windows would "
+            "be wrong by that: set it, or raise --max-clock-difference"
         )
 
 

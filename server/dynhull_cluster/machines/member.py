@@ -25,7 +25,7 @@ from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
 from dynhull_server.settings import Settings
 from dynhull_server.state.errors import words
-from dynhull_server.storage.port import LockedError, TakenOverError
+from dynhull_server.storage.port import LockedError, StorageError, TakenOverError
 
 from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
