@@ -1,4 +1,5 @@
 """Runs the command that follows, with a storage that fails while a file of that name is in the folder given first.
+A fault that has come leaves a file: "commit failed".
 
 Patience is a second, and the log's bound a quarter of a megabyte.
 
@@ -22,6 +23,7 @@ FAULTS = Path(sys.argv[1] if __name__ == "__main__" else ".")
 
 def fails(name: str, error: BaseException) -> None:
     if (FAULTS / name).exists():
+        (FAULTS / f"{name} failed").touch()
         raise error
 
 
