@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import grpc
 import numpy as np
 import pytest
+from patience import PATIENCE, wait_until
 from proxy import proxy
 from server_process import server_process
 
@@ -63,7 +64,7 @@ def test_addresses_as_people_write_them(connect: type[HullClient], given: str, a
 def test_an_address_may_ask_for_encryption(address: str, connect: type[HullClient]) -> None:
     with connect(f"http://{address}") as client:
         list(client.list_hulls())
-    with connect(f"https://{address}", timeout=5) as client, pytest.raises(UnavailableError):
+    with connect(f"https://{address}", timeout=PATIENCE) as client, pytest.raises(UnavailableError):
         list(client.list_hulls())
 
 
