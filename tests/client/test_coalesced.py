@@ -182,13 +182,12 @@ def test_many_batches_of_one_point_over_a_killed_server(tmp_path, connect: type[
         client.create_hull("a")
         writer = client.writer("a", producer="p", batch_points=1, in_flight=500, patience=0)
         outcomes = []
-        killing = threading.Timer(0.05, first.process.kill)
-        killing.start()
         with pytest.raises(Exception):  # noqa: B017, PT011, PT012  # it ends wherever it is
-            for point in points:
-                outcomes.append(writer.put(insert=[point]))  # noqa: PERF401  # up to the error
+            for i, point in enumerate(points):
+                if i == len(points) // 2:
+                    first.process.kill()
+                outcomes.append(writer.put(insert=[point]))
             writer.close()
-        killing.join()
     acknowledged = sum(
         outcome.done() and not outcome.cancelled() and outcome.exception() is None for outcome in outcomes
     )

@@ -155,9 +155,10 @@ def test_following_a_hull_that_is_deleted_and_created_again(address: str, connec
     copy = HullCopy()
     with proxy(address) as way, connect(way.address) as watching, HullClient(address) as client:
         watch = watching.watch(name, copy=copy, follow=True)
-        creating = threading.Timer(0.1, client.create_hull, (name,))
+        creating = threading.Thread(target=lambda: (wait_until(lambda: watch.lost), client.create_hull(name)))
         creating.start()
         assert next(watch).revision == 0  # waited for the hull to come
+        creating.join()
         client.apply(name, insert=[[1, 2], [3, 4]])
         assert isinstance(next(watch), Change)
         first = copy.uid
@@ -221,7 +222,7 @@ def test_following_from_a_copy_of_an_earlier_hull(address: str, connect: type[Hu
 def test_closing_ends_the_wait_for_a_hull(address: str, connect: type[HullClient], name: str) -> None:
     with connect(address) as client:
         watch = client.watch(name, follow=True)
-        closing = threading.Timer(0.2, watch.close)
+        closing = threading.Thread(target=lambda: (wait_until(lambda: watch.lost), watch.close()))
         closing.start()
         assert list(watch) == []
 
@@ -232,7 +233,7 @@ def test_closing_ends_the_wait_for_a_server(connect: type[HullClient]) -> None:
         watch = client.watch("a")
         next(watch)
         server.process.kill()
-        closing = threading.Timer(0.2, watch.close)
+        closing = threading.Thread(target=lambda: (wait_until(lambda: watch.lost), watch.close()))
         closing.start()
         assert list(watch) == []
 

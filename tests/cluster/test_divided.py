@@ -18,6 +18,7 @@ import pytest
 from cases import with_all_cases
 from cluster import descendants, processes
 from command_line import dynhull
+from pacing import pause
 from patience import PATIENCE, wait_until
 from postgresql import query
 from server_process import Server, server_process
@@ -485,7 +486,7 @@ def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
 
             thread = threading.Thread(target=change)
             thread.start()
-            time.sleep(draw.uniform(0, 0.15))
+            pause(draw.uniform(0, 0.15))
             os.kill(processes(server.process.pid)[f"worker-{kill % 2}"], signal.SIGKILL)
             assert done.wait(PATIENCE)
             thread.join()
@@ -519,7 +520,7 @@ def test_a_server_that_is_killed_has_the_old_shards_or_the_new_ones(tmp_path: Pa
             assert client.verify("fleet").equal
             thread = threading.Thread(target=divide, args=(client, 3 + life))
             thread.start()
-            time.sleep(0.02 * life)
+            pause(0.02 * life)
             for each in [*descendants(server.process.pid), server.process.pid]:
                 os.kill(each, signal.SIGKILL)
             server.process.wait(PATIENCE)
@@ -595,7 +596,7 @@ def test_copies_beside_writes_are_of_one_revision(
 ) -> None:
     """On a machine so busy that some time passes between the moments of the parts."""
     read = copies.format_of
-    monkeypatch.setattr(copies, "format_of", lambda *given: (time.sleep(0.02), read(*given))[1])
+    monkeypatch.setattr(copies, "format_of", lambda *given: (pause(0.02), read(*given))[1])
     data, made = tmp_path / "data", [tmp_path / f"copy{i}" for i in range(5)]
     spans = []
     with (

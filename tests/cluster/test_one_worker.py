@@ -8,7 +8,7 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
-from patience import PATIENCE
+from patience import PATIENCE, until
 
 from dynhull_client import Batch, HullClient
 from dynhull_cluster.frames import MOST_BYTES, Frames, Kind, unpack_request
@@ -148,9 +148,8 @@ def test_what_a_worker_sent_before_it_ended_arrives(tmp_path: Path) -> None:
         await sent.wait()
         leaving.pop().close()
         await worker.stop(None)
+        await until(lambda: not link.present)
         async with asyncio.timeout(PATIENCE):
-            while link.present:
-                await asyncio.sleep(0.01)
             assert [await upstream.read(), await upstream.read()] == [b"answer"] * 2
             with pytest.raises(RelayedError) as lost:
                 await upstream.read()

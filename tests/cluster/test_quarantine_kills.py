@@ -11,6 +11,7 @@ import pytest
 from cases import with_all_cases
 from cluster import processes
 from command_line import dynhull
+from pacing import pause
 from postgresql import PostgreSQL
 from quarantine_rules import SECOND, Model
 from server_process import Server, server_process
@@ -93,6 +94,12 @@ class Fleet:
                 continue
 
 
+def kill(seconds: float, process: int) -> None:
+    """Kill a process after a while."""
+    pause(seconds)
+    os.kill(process, signal.SIGKILL)
+
+
 def live(server: Server, seed: int) -> list[Fleet]:
     """Batches to hulls of both workers, beside kills of workers and gateways."""
     fleets = [Fleet("north/a", seed), Fleet("fleet/a", seed + 1)]
@@ -103,8 +110,7 @@ def live(server: Server, seed: int) -> list[Fleet]:
         for number in range(BATCHES):
             if number % (BATCHES // KILLS) == BATCHES // KILLS // 2:
                 there = [process for name, process in sorted(processes(server.process.pid).items())]
-                kill = threading.Timer(chance.uniform(0, 0.01), os.kill, (chance.choice(there), signal.SIGKILL))
-                kill.start()
+                threading.Thread(target=kill, args=(chance.uniform(0, 0.01), chance.choice(there))).start()
             for each in fleets:
                 each.write(client)
             if number % 10 == 0:

@@ -10,7 +10,7 @@ import pytest
 from chromium import chromium
 from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
 from metrics import measured, scrape
-from patience import PATIENCE, wait_until
+from patience import PATIENCE, until, wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
 from proxy import proxy
 from server_process import Server, run, server_process
@@ -217,9 +217,7 @@ def test_a_fence_that_is_created_again_around_hulls_with_another_centre(client: 
             found = []
             try:
                 for center in ((179, -17), (-179, -17)):
-                    async with asyncio.timeout(PATIENCE):
-                        while feed.marks.center != center:
-                            await asyncio.sleep(0.05)
+                    await until(lambda center=center: feed.marks.center == center)
                     found.append(feed.area.message)
                     client.delete_fence(name)
                     client.delete_hull(name)

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import grpc
 import numpy as np
 import pytest
-from patience import PATIENCE
+from patience import until
 
 from dynhull_client import AsyncHullClient, Circle, Fence, FenceEvent, Polygon
 from dynhull_dashboard.advice import about_fences
@@ -140,10 +140,9 @@ def test_the_list_has_the_newest_events() -> None:
 
 def test_a_server_older_than_fences_is_named_as_such() -> None:
     async def advice(address: str) -> str:
-        async with AsyncHullClient(address) as client, asyncio.timeout(PATIENCE):
+        async with AsyncHullClient(address) as client:
             fences = FenceList(client, "")
-            while fences.error is None:
-                await asyncio.sleep(0.01)
+            await until(lambda: fences.error is not None)
             await fences.close()
             return about_fences(address, fences, shown=False)
 

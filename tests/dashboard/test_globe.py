@@ -2,12 +2,11 @@
 
 import asyncio
 import json
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 import shapely
-from patience import PATIENCE
+from patience import until
 from pyproj import Geod
 
 from dynhull import GeoHull
@@ -21,12 +20,6 @@ from dynhull_dashboard.looks import Look
 from dynhull_dashboard.search import State
 
 LOOK = Look("#000000", (), "circle")
-
-
-async def until(ready: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE):
-        while not ready():
-            await asyncio.sleep(0.01)
 
 
 @pytest.fixture

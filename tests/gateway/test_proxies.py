@@ -82,7 +82,7 @@ def test_behind_a_proxy(behind: Gateway, tmp_path: Path, name: str, proxy) -> No
         events = Events(proxied, f"{path}/events?form=vertices", Host=NAMED)
         kind, hull_now = events.next()
         assert (kind, hull_now["points"]) == ("snapshot", 20_000)
-        sender = threading.Timer(0, lambda: proxied.post(f"{path}/points", [[-1, 0]], Host=NAMED))
+        sender = threading.Thread(target=lambda: proxied.post(f"{path}/points", [[-1, 0]], Host=NAMED))
         sender.start()
         assert events.next()[1]["points"] == 20_001  # at once, not when a buffer of the proxy is full
         sender.join()

@@ -149,6 +149,13 @@ def readable(client: HullClient) -> bool:
     return True
 
 
+def end(faults: Path) -> None:
+    """End the faults of commits, once they have come."""
+    wait_until((faults / "settle failed").exists)
+    for name in ("commit", "settle"):
+        (faults / name).unlink()
+
+
 @pytest.mark.one_process("faults are put into the process that is started")
 def test_a_writer_finds_out_and_goes_on(tmp_path: Path) -> None:
     points = np.random.default_rng(5).normal(size=(30, 4, 2))
@@ -162,7 +169,7 @@ def test_a_writer_finds_out_and_goes_on(tmp_path: Path) -> None:
                 if i == 10:
                     (faults / "settle").touch()
                     (faults / "commit").touch()
-                    threading.Timer(0.5, lambda: [(faults / name).unlink() for name in ("commit", "settle")]).start()
+                    threading.Thread(target=end, args=(faults,)).start()
                 writer.put(insert=each)
         assert client.last_sequence("a", "p") == client.get_hull("a").info.revision
         assert set(client.count("a", points.reshape(-1, 2)).counts.tolist()) == {1}

@@ -1,12 +1,13 @@
 """Keys that one batch moves between hulls of a prefix are subjects that move."""
 
-import time
 from itertools import count
 
 import grpc
 import pytest
 from fence_calls import create, events, polygon, put, puts
 from patience import wait_until
+from server_process import server_process
+from set_time import SetTime
 
 from dynhull_proto.v1 import batch_pb2, fence_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -15,6 +16,18 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 SQUARE = (0, 0, 4, 0, 4, 4, 0, 4)
 NUMBERS = count()
+HOUR, SECOND = 3600, 1_000_000
+
+
+@pytest.fixture(scope="module")
+def clock(tmp_path_factory):
+    return SetTime(tmp_path_factory.mktemp("transfers"))
+
+
+@pytest.fixture(scope="module")
+def address(clock):
+    with server_process(wrap=clock.wrap) as server:
+        yield server.address
 
 
 @pytest.fixture
@@ -169,16 +182,18 @@ def test_reports_that_confirm_go_over(stub, fences, at):
     assert confirmed.first_time.ToMicroseconds() < confirmed.time.ToMicroseconds()
 
 
-def test_time_that_confirms_goes_over(stub, fences, at):
+def test_time_that_confirms_goes_over(stub, fences, at, clock):
     """Who waits in one hull waits on in the other, and since the same time."""
     fence = at + "gate"
     put(stub, at + "yard", van=(9, 1), bus=(1, 1))
-    config = {"polygon_area": polygon(SQUARE), "subject_prefix": at, "min_dwell": {"seconds": 1}}
+    config = {"polygon_area": polygon(SQUARE), "subject_prefix": at, "min_dwell": {"seconds": HOUR}}
     create(fences, fence, initial="FENCE_INITIAL_NONE", **config)
-    begun = time.time_ns()
+    begun = clock.now() - SECOND
     put(stub, at + "yard", van=(1, 1), bus=(9, 1))
-    ended = time.time_ns()
+    ended = clock.now() + SECOND
+    clock.passes(HOUR / 2)
     transfer(stub, at, "yard", "road", van=(2, 1), bus=(9, 2))
+    clock.passes(HOUR / 2)
     wait_until(lambda: len(events(fences, fence)) == 3)
     assert [line[:4] for line in lines(fences, fence, at)] == [
         ("transfer", "yard", "road", "bus"),
@@ -186,8 +201,8 @@ def test_time_that_confirms_goes_over(stub, fences, at):
         ("enter", "", "road", "van"),
     ]
     for event in events(fences, fence)[1:]:
-        assert begun // 1000 <= event.first_time.ToMicroseconds() <= ended // 1000
-        assert event.time.ToMicroseconds() - event.first_time.ToMicroseconds() >= 10**6
+        assert begun <= event.first_time.ToMicroseconds() <= ended
+        assert event.time.ToMicroseconds() - event.first_time.ToMicroseconds() >= HOUR * SECOND
 
 
 def test_a_batch_that_is_refused_moves_nobody(stub, fences, at):

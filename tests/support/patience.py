@@ -1,5 +1,6 @@
 """Waiting for a condition, with a time limit."""
 
+import asyncio
 import time
 from collections.abc import Callable
 
@@ -14,3 +15,10 @@ def wait_until(condition: Callable[[], object]) -> None:
         assert time.monotonic() < end, f"not within {PATIENCE} s"
         time.sleep(pause)
         pause = min(1.5 * pause, LONGEST_PAUSE)
+
+
+async def until(condition: Callable[[], object]) -> None:
+    """The same for a task."""
+    async with asyncio.timeout(PATIENCE):
+        while not condition():
+            await asyncio.sleep(0.01)

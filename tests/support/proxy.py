@@ -9,7 +9,8 @@ from contextlib import contextmanager, suppress
 class Proxy:
     """Forwards connections on `address` to a server, which may change; `cut` severs all of them at once.
 
-    While `flowing` is not set, it takes data and passes none on.
+    While `flowing` is not set, it takes data and passes none on. The next connections are ended at once, `refusals` of
+    them.
 
     Args:
         server: host and port, or the path of a Unix socket; "" to end new connections at once.
@@ -17,6 +18,7 @@ class Proxy:
 
     def __init__(self, server: str) -> None:
         self.server = server
+        self.refusals = 0
         self.flowing = threading.Event()
         self.flowing.set()
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -49,6 +51,10 @@ class Proxy:
         with suppress(OSError):
             while True:
                 client, _ = self._listener.accept()
+                if self.refusals:
+                    self.refusals -= 1
+                    client.close()
+                    continue
                 self._start(self._connect, client)
 
     def _connect(self, client: socket.socket) -> None:

@@ -3,6 +3,7 @@
 import threading
 import time
 
+from pacing import pause
 from patience import PATIENCE, wait_until
 
 from dynhull_client import HullClient
@@ -50,7 +51,7 @@ class SteadyWriter(threading.Thread):
                     )
                     self.waits.append(time.monotonic() - begun)
                     self.revisions.append(done.revision)
-                    time.sleep(BREATH)
+                    pause(BREATH)
         except BaseException as error:
             self._error = error
 

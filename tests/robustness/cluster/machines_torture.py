@@ -15,17 +15,18 @@ network to it those of postgres_torture.py. The other faults:
 import os
 import signal
 import sys
-import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
+
 sys.path.append(str(Path(__file__).parent))
 import postgres_torture
 import torture
 from cluster import processes
+from pacing import pause
 from patience import PATIENCE, wait_until
 from postgresql import query
 from promises import require
@@ -82,7 +83,7 @@ class Torture(postgres_torture.Torture):
         os.kill(worker, signal.SIGSTOP)
         try:
             wait_until(lambda: len({each for (each,) in query(self._url, SERVED)}) == 1)
-            time.sleep(self._random.uniform(0.1, 1.0))
+            pause(self._random.uniform(0.1, 1.0))
         finally:
             os.kill(worker, signal.SIGCONT)
         wait_until(lambda: worker not in self._workers())
@@ -101,7 +102,7 @@ class Torture(postgres_torture.Torture):
         if self._random.random() < 0.5:
             self._turn()
         self._other.kill()
-        time.sleep(self._random.uniform(0.0, 6.0))
+        pause(self._random.uniform(0.0, 6.0))
         self._other.start()
 
     def _stop_machine(self) -> None:
@@ -113,7 +114,7 @@ class Torture(postgres_torture.Torture):
     def _move(self) -> None:
         """Every partition to one worker, and then anywhere."""
         self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
-        time.sleep(self._random.uniform(0.2, 2.0))
+        pause(self._random.uniform(0.2, 2.0))
         self._order("anywhere")
 
     def _order(self, worker: str) -> None:
@@ -125,7 +126,7 @@ class Torture(postgres_torture.Torture):
         """One of the two workers of a move is killed, at any moment."""
         self._balanced()
         self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
-        time.sleep(self._random.uniform(0.0, 0.6))
+        pause(self._random.uniform(0.0, 0.6))
         with suppress(ProcessLookupError):
             os.kill(self._one_of("worker"), signal.SIGKILL)
         self._order("anywhere")
@@ -134,7 +135,7 @@ class Torture(postgres_torture.Torture):
         """PostgreSQL is killed, at any moment of a move."""
         self._balanced()
         self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
-        time.sleep(self._random.uniform(0.0, 0.6))
+        pause(self._random.uniform(0.0, 0.6))
         self._crash()
         self._order("anywhere")
 
@@ -142,11 +143,11 @@ class Torture(postgres_torture.Torture):
         """One of the two is stopped for a while, at any moment, and goes on before it is replaced, or after."""
         self._balanced()
         self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
-        time.sleep(self._random.uniform(0.0, 0.6))
+        pause(self._random.uniform(0.0, 0.6))
         worker = self._one_of("worker")
         with suppress(ProcessLookupError):
             os.kill(worker, signal.SIGSTOP)
-            time.sleep(self._random.uniform(0.1, 6.0))
+            pause(self._random.uniform(0.1, 6.0))
             os.kill(worker, signal.SIGCONT)
         self._order("anywhere")
 

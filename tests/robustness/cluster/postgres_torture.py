@@ -13,7 +13,6 @@ The clients and the models are those of tests/robustness/server/torture.py, and 
 import os
 import signal
 import sys
-import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -24,6 +23,7 @@ sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 import torture
 from cluster import descendants
+from pacing import pause
 from patience import PATIENCE, wait_until
 from postgresql import FAST, PostgreSQL, query
 from promises import require
@@ -75,7 +75,7 @@ class Torture(torture.Torture):
         self.server.process.send_signal(signal.SIGSTOP)
         try:
             before = self._take_over()
-            time.sleep(self._random.uniform(0.1, 1.0))
+            pause(self._random.uniform(0.1, 1.0))
         finally:
             before.process.send_signal(signal.SIGCONT)
         require(before.process.wait(PATIENCE) == ENDED, f"a server that was replaced: {before.said()}")
@@ -101,7 +101,7 @@ class Torture(torture.Torture):
         for each in stopped:
             with suppress(ProcessLookupError):
                 os.kill(each, signal.SIGSTOP)
-        time.sleep(self._random.uniform(0.2, 6.0))
+        pause(self._random.uniform(0.2, 6.0))
         for each in stopped:
             with suppress(ProcessLookupError):
                 os.kill(each, signal.SIGCONT)
@@ -110,13 +110,13 @@ class Torture(torture.Torture):
         """The connections to PostgreSQL are lost, and for a while there are no others."""
         self._wire.server = ""
         self._wire.cut()
-        time.sleep(self._random.uniform(0, 6.0))
+        pause(self._random.uniform(0, 6.0))
         self._wire.server = self._socket()
 
     def _hold(self) -> None:
         """Nothing arrives, in either direction; then it does, or the connections are lost."""
         self._wire.flowing.clear()
-        time.sleep(self._random.uniform(0.2, 6.0))
+        pause(self._random.uniform(0.2, 6.0))
         if self._random.random() < 0.5:
             self._wire.cut()
         self._wire.flowing.set()
@@ -127,7 +127,7 @@ class Torture(torture.Torture):
         with suppress(OSError), ballast.open("wb") as file:
             while True:
                 file.write(bytes(2**16))
-        time.sleep(self._random.uniform(0.5, 3.0))
+        pause(self._random.uniform(0.5, 3.0))
         ballast.unlink()
         if not self._database.runs():
             self._database.start()

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import grpc
+from pacing import pause
 
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[2] / "support")]
 from mortal_server import MortalServer
@@ -81,7 +82,7 @@ class LiveWatch:
                 name = rng.choice(names)
                 with suppress(grpc.RpcError):  # a kill, or a fence that is deleted meanwhile
                     self._watch(name)
-            time.sleep(0.05)
+            pause(0.05)
 
     def _watch(self, name: str) -> None:
         request = fs.WatchFenceRequest(name=self._world.prefix + name, only_new=True)
@@ -217,7 +218,7 @@ class WorldClient:
                     return None
                 must(error.code() in LOST, request, "is refused:", error)
                 self.counts["asked again"] += 1
-                time.sleep(0.02)
+                pause(0.02)
 
     def wait(self) -> None:
         """Wait until the server is up."""
@@ -414,7 +415,7 @@ class WorldClient:
         end = time.monotonic() + SECONDS
         while any(reader.waiting() for reader in self.readers.values()):
             must(time.monotonic() < end, "no stays of", [reader.waiting() for reader in self.readers.values()])
-            time.sleep(0.1)
+            pause(0.1)
             self.compare()
         self._channel.close()
 
@@ -436,7 +437,7 @@ def run(steps: int, kills: int, worlds: int, seed: int, folder: Path) -> Counter
         while counts["steps"] < steps or counts["kills"] < kills:
             least = min(counts["steps"] + steps // max(kills, 1), steps) if counts["kills"] < kills else steps
             _until(clients, least)
-            time.sleep(rng.uniform(0, 0.02))
+            pause(rng.uniform(0, 0.02))
             if counts["kills"] < kills:
                 server.kill()
                 counts["kills"] += 1
@@ -463,7 +464,7 @@ def run(steps: int, kills: int, worlds: int, seed: int, folder: Path) -> Counter
 def _until(clients: list[WorldClient], steps: int) -> None:
     while sum(client.counts["steps"] for client in clients) < steps:
         _look(clients)
-        time.sleep(0.005)
+        pause(0.005)
 
 
 def _look(clients: list[WorldClient]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import grpc
 import numpy as np
+from pacing import pause
 from patience import PATIENCE
 from promises import require
 
@@ -66,7 +67,7 @@ class Actor(threading.Thread):
                     if error.code() not in PASSING:
                         self.shared.failures.append(error)
                         return
-                    time.sleep(0.05)
+                    pause(0.05)
                 except BaseException as error:
                     self.shared.failures.append(error)
                     return
@@ -84,7 +85,7 @@ def persist(method: Callable[..., Any], request: Any) -> Any:
         except grpc.RpcError as error:
             if error.code() not in PASSING or time.monotonic() > deadline:
                 raise
-            time.sleep(0.05)
+            pause(0.05)
 
 
 class Writer(Actor):
@@ -195,7 +196,7 @@ class PointWriter(Streamer):
         self._own: list[tuple[float, float]] = []
 
     def create_batch(self) -> tuple[np.ndarray, np.ndarray]:
-        time.sleep(self.shared.breath)
+        pause(self.shared.breath)
         rng = self._random
         inserts = rng.normal(size=(rng.integers(1, 30), 2)).round(rng.integers(0, 4)) + 0.0
         deletes = []
@@ -226,7 +227,7 @@ class Reader(Actor):
             require(revision >= self.seen, f"{self.name}: revision {revision} after {self.seen}")
             self.seen = revision
             self.reads += 1
-            time.sleep(2 * self.shared.breath)
+            pause(2 * self.shared.breath)
 
     def read(self, stub: HullServiceStub) -> int:
         return stub.GetHull(pb.GetHullRequest(name=self._hull), timeout=10).hull.revision
@@ -330,12 +331,12 @@ class Leaver(Actor):
     def act(self, stub: HullServiceStub) -> None:
         while not self.shared.over.is_set():
             hull = self._random.choice((*self.NAMES, self._hull))
-            time.sleep(4 * self.shared.breath)
+            pause(4 * self.shared.breath)
             call = self._begin(stub, hull)
             threading.Event().wait(self._random.random() ** 3 * 0.02)
             self.left += call.cancel()
             if (code := call.code()) in PASSING - {grpc.StatusCode.CANCELLED}:
-                time.sleep(0.02 if code else 0)
+                pause(0.02 if code else 0)
 
     def _begin(self, stub: HullServiceStub, hull: str) -> grpc.Future:
         if hull == self._hull:

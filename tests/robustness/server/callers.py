@@ -28,6 +28,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 from forked import COMMAND, Process
+from pacing import pause_async
 from patience import PATIENCE
 from promises import BrokenPromiseError, require
 
@@ -139,7 +140,7 @@ class Callers:
                     raise error
                 if life < kills:
                     burst = [asyncio.create_task(self._call_until(stub, end + 2 * CALLERS)) for _ in range(CALLERS)]
-                    await asyncio.sleep(self._random.uniform(0, 0.03))
+                    await pause_async(self._random.uniform(0, 0.03))
                     self._server.kill()
                     await asyncio.gather(*burst, return_exceptions=True)
                 else:

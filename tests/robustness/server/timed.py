@@ -6,6 +6,7 @@ from itertools import chain
 
 import numpy as np
 from actors import Seen, Shared, Streamer, Watcher, Writer, persist
+from pacing import pause
 from patience import PATIENCE
 from promises import require
 from timeline import FLEETS, SECOND, Change, Contents, Entity, Key, Kind, Timeline, draw, encode, outline
@@ -45,7 +46,7 @@ class TimedWriter(Streamer):
         self._revisions = [(0, 0)]  # since the last rest: revision and number of acknowledged batches
 
     def create_batch(self) -> tuple[Change]:
-        time.sleep(self.shared.breath)
+        pause(self.shared.breath)
         self._now = wall() if self.kind.follows_server else self._now + int(self._random.integers(SECOND // 50))
         change = draw(self._random, self._sent, self._now)
         self._sent.apply(change)
@@ -127,7 +128,7 @@ class Shuttle(Writer):
             require(same, f"{self.name}: batch {self.acknowledged} is in one hull only: {one}, {other}")
 
     def create_batch(self) -> tuple[Change, ...]:
-        time.sleep(self.shared.breath)
+        pause(self.shared.breath)
         rng = self._random
         changes = Change(), Change()
         for i in rng.permutation(len(self._keys))[: rng.integers(2, 8)]:
@@ -164,7 +165,7 @@ class ModelledHull:
             if timeless or contents.at(clock) == contents.at(max(clock, now)):
                 break
             require(time.monotonic() < deadline, f"{self.kind.name}: points due by {now} are there at {clock}")
-            time.sleep(0.02)
+            pause(0.02)
         self.watcher.wait_for(revision)
         for seen in self.watcher.seen():
             if seen.revision == revision:

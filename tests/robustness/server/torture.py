@@ -58,6 +58,7 @@ from actors import (
 )
 from cluster import processes
 from forked import COMMAND, Process
+from pacing import pause
 from patience import PATIENCE
 from promises import require
 from proxy import Proxy
@@ -164,10 +165,10 @@ class Torture:
     def round(self, fault: str) -> None:
         """Traffic, a fault during it, the checks that must hold at once, and those that must hold at rest."""
         self.faults[fault] += 1
-        time.sleep(self._random.uniform(0.05, 0.6))
+        pause(self._random.uniform(0.05, 0.6))
         getattr(self, f"_{fault}")()
         self.shared.gate.set()
-        time.sleep(self._random.uniform(0.05, 0.3))
+        pause(self._random.uniform(0.05, 0.3))
         self._settle()
         self._check()
         self.shared.gate.set()
@@ -197,7 +198,7 @@ class Torture:
 
     def _pause(self) -> None:
         self.server.process.send_signal(signal.SIGSTOP)
-        time.sleep(self._random.uniform(0.1, 1.0))
+        pause(self._random.uniform(0.1, 1.0))
         self.server.process.send_signal(signal.SIGCONT)
 
     def _kill_worker(self) -> None:
@@ -215,7 +216,7 @@ class Torture:
         worker = self._one_of("worker")
         with suppress(ProcessLookupError):  # as above
             os.kill(worker, signal.SIGSTOP)
-            time.sleep(self._random.uniform(0.1, 1.0))
+            pause(self._random.uniform(0.1, 1.0))
             os.kill(worker, signal.SIGCONT)
 
     def _restart(self) -> None:
@@ -234,7 +235,7 @@ class Torture:
         with suppress(OSError), ballast.open("wb") as file:
             while True:
                 file.write(bytes(2**16))
-        time.sleep(self._random.uniform(0.2, 0.8))
+        pause(self._random.uniform(0.2, 0.8))
         if self._random.random() < 0.5:
             self.server.kill()
             ballast.unlink()
@@ -248,9 +249,9 @@ class Torture:
         before = resource.prlimit(pid, resource.RLIMIT_NOFILE)
         used = max(int(each.name) for each in Path(f"/proc/{pid}/fd").iterdir())
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (used, before[1]))
-        time.sleep(self._random.uniform(0.2, 1.5))
+        pause(self._random.uniform(0.2, 1.5))
         self._proxy.cut()
-        time.sleep(self._random.uniform(0.2, 0.8))
+        pause(self._random.uniform(0.2, 0.8))
         resource.prlimit(pid, resource.RLIMIT_NOFILE, before)
 
     def _copy(self) -> None:
