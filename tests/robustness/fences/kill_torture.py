@@ -24,10 +24,10 @@ from pathlib import Path
 from typing import Any
 
 import grpc
-from pacing import pause
 
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[2] / "support")]
 from mortal_server import MortalServer
+from pacing import pause
 from told import Expectation, Reader, ToldWorld, must
 from world import FENCES, GUEST, HULLS, KEYED, TICK, ZONE, Chance
 
