@@ -1,4 +1,5 @@
 import gc
+import os
 import re
 from collections import Counter
 from collections.abc import Generator, Iterator
@@ -95,10 +96,17 @@ def shuffled(items: list[pytest.Item], seed: int) -> list[pytest.Item]:
     return [*chain.from_iterable(modules)]
 
 
+def takes_too_long(item: pytest.Item) -> bool:
+    return any(os.environ.get(marker.args[0]) != "all" for marker in item.iter_markers("only_with"))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the long tests: at the end, all workers should have something to do."""
     if (seed := config.getoption("--order-seed")) is not None:
         items[:] = shuffled(items, seed)
+    if left_out := [each for each in items if takes_too_long(each)]:
+        config.hook.pytest_deselected(items=left_out)  # not skipped: they have a word of their own
+        items[:] = [each for each in items if not takes_too_long(each)]
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if servers.shape != "process":
         for each in items:

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # What the tests talk to and pip cannot install: a real Prometheus and browser, systemd's checks, a clock that can be
-# set back, message brokers, a database, readers of maps, reverse proxies, and a gRPC client in another language. Installs what it can: Debian's packages as root, npm's packages wherever there is npm. The tests
-# that need what is missing are skipped, and say so.
+# set back, message brokers, a database, readers of maps, reverse proxies, and gRPC clients in other languages. Installs
+# what it can: Debian's packages as root, npm's packages wherever there is npm, grpcurl where there is Go. The tests that
+# need what is missing are skipped, and say so.
 set -uo pipefail
 cd "$(dirname "$0")"
 
@@ -28,6 +29,10 @@ if [ ${#packages[@]} -gt 0 ]; then
     else
         skipped "root on Debian could install ${packages[*]}"
     fi
+fi
+if command -v go >/dev/null && ! command -v grpcurl >/dev/null; then
+    GOBIN="$PWD/../.venv/bin" go install github.com/fullstorydev/grpcurl/cmd/grpcurl@v1.9.3 \
+        || skipped "could not build grpcurl"
 fi
 if command -v npm >/dev/null; then
     npm ci --prefix javascript --no-audit --no-fund --ignore-scripts --loglevel=error \

@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from peers import missing
 from server_process import PATIENCE
 
 ROOT = Path(__file__).parents[2]
@@ -34,7 +35,9 @@ def run(*command: str, folder: Path, **environment: str) -> str:
 def test_command_line(tool: str, take_program: Callable[[str, str], Path], address: str, tmp_path: Path) -> None:
     path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"
     if tool == "grpcurl" and not shutil.which(tool, path=path):
-        pytest.skip("grpcurl is not installed: go install github.com/fullstorydev/grpcurl/cmd/grpcurl@latest")
+        if shutil.which("go"):
+            missing(tool, "run `make peers`")
+        pytest.skip("no go: install Go, which builds grpcurl (see `make peers`)")
     script = take_program("how-to/other-languages", f"{tool}.sh")
     script.write_text(script.read_text().replace(DEFAULT_ADDRESS, address))
     printed = run("bash", "-eu", str(script), folder=tmp_path, PATH=path)

@@ -1,9 +1,12 @@
 """The targets of `make`: listed by `make help`, and explained in CONTRIBUTING.md."""
 
+import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
+import pytest
 from peers import program
 
 ROOT = Path(__file__).parents[2]
@@ -17,3 +20,12 @@ def test_every_word_is_listed_and_every_documented_word_exists() -> None:
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
     documented = {word for page in pages for word in re.findall(r"`make ([a-z-]+)", page.read_text())}
     assert documented - listed == set()
+
+
+def test_what_has_a_word_of_its_own_is_left_out_of_the_run_and_not_skipped() -> None:
+    command = [sys.executable, "-m", "pytest", "tests/ray/test_launcher.py", "-n", "0", "-p", "no:cacheprovider"]
+    environment = {name: value for name, value in os.environ.items() if name != "RAY_CASES"}
+    run = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert run.returncode == pytest.ExitCode.NO_TESTS_COLLECTED, run.stdout + run.stderr
+    assert "2 deselected" in run.stdout
+    assert "skipped" not in run.stdout

@@ -22,10 +22,7 @@ from dynhull_client import HullClient
 SERVED = "SELECT DISTINCT worker FROM owners WHERE until > '-infinity' AND address <> ''"
 HULLS = [f"{first}/hull" for first in "abcdefgh"]  # in all of four partitions
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(os.environ.get("RAY_CASES") != "all", reason="with `make ray`: Ray takes many seconds to start"),
-]
+pytestmark = [pytest.mark.long, pytest.mark.only_with("RAY_CASES")]  # Ray takes many seconds to start
 
 
 def test_servers_are_started_and_started_again_and_end_with_their_ray(postgres: PostgreSQL) -> None:

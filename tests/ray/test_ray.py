@@ -55,7 +55,7 @@ def test_errors_say_what_is_wrong_and_where(found, problem):
     assert words in found[problem][1]
 
 
-@pytest.mark.skipif(CASES != "all", reason="with `make ray`")
+@pytest.mark.only_with("RAY_CASES")
 def test_files_other_columns_and_integers(found):
     assert found["files"]
     assert found["turned"]
