@@ -10,7 +10,8 @@ from nats.errors import BadSubjectError, Error, MaxPayloadError
 from nats.js.errors import NoStreamResponseError
 
 from .letters import CONTENT_TYPE, Letter
-from .target import NotDeliveredError, RefusedError, filled
+from .refusals.nats import NATS, code_of
+from .target import NotDeliveredError, RefusedError, filled, not_delivered
 from .urls import check_subject, options_of, without_secrets
 
 SUBJECT = "dynhull.{fence}.{type}"
@@ -54,8 +55,10 @@ class JetStream:
             except NoStreamResponseError:
                 raise NotDeliveredError(f"NATS: no stream stores the subject {subject}; create one") from None
             except (Error, OSError, TimeoutError) as error:
-                await self._disconnect(client)
-                raise NotDeliveredError(f"NATS: {error}") from None
+                refused = not_delivered(NATS.meaning(code_of(error)), f"NATS: {error}")
+                if not isinstance(refused, RefusedError):
+                    await self._disconnect(client)
+                raise refused from None
 
     def place(self, letter: Letter) -> str:
         """The server and the subject."""

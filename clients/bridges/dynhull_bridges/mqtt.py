@@ -12,13 +12,13 @@ from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
 from .letters import Letter
-from .target import NotDeliveredError, RefusedError, filled
+from .refusals.mqtt import MQTT
+from .target import NotDeliveredError, filled, not_delivered
 from .urls import options_of, without_secrets
 
 TOPIC = "dynhull/{fence}/{type}"
 PORT, TLS_PORT = 1883, 8883
 AT_LEAST_ONCE = 1
-REFUSED = {0x87, 0x90, 0x95, 0x99}  # not authorized, topic invalid, packet too large, payload invalid: not for now only
 
 
 class _Client(aiomqtt.Client):
@@ -84,8 +84,7 @@ class Mqtt:
                 await self._disconnect(client)
                 raise NotDeliveredError(f"MQTT: {error}") from None
             if reason.is_failure:
-                kind = RefusedError if reason.value in REFUSED else NotDeliveredError
-                raise kind(f"MQTT: refused: {reason}")
+                raise not_delivered(MQTT.meaning(reason.value), f"MQTT: refused: {reason}")
 
     def place(self, letter: Letter) -> str:
         """The broker and the topic."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from .letters import Letter
+from .refusals.table import Meaning
 
 PLACE = re.compile(r"\{fence\}|\{type\}|\{\{|\}\}")
 
@@ -23,6 +24,12 @@ class NotDeliveredError(Exception):
 
 class RefusedError(NotDeliveredError):
     """The receiver does not want these letters: after some attempts they become dead letters."""
+
+
+def not_delivered(meaning: Meaning, message: str, retry_after: float | None = None) -> NotDeliveredError:
+    """The error that a refusal of a receiver is, by what it means."""
+    kind = RefusedError if meaning is Meaning.FINAL else NotDeliveredError
+    return kind(message, retry_after)
 
 
 class GoneError(Exception):

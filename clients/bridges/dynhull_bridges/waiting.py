@@ -40,14 +40,18 @@ class Absence:
             self._next, self._gap = self._began, FIRST_GAP
         return self._began
 
-    def lasts(self, error: Exception) -> None:
-        """It still does not answer, which the error explains; raises the error if it has been away for too long."""
+    def lasts(self, error: Exception, pause: float | None = None) -> None:
+        """It still does not answer, which the error explains; raises the error if it has been away for too long.
+
+        `pause` is the number of seconds until it is tried again, for the log.
+        """
         now, began = monotonic(), self.begins()
         if self._limit is not None and now - began >= self._limit:
             raise error
         if now >= self._next:
             self._next, self._gap = now + self._gap, min(2 * self._gap, LONGEST_GAP)
-            log.warning(self._event, **self._names, since=self._since, error=str(error))
+            names = self._names if pause is None else {**self._names, "pause": round(self.pause(pause), 3)}
+            log.warning(self._event, **names, since=self._since, error=str(error))
 
     def pause(self, pause: float) -> float:
         """The seconds until it is tried again, rather than `pause`: not beyond the limit."""

@@ -15,12 +15,11 @@ import dynhull_client
 
 from .addresses import PublicOnly, is_public
 from .letters import BATCH_CONTENT_TYPE, CONTENT_TYPE, Letter
+from .refusals.http import HTTP
 from .signatures import signature
-from .target import GoneError, NotDeliveredError, RefusedError, filled
+from .target import GoneError, NotDeliveredError, filled, not_delivered
 from .urls import without_secrets
 
-# Client errors after which the same request may succeed later.
-PASSING = {HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MANY_REQUESTS}
 LONGEST_ANSWER = 200  # bytes of a refusal that are shown
 
 
@@ -94,10 +93,7 @@ class Webhook:
         message = f"HTTP {status} {response.reason or ''} {answer.decode(errors='replace')!r}"
         if status == HTTPStatus.GONE:
             raise GoneError(message)
-        later = retry_after(response.headers.get("Retry-After"))
-        if status in PASSING or status >= HTTPStatus.INTERNAL_SERVER_ERROR:
-            raise NotDeliveredError(message, later)
-        raise RefusedError(message, later)
+        raise not_delivered(HTTP.meaning(status), message, retry_after(response.headers.get("Retry-After")))
 
 
 def retry_after(text: str | None) -> float | None:

@@ -106,7 +106,7 @@ def ingest(
     from .. import logs
     from ..urls import without_secrets
     from .bad import BadMessages
-    from .feed import FeedError
+    from .feed import DoubtfulError, FeedError
     from .ingest import IngestError, feeds_of, run
     from .mapping import Mapping
     from .pump import Settings
@@ -144,6 +144,8 @@ def ingest(
 
     try:
         ended = asyncio.run(serve())
+    except DoubtfulError as error:
+        fail(Exit.UNUSABLE, str(error))
     except FeedError as error:
         fail(
             Exit.UNAVAILABLE, f"no answer from the broker: {error}\nIs it running, is {without_secrets(source)} right?"

@@ -6,12 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from ..refusals.table import Meaning
+
 UNSAFE = re.compile(r"[^A-Za-z0-9._/-]")
 LONGEST_PRODUCER = 200
 
 
 class FeedError(Exception):
     """The broker cannot be reached for now, or has lost the connection: the feed begins again."""
+
+
+class DoubtfulError(FeedError):
+    """The broker refuses what would be final, but says the same while it is recovering."""
+
+
+def refusal(meaning: Meaning, message: str) -> FeedError | ValueError:
+    """The error that a refusal of a broker is, by what it means."""
+    match meaning:
+        case Meaning.FINAL:
+            return ValueError(message)
+        case Meaning.DOUBTFUL:
+            return DoubtfulError(message)
+        case Meaning.PASSES:
+            return FeedError(message)
 
 
 def feed_error(broker: str, error: BaseException) -> FeedError:
@@ -56,8 +73,9 @@ class Feed(Protocol):
         None begins after the last message that was kept track of with `keep`, or at the oldest one.
 
         Raises:
-            FeedError: the broker cannot be reached.
-            ValueError: what is to be read does not exist, or is not the log that `known` is about.
+            FeedError: the broker cannot be reached, or refuses for now.
+            DoubtfulError: it says that what is to be read does not exist.
+            ValueError: it refuses for good, or what is to be read is not the log that `known` is about.
         """
 
     async def read(self) -> Sequence[Message]:

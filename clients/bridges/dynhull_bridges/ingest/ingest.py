@@ -12,11 +12,11 @@ from dynhull_client import AsyncHullClient
 
 from ..waiting import SERVER_AWAY, Absence, growing_pauses, unless
 from .bad import BadMessages, TooManyBadError
-from .feed import Feed, FeedError, check_producer
+from .feed import DoubtfulError, Feed, FeedError, check_producer
 from .figures import Figures
 from .lane import NotCreatedError
 from .mapping import Mapping
-from .pump import BROKER_AWAY, FIRST_PAUSE, LONGEST_PAUSE, Pump, Settings
+from .pump import BROKER_AWAY, DOUBT, FIRST_PAUSE, LONGEST_PAUSE, Pump, Settings
 
 log = structlog.get_logger("dynhull_ingest")
 Find = Callable[[], Awaitable[Sequence[Feed]]]
@@ -89,6 +89,7 @@ async def run(
     Raises:
         DynhullError: the server refuses to take points, or has been away for too long.
         FeedError: the broker has been away for too long.
+        DoubtfulError: it has denied for some seconds what is to be read.
         IngestError: points cannot be sent, or there are too many bad messages.
     """
     stop = asyncio.Event()
@@ -130,14 +131,21 @@ async def run(
 
 async def _found(find: Find, patience: float | None) -> Sequence[Feed]:
     """The feeds, once the broker says which there are."""
-    away, pauses = Absence(BROKER_AWAY, patience), growing_pauses(FIRST_PAUSE, LONGEST_PAUSE)
+    away, doubt = Absence(BROKER_AWAY, patience), Absence(BROKER_AWAY, DOUBT)
+    pauses = growing_pauses(FIRST_PAUSE, LONGEST_PAUSE)
     while True:
         away.begins()
+        pause = next(pauses)
         try:
             return await find()
+        except DoubtfulError as error:
+            doubt.lasts(error, pause)
+            pause = doubt.pause(pause)
         except FeedError as error:
-            away.lasts(error)
-        await asyncio.sleep(away.pause(next(pauses)))
+            doubt.ends()
+            away.lasts(error, pause)
+            pause = away.pause(pause)
+        await asyncio.sleep(pause)
 
 
 async def _end(stop: asyncio.Event, running: "asyncio.Future[list[None]]", pumps: Sequence[Pump], grace: float) -> None:

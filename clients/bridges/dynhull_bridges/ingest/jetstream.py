@@ -13,11 +13,13 @@ import nats
 from nats.aio.msg import Msg
 from nats.errors import Error
 from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig
-from nats.js.errors import BadRequestError, BucketNotFoundError, KeyNotFoundError, NotFoundError
+from nats.js.errors import BadRequestError, BucketNotFoundError, KeyNotFoundError
 from nats.js.kv import KeyValue
 
+from ..refusals.nats import NATS, code_of
+from ..refusals.table import Meaning
 from ..urls import check_subject, options_of, without_secrets
-from .feed import FeedError, Message, feed_error, producer_name
+from .feed import FeedError, Message, feed_error, producer_name, refusal
 from .topics import captures_of
 
 if TYPE_CHECKING:
@@ -32,8 +34,7 @@ WAIT = 1.0  # seconds that a read waits for messages
 EXPIRES = 5.0  # seconds after which the server ends a request, and says so
 SILENCE = 15.0  # seconds without a word, after which the connection is lost
 NO_MESSAGES, REQUEST_EXPIRED = "404", "408"
-NOT_IN_STREAM = 10093  # the code of an error
-REFUSAL = "authorization violation"
+NOT_IN_STREAM, NO_STREAM = 10093, 10059  # codes of errors
 # The reply subject of a message: $JS.ACK.STREAM.CONSUMER.attempts.sequence.delivered.time.pending
 SHORT_REPLY, SEQUENCE = 9, 5
 
@@ -84,12 +85,17 @@ class JetStream:
         """Connect; see `Feed.begin`."""
         try:
             return await self._begin(known)
-        except NotFoundError:
-            raise ValueError(f"NATS has no stream {self._stream!r}") from None
         except (Error, OSError, TimeoutError) as error:
-            if REFUSAL in str(error).lower():  # which has no class of its own
-                raise ValueError(f"the broker refuses the connection: {error}") from None
-            raise feed_error("NATS", error) from None
+            raise self._failure(error) from None
+
+    def _failure(self, error: Exception) -> Exception:
+        code = code_of(error)
+        meaning = NATS.meaning(code)
+        if code == NO_STREAM:
+            return refusal(meaning, f"NATS has no stream {self._stream!r}")
+        if isinstance(code, str):
+            return refusal(meaning, f"the broker refuses the connection: {error}")
+        return feed_error("NATS", error) if meaning is Meaning.PASSES else refusal(meaning, f"NATS: {error}")
 
     async def _begin(self, known: int | None) -> int:
         self._client = await nats.connect(
@@ -202,8 +208,8 @@ class JetStream:
 
     async def _kept(self) -> int:
         try:
-            entry = await (await self._positions()).get(self._key)
-        except KeyNotFoundError:
+            entry = await (await self._context.key_value(POSITIONS)).get(self._key)
+        except (BucketNotFoundError, KeyNotFoundError):
             return 0
         return int(entry.value or 0)
 

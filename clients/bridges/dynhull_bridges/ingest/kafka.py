@@ -5,10 +5,11 @@ from urllib.parse import unquote, urlsplit
 
 from aiokafka import AIOKafkaConsumer, TopicPartition
 from aiokafka.admin import AIOKafkaAdminClient
-from aiokafka.errors import KafkaConnectionError, KafkaError
+from aiokafka.errors import KafkaConnectionError, KafkaError, UnknownTopicOrPartitionError, for_code
 
+from ..refusals.kafka import KAFKA
 from ..urls import options_of, without_secrets
-from .feed import FeedError, Message, feed_error, producer_name
+from .feed import FeedError, Message, feed_error, producer_name, refusal
 
 WAIT = 1000  # milliseconds that a read waits for messages
 MOST = 4096  # messages of one read
@@ -56,7 +57,7 @@ class Kafka:
             oldest = (await consumer.beginning_offsets([partition]))[partition]
             end = (await consumer.end_offsets([partition]))[partition]
         except (KafkaError, OSError) as error:
-            raise feed_error("Kafka", error) from None
+            raise _failure(error) from None
         if after > end:
             raise ValueError(
                 f"{self.name} ends at offset {end}, but {after} offsets of it have been taken: the topic was created "
@@ -71,7 +72,7 @@ class Kafka:
         try:
             found = await self._connected.getmany(self._partition, timeout_ms=WAIT, max_records=MOST)
         except (KafkaError, OSError) as error:
-            raise feed_error("Kafka", error) from None
+            raise _failure(error) from None
         records = found.get(self._partition, ())
         if records:
             self._next = records[-1].offset + 1
@@ -133,8 +134,9 @@ class Topic:
         """The partitions.
 
         Raises:
-            ValueError: there is no such topic, or it has no such partition.
-            FeedError: no broker answers.
+            DoubtfulError: the broker says that there is no such topic.
+            ValueError: the topic has no such partition, or the broker refuses for good.
+            FeedError: no broker answers, or it refuses for now.
         """
         admin = AIOKafkaAdminClient(bootstrap_servers=self._servers)
         try:
@@ -143,12 +145,15 @@ class Topic:
         except KafkaConnectionError:
             raise FeedError(f"Kafka: no broker answers at {self._servers}") from None
         except (KafkaError, OSError) as error:
-            raise feed_error("Kafka", error) from None
+            raise _failure(error) from None
         finally:
             await admin.close()
         there = sorted(each["partition"] for each in described["partitions"])
         if not there:
-            raise ValueError(f"Kafka has no topic {self._name!r}")
+            refused: type[KafkaError] = for_code(described["error_code"])
+            denied = f"Kafka has no topic {self._name!r}"
+            unsure = f"Kafka: the topic {self._name!r}: {refused.__name__}"
+            raise refusal(KAFKA.meaning(refused), denied if refused is UnknownTopicOrPartitionError else unsure)
         if missing := sorted(set(self._asked) - set(there)):
             raise ValueError(f"the topic {self._name!r} has no partition {missing[0]}: it has 0 to {max(there)}")
         return [self._partition(each) for each in self._asked or there]
@@ -156,3 +161,8 @@ class Topic:
     def _partition(self, number: int) -> Kafka:
         producer = f"{self._producer}/{number}" if self._producer else None
         return Kafka(self._servers, self._name, number, producer, self._group)
+
+
+def _failure(error: KafkaError | OSError) -> Exception:
+    kind: type[Exception] = type(error)
+    return refusal(KAFKA.meaning(kind), str(feed_error("Kafka", error)))

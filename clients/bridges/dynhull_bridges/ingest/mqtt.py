@@ -16,8 +16,9 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
+from ..refusals.mqtt import MQTT
 from ..urls import options_of, without_secrets
-from .feed import FeedError, Message, feed_error
+from .feed import FeedError, Message, feed_error, refusal
 from .topics import captures_of
 
 PORT, TLS_PORT = 1883, 8883
@@ -148,7 +149,7 @@ class Mqtt:
 
     def _connected(self, _client: Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any) -> None:
         if reason.is_failure:
-            self._tell(ValueError(f"the broker refuses the connection: {reason}"))
+            self._tell(refusal(MQTT.meaning(reason.value), f"the broker refuses the connection: {reason}"))
             return
         with self._lock:
             self._connections += 1
@@ -157,12 +158,14 @@ class Mqtt:
 
     def _subscribed(self, _client: Client, _data: Any, _number: int, reasons: list[ReasonCode], _props: Any) -> None:
         if reasons[0].is_failure:
-            self._tell(ValueError(f"the broker refuses the filter {self._filter!r}: {reasons[0]}"))
+            meaning = MQTT.meaning(reasons[0].value)
+            self._tell(refusal(meaning, f"the broker refuses the filter {self._filter!r}: {reasons[0]}"))
         else:
             self._tell(None)
 
     def _disconnected(self, _client: Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any) -> None:
         self._lost = str(reason)
+        self._tell(FeedError(f"MQTT: {reason}"))
         self._loop.call_soon_threadsafe(self._news.set)
 
     def _arrive(self, _client: Client, _data: Any, message: MQTTMessage) -> None:

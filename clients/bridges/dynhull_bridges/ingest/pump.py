@@ -14,7 +14,7 @@ from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, Un
 from ..waiting import Absence, unless
 from .bad import BadMessages
 from .chunk import Taken, chunks_of
-from .feed import Feed, FeedError, Message
+from .feed import DoubtfulError, Feed, FeedError, Message
 from .figures import Figures
 from .lane import ANSWER, Lane
 from .mapping import Mapping, Row
@@ -23,7 +23,8 @@ log = structlog.get_logger("dynhull_ingest")
 UNDER_WAY = 64  # reads that are not settled
 KEEP_EVERY = 1.0  # seconds between notes of the place in a log
 FIRST_PAUSE, LONGEST_PAUSE = 0.2, 30.0
-BROKER_AWAY = "the broker does not answer, trying again"
+DOUBT = 3.0  # seconds for which a broker may deny what is to be read: while it recovers it does
+BROKER_AWAY = "no messages from the broker, trying again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +71,8 @@ class Pump:
         self._bad = bad
         self._server_away = server_away
         self._broker_away = Absence(BROKER_AWAY, settings.patience, feed=feed.name)
+        self._doubt = Absence(BROKER_AWAY, DOUBT, feed=feed.name)
+        self._was_there = False  # what the feed reads, now or for an ingest before
         self._lanes: dict[str, Lane] = {}
         self._sending: list[asyncio.Task[None]] = []
         self._under_way: deque[Taken] = deque()
@@ -113,16 +116,21 @@ class Pump:
             try:
                 await self._connection(stop)
             except FeedError as error:
+                failure: Exception = error
                 away = self._broker_away
                 self._figures.restarts.labels(self._feed.name).inc()
-                away.lasts(error)
+                if isinstance(error, DoubtfulError) and not self._was_there:
+                    away = self._doubt
+                else:
+                    self._doubt.ends()
             except (UnavailableError, DeadlineError) as error:
+                failure = error
                 away = self._server_away
-                away.lasts(error)
             else:
                 return
-            await self._feed.close()
             pause = FIRST_PAUSE if self.reached > reached else min(2 * pause, LONGEST_PAUSE)
+            away.lasts(failure, pause)
+            await self._feed.close()
             await unless(stop, asyncio.sleep(away.pause(pause)))
 
     async def _connection(self, stop: asyncio.Event) -> None:
@@ -153,9 +161,12 @@ class Pump:
 
     async def _begin(self) -> int:
         known = self.reached or await self._known()
+        self._was_there |= bool(known)
         self._broker_away.begins()
         begun = await self._feed.begin(known)
         self._broker_away.ends()
+        self._doubt.ends()
+        self._was_there = True
         return begun
 
     async def _known(self) -> int | None:

@@ -1,0 +1,1 @@
+"""What the refusals of each broker and receiver mean: a table each, all of the same form."""
