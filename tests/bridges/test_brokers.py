@@ -3,8 +3,10 @@
 import asyncio
 import json
 import socketserver
+import subprocess
 import threading
 from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -35,18 +37,20 @@ def port() -> int:
 
 
 class Subscriber:
-    """Collects what the broker has for a persistent session."""
+    """Subscribes to all topics, and collects what arrives. The broker keeps the session of an identifier."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, identifier: str | None = None) -> None:
         self.messages: list[tuple[str, dict[str, Any]]] = []
         self._ready = threading.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._run(port)), daemon=True)
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._run(port, identifier)), daemon=True)
         self._thread.start()
         assert self._ready.wait(PATIENCE)
 
-    async def _run(self, port: int) -> None:
+    async def _run(self, port: int, identifier: str | None) -> None:
         try:
-            async with aiomqtt.Client("127.0.0.1", port) as client:
+            async with aiomqtt.Client(
+                "127.0.0.1", port, identifier=identifier, clean_session=identifier is None
+            ) as client:
                 await client.subscribe("#", qos=1)
                 self._ready.set()
                 async for message in client.messages:
@@ -56,22 +60,38 @@ class Subscriber:
 
 
 def test_mqtt(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:
-    command = mosquitto(tmp_path, port)
+    """The relay is there before the broker, and before both a subscription, in a session that the broker keeps."""
+    command = mosquitto(tmp_path, port, "persistence true", f"persistence_location {tmp_path}/")
     to = ("--to", f"mqtt://127.0.0.1:{port}", "--timeout", "1s", *FAST)
+    with saved(broker(command, port)):
+        Subscriber(port, "first")
     with relay_process(address, tmp_path, name, *to) as relay:
         pass_through(client, name, KEYS)
         relay.wait_for("not delivered, trying again")
-        with broker(command, port):
-            subscriber = Subscriber(port)
+        with saved(broker(command, port)):
+            subscriber = Subscriber(port, "first")
             wait_until(lambda: acknowledged(client, name) == 6)
+            wait_until(lambda: sequences(subscriber) == list(range(1, 7)))
         pass_through(client, name, KEYS)
         with broker(command, port):
-            again = Subscriber(port)
+            again = Subscriber(port, "first")
             wait_until(lambda: acknowledged(client, name) == 12)
-            wait_until(lambda: again.messages and again.messages[-1][1]["data"]["sequence"] == 12)
-    seen = [message["data"]["sequence"] for _, message in subscriber.messages + again.messages]
-    assert seen == sorted(seen)
-    assert {topic for topic, _ in again.messages} <= {f"dynhull/{name}/enter", f"dynhull/{name}/exit"}
+            wait_until(lambda: sequences(again) == list(range(7, 13)))
+    assert {topic for topic, _ in again.messages} == {f"dynhull/{name}/enter", f"dynhull/{name}/exit"}
+
+
+def sequences(subscriber: Subscriber) -> list[int]:
+    """Those that have arrived, each once: with QoS 1 some may come again."""
+    return sorted({message["data"]["sequence"] for _, message in subscriber.messages})
+
+
+@contextmanager
+def saved(running: AbstractContextManager[subprocess.Popen[bytes]]) -> Iterator[None]:
+    """A broker that saves its sessions at the end."""
+    with running as process:
+        yield
+        process.terminate()
+        process.wait(PATIENCE)
 
 
 def test_mqtt_has_each_event(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:

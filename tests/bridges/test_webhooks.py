@@ -203,7 +203,7 @@ def test_sigterm_lets_a_delivery_finish(
 
         def answer(_: Received) -> tuple[int, dict[str, str]]:
             relay.process.terminate()
-            time.sleep(0.2)  # the signal arrives while the relay waits for this answer
+            relay.wait_for("stopping when the deliveries under way are done")
             return 200, {}
 
         endpoint.answer = answer

@@ -4,12 +4,12 @@ import asyncio
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
-import nats
 from nats.aio.client import Client
 from nats.errors import BadSubjectError, Error, MaxPayloadError
 from nats.js.errors import NoStreamResponseError
 
 from .letters import CONTENT_TYPE, Letter
+from .nats_connection import closed, connected
 from .refusals.nats import NATS, code_of
 from .target import NotDeliveredError, RefusedError, filled, not_delivered
 from .urls import check_subject, options_of, without_secrets
@@ -73,15 +73,7 @@ class JetStream:
         async with self._connecting:
             if self._client is None:
                 try:
-                    self._client = await nats.connect(
-                        self._server,
-                        # Lanes repeat their deliveries themselves; without a limit, the first connect never returns.
-                        allow_reconnect=False,
-                        max_reconnect_attempts=1,
-                        reconnect_time_wait=0,
-                        connect_timeout=self._timeout,
-                        error_cb=_quiet,
-                    )
+                    self._client = await connected(self._server, self._timeout)
                 except (Error, OSError, TimeoutError) as error:
                     raise NotDeliveredError(f"NATS: {type(error).__name__}: {error}") from None
             return self._client
@@ -91,8 +83,4 @@ class JetStream:
         async with self._connecting:
             if self._client is client:
                 self._client = None
-                await client.close()
-
-
-async def _quiet(_: Exception) -> None:
-    """The delivery that fails reports the error."""
+                await closed(client)

@@ -184,6 +184,7 @@ async def _require_fences(client: AsyncHullClient, server: str, fences: Sequence
 async def _end(stop: asyncio.Event, running: Sequence[asyncio.Task[None]], grace: float) -> None:
     """After a signal, let deliveries that are under way finish, within the grace period."""
     await stop.wait()
+    log.info("stopping when the deliveries under way are done", grace=grace)
     with suppress(TimeoutError):
         async with asyncio.timeout(grace):
             await asyncio.wait(running)

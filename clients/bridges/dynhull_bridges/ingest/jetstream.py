@@ -9,13 +9,13 @@ from time import monotonic
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
-import nats
 from nats.aio.msg import Msg
 from nats.errors import Error
 from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig
 from nats.js.errors import BadRequestError, BucketNotFoundError, KeyNotFoundError
 from nats.js.kv import KeyValue
 
+from ..nats_connection import closed, connected
 from ..refusals.nats import NATS, code_of
 from ..refusals.table import Meaning
 from ..urls import check_subject, options_of, without_secrets
@@ -98,14 +98,7 @@ class JetStream:
         return feed_error("NATS", error) if meaning is Meaning.PASSES else refusal(meaning, f"NATS: {error}")
 
     async def _begin(self, known: int | None) -> int:
-        self._client = await nats.connect(
-            self._server,
-            allow_reconnect=False,  # the feed begins again after the last message that it has read
-            max_reconnect_attempts=1,
-            reconnect_time_wait=0,
-            connect_timeout=int(TIMEOUT),
-            error_cb=_quiet,
-        )
+        self._client = await connected(self._server, TIMEOUT)
         self._context = self._client.jetstream(timeout=TIMEOUT)
         stream = await self._context.stream_info(self._stream)
         state = stream.state
@@ -227,9 +220,4 @@ class JetStream:
         """Disconnect."""
         client, self._client = self._client, None
         if client is not None:
-            with suppress(Error, OSError, TimeoutError):
-                await client.close()
-
-
-async def _quiet(_: Exception) -> None:
-    """Reading fails too, and reports the error."""
+            await closed(client)

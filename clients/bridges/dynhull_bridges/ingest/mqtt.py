@@ -17,6 +17,7 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
 from ..refusals.mqtt import MQTT
+from ..refusals.table import Meaning
 from ..urls import options_of, without_secrets
 from .feed import FeedError, Message, feed_error, refusal
 from .topics import captures_of
@@ -67,6 +68,7 @@ class Mqtt:
             clean_session=None if five else False,
             protocol=self._version,
             manual_ack=True,
+            reconnect_on_failure=False,  # the feed begins again itself
         )
         if parts.username:
             self._client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
@@ -165,7 +167,10 @@ class Mqtt:
 
     def _disconnected(self, _client: Client, _data: Any, _flags: Any, reason: ReasonCode, _properties: Any) -> None:
         self._lost = str(reason)
-        self._tell(FeedError(f"MQTT: {reason}"))
+        final = MQTT.meaning(reason.value) is Meaning.FINAL
+        self._tell(
+            ValueError(f"the broker refuses the connection: {reason}") if final else FeedError(f"MQTT: {reason}")
+        )
         self._loop.call_soon_threadsafe(self._news.set)
 
     def _arrive(self, _client: Client, _data: Any, message: MQTTMessage) -> None:

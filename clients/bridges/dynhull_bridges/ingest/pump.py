@@ -72,6 +72,7 @@ class Pump:
         self._server_away = server_away
         self._broker_away = Absence(BROKER_AWAY, settings.patience, feed=feed.name)
         self._doubt = Absence(BROKER_AWAY, DOUBT, feed=feed.name)
+        self._read_so_far = 0  # messages
         self._was_there = False  # what the feed reads, now or for an ingest before
         self._lanes: dict[str, Lane] = {}
         self._sending: list[asyncio.Task[None]] = []
@@ -112,7 +113,7 @@ class Pump:
         """One connection to the broker after another."""
         pause = FIRST_PAUSE
         while not stop.is_set():
-            reached = self.reached
+            read = self._read_so_far
             try:
                 await self._connection(stop)
             except FeedError as error:
@@ -128,7 +129,7 @@ class Pump:
                 away = self._server_away
             else:
                 return
-            pause = FIRST_PAUSE if self.reached > reached else min(2 * pause, LONGEST_PAUSE)
+            pause = FIRST_PAUSE if self._read_so_far > read else min(2 * pause, LONGEST_PAUSE)
             away.lasts(failure, pause)
             await self._feed.close()
             await unless(stop, asyncio.sleep(away.pause(pause)))
@@ -185,6 +186,7 @@ class Pump:
     async def _take(self, messages: Sequence[Message]) -> None:
         """Hand the rows of some messages to the lanes of their hulls."""
         self._figures.messages.labels(self._feed.name).inc(len(messages))
+        self._read_so_far += len(messages)
         if not self.reached and not self.points and not self._under_way:
             self.begun = monotonic()
         taken = Taken(messages)

@@ -1,6 +1,6 @@
 """MQTT: reason codes of CONNACK, SUBACK and PUBACK (MQTT 5, 2.4), to which the client translates those of 3.1.1.
 
-A DISCONNECT is no refusal: the next CONNACK decides.
+A DISCONNECT refuses what is asked for before the subscription if its code is final; later the next CONNACK decides.
 """
 
 from .table import Meaning, Refusals
