@@ -141,6 +141,8 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 	$(BIN)/python tests/robustness/fences/kill_torture.py --steps 1000000 --kills 1000
 	$(BIN)/python tests/robustness/bridges/relay_torture.py --kills 100
 	$(BIN)/python tests/robustness/bridges/ingest_torture.py --kills 50
+	$(BIN)/python tests/robustness/bridges/ingest_torture.py --kills 20 --only broker
+	$(BIN)/python tests/robustness/bridges/mqtt_torture.py --kills 20
 
 SCHEDULES ?= 100000
 

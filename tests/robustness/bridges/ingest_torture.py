@@ -1,6 +1,6 @@
 """Real ingests of a real JetStream into a real server, all of which are killed again and again.
 
-    python tests/robustness/bridges/ingest_torture.py [--kills 50] [--seed 0]
+    python tests/robustness/bridges/ingest_torture.py [--kills 50] [--only broker] [--seed 0]
 
 Points without keys go into a stream, each of them another, while SIGKILL hits an ingest, the broker or the server at
 any moment, and each starts again on what is left. Two ingests read the same stream, so that there is always one that
@@ -19,6 +19,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,6 @@ class Publisher:
                     return
                 async with await nats.connect(self._url, allow_reconnect=False) as connection:
                     context = connection.jetstream()
-                    await context.add_stream(name=STREAM, subjects=[STREAM])
                     while self._may.is_set() and not self._ends:
                         await asyncio.gather(*(self._publish(context) for _ in range(MESSAGES)))
                         await asyncio.sleep(0.005)
@@ -92,6 +92,11 @@ class Publisher:
         points = [[self._number + i, (self._number + i) ** 2] for i in range(POINTS)]
         self._number += POINTS
         await context.publish(STREAM, json.dumps(points).encode(), timeout=PATIENCE)
+
+
+async def make_stream(port: int) -> None:
+    async with await nats.connect(f"nats://127.0.0.1:{port}") as connection:
+        await connection.jetstream().add_stream(name=STREAM, subjects=[STREAM])
 
 
 async def stored(port: int) -> int:
@@ -111,7 +116,7 @@ class Torture:
         self._ingest += ("--x", "$[0]", "--y", "$[1]")
         self._address = f"127.0.0.1:{self._port}"
 
-    def run(self, kills: int) -> str:
+    def run(self, kills: int, choices: Sequence[str] = CHOICES) -> str:
         counts: Counter[str] = Counter()
         publisher = Publisher(self._broker_port)
         with ExitStack() as running:
@@ -123,7 +128,7 @@ class Torture:
             publisher.go_on()
             while counts.total() < kills:
                 time.sleep(self._random.uniform(0, 0.6))
-                name = self._random.choice(CHOICES)
+                name = self._random.choice(choices)
                 if name == BROKER:
                     publisher.pause()
                     time.sleep(FLUSHED)
@@ -145,7 +150,9 @@ class Torture:
         if name == SERVER:
             return stack.enter_context(self._server(killed=True)).process
         if name == BROKER:
-            return stack.enter_context(broker(self._broker, self._broker_port))
+            process = stack.enter_context(broker(self._broker, self._broker_port))
+            asyncio.run(make_stream(self._broker_port))  # an ingest may not wait for one that it has never read
+            return process
         return stack.enter_context(ingest_process(self._address, *self._ingest, killed=True)).process
 
     def _server(self, *, killed: bool = False) -> AbstractContextManager[Server]:
@@ -165,10 +172,11 @@ class Torture:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--only", choices=sorted(set(CHOICES)), help="kill nothing else")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        result = Torture(Path(folder), options.seed).run(options.kills)
+        result = Torture(Path(folder), options.seed).run(options.kills, [options.only] if options.only else CHOICES)
     print(result)
     if not result.endswith("lost: 0, doubled: 0"):
         raise SystemExit(1)
