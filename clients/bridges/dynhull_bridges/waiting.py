@@ -18,6 +18,8 @@ Result = TypeVar("Result")
 class Absence:
     """The time for which a server or a broker has not answered. The log has it, however many ask, once in a while.
 
+    Another kind of error is logged at once.
+
     Args:
         event: what the log says.
         limit: the seconds after which it is given up; None for never.
@@ -31,6 +33,7 @@ class Absence:
         self._began: float | None = None
         self._since = ""
         self._next = self._gap = 0.0  # when the log says it again, and the seconds between
+        self._logged: set[type[Exception]] = set()  # kinds of errors
 
     def begins(self) -> float:
         """It is asked, and has not answered; returns the time since when, on the monotonic clock."""
@@ -38,6 +41,7 @@ class Absence:
             self._began = monotonic()
             self._since = datetime.now(UTC).isoformat(timespec="seconds")
             self._next, self._gap = self._began, FIRST_GAP
+            self._logged.clear()
         return self._began
 
     def lasts(self, error: Exception, pause: float | None = None) -> None:
@@ -48,7 +52,8 @@ class Absence:
         now, began = monotonic(), self.begins()
         if self._limit is not None and now - began >= self._limit:
             raise error
-        if now >= self._next:
+        if now >= self._next or type(error) not in self._logged:
+            self._logged.add(type(error))
             self._next, self._gap = now + self._gap, min(2 * self._gap, LONGEST_GAP)
             names = self._names if pause is None else {**self._names, "pause": round(self.pause(pause), 3)}
             log.warning(self._event, **names, since=self._since, error=str(error))
