@@ -22,12 +22,14 @@ from dynhull_bridges.ingest.feed import DoubtfulError, Feed, FeedError
 from dynhull_bridges.ingest.jetstream import JetStream
 from dynhull_bridges.ingest.kafka import Kafka
 from dynhull_bridges.ingest.mqtt import Mqtt
+from dynhull_bridges.jetstream import JetStream as JetStreamTarget
 from dynhull_bridges.letters import Letter
+from dynhull_bridges.mqtt import Mqtt as MqttTarget
 from dynhull_bridges.refusals.kafka import KAFKA
 from dynhull_bridges.refusals.mqtt import MQTT
 from dynhull_bridges.refusals.nats import NATS
 from dynhull_bridges.refusals.table import Meaning
-from dynhull_bridges.target import GoneError, NotDeliveredError, RefusedError
+from dynhull_bridges.target import GoneError, NotDeliveredError, RefusedError, Target
 from dynhull_bridges.webhook import Webhook
 
 ERRORS: dict[Meaning, type[Exception]] = {
@@ -37,6 +39,7 @@ ERRORS: dict[Meaning, type[Exception]] = {
 }
 CONNACKS = [0x80, *range(0x81, 0x8B), 0x8C, 0x90, 0x95, 0x97, 0x9A, 0x9B, 0x9C, 0x9D, 0x9F]
 SUBACKS = [0x80, 0x83, 0x87, 0x8F, 0x91, 0x97, 0x9E, 0xA1, 0xA2]
+PUBACKS = [0x80, 0x83, 0x87, 0x90, 0x91, 0x97, 0x99]
 OLD_CONNACKS = {1: ValueError, 2: ValueError, 3: FeedError, 4: ValueError, 5: ValueError}
 
 
@@ -93,8 +96,7 @@ def mqtt(version: str, *answers: bytes) -> Exception:
 
 
 def test_the_rows_of_mqtt_are_answers_that_there_are() -> None:
-    publications = {0x99}  # of answers to a publication alone
-    assert {code for codes in MQTT.rows.values() for code in codes} == {*CONNACKS, *SUBACKS, *publications}
+    assert {code for codes in MQTT.rows.values() for code in codes} == {*CONNACKS, *SUBACKS, *PUBACKS}
 
 
 @pytest.mark.parametrize("code", CONNACKS, ids=hex)
@@ -118,6 +120,32 @@ def test_subscriptions_of_mqtt(code: int) -> None:
 
 def test_subscriptions_of_mqtt_3() -> None:
     assert type(mqtt("3.1.1", bytes([0x20, 2, 0, 0]), bytes([0x90, 3, 0, 1, 0x80]))) is DoubtfulError
+
+
+async def deliver(target: Target) -> Exception:
+    """The error with which a letter is not delivered."""
+    try:
+        await target.deliver([Letter("id", "fence", "enter", "uid", 1, "{}")])
+    except (NotDeliveredError, GoneError) as error:
+        return error
+    finally:
+        await target.close()
+    raise AssertionError("it was not refused")
+
+
+def kind_of(meaning: Meaning) -> type[Exception]:
+    """The error of a delivery."""
+    return RefusedError if meaning is Meaning.FINAL else NotDeliveredError
+
+
+@pytest.mark.parametrize("code", PUBACKS, ids=hex)
+def test_publications_to_mqtt(code: int) -> None:
+    async def run(port: int) -> Exception:
+        return await deliver(MqttTarget(f"mqtt://127.0.0.1:{port}/t", PATIENCE))
+
+    with answering(b"", bytes([0x20, 3, 0, 0, 0]), bytes([0x40, 4, 0, 1, code, 0])) as port:
+        error = asyncio.run(run(port))
+    assert type(error) is kind_of(MQTT.meaning(code))
 
 
 def test_a_connection_that_is_lost_before_the_answer() -> None:
@@ -154,6 +182,23 @@ def test_answers_of_jetstream(without_jetstream: int, code: int) -> None:
     assert "said by JetStream" in str(error) or str(error) == "NATS has no stream 'S'"
 
 
+@pytest.mark.parametrize("code", [10054, 10060, 10077, 10109, 10047, 10008, 99999])
+def test_publications_to_jetstream(without_jetstream: int, code: int) -> None:
+    async def run() -> Exception:
+        url = f"nats://127.0.0.1:{without_jetstream}"
+        async with await nats.connect(url) as connection:
+            answer = {"error": {"code": 400, "err_code": code, "description": "said by JetStream"}, "stream": "S"}
+
+            async def refuse(message: Any) -> None:
+                await message.respond(json.dumps(answer).encode())
+
+            await connection.subscribe("events", cb=refuse)
+            await connection.flush()
+            return await deliver(JetStreamTarget(f"{url}/events", PATIENCE))
+
+    assert type(asyncio.run(run())) is kind_of(NATS.meaning(code))
+
+
 def test_no_jetstream(without_jetstream: int) -> None:
     """As long as nobody answers, it may be starting."""
     feed = JetStream(f"nats://127.0.0.1:{without_jetstream}/S", None, "mapping")
@@ -184,18 +229,12 @@ def test_errors_of_kafka(monkeypatch: pytest.MonkeyPatch, kind: type[Exception])
     + [(410, GoneError)],
 )
 def test_answers_to_webhooks(status: int, error: type[Exception]) -> None:
-    async def run(url: str) -> None:
-        hook = Webhook(url, [], batch=1, timeout=PATIENCE, allow_private=True)
-        try:
-            await hook.deliver([Letter("id", "fence", "enter", "uid", 1, "{}")])
-        finally:
-            await hook.close()
+    async def run(url: str) -> Exception:
+        return await deliver(Webhook(url, [], batch=1, timeout=PATIENCE, allow_private=True))
 
     with receiver() as endpoint:
         endpoint.answer = lambda _: (status, {})
-        with pytest.raises((NotDeliveredError, GoneError)) as raised:
-            asyncio.run(run(endpoint.url))
-    assert type(raised.value) is error
+        assert type(asyncio.run(run(endpoint.url))) is error
 
 
 async def make(port: int, stream: str) -> None:
