@@ -9,6 +9,7 @@ import hmac
 import socket
 import ssl
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache, partial
 from itertools import islice, takewhile
 from pathlib import Path
@@ -22,29 +23,39 @@ from dynhull_server.rpc.methods import RunHandler
 from dynhull_server.rpc.runs import Run, run_of_requests
 
 from .callers import KEY, OWNER
-from .frames import Frames, Kind, unpack_request
+from .frames import VERSION, Frames, Kind, unpack_request
 
 DETAILS = "grpc-status-details-bin"
+# Seconds that the others get to receive their last answers and to close their connections.
+LEAVE_SECONDS = 1.0
 ENDED = Status(code=code_pb2.UNAVAILABLE, message="the call ended without an answer; its outcome is unknown")
 
 
 class FrameServer:
-    """Listens from `listen` or `listen_on` until `close`.
+    """Listens from `listen` or `listen_on` until `say_goodbye`, and serves until `close`.
 
     Args:
         handlers: the handlers of all methods.
         runs: those of runs of calls, by the paths of their methods.
         greeting: what a connection has to begin with; empty where only gateways can connect.
+
+    Attributes:
+        greeting: the same.
+        runs: the handlers of runs, by the paths of their methods.
+        handler: finds the handler of a method by its path.
+        leaving: whether it has said goodbye.
     """
 
     def __init__(
         self, handlers: Sequence[grpc.GenericRpcHandler], runs: Mapping[str, RunHandler], greeting: bytes = b""
     ) -> None:
         self._handlers = handlers
-        self._greeting = greeting
-        self._runs = {path.encode(): handler for path, handler in runs.items()}
-        self._handler = cache(self._find)
+        self.greeting = greeting
+        self.runs = {path.encode(): handler for path, handler in runs.items()}
+        self.handler = cache(self._find)
+        self.leaving = False
         self._open: set[_Connection] = set()
+        self._left = asyncio.Event()
 
     async def listen(self, path: Path) -> None:
         """Listen on a Unix socket, and serve in the background."""
@@ -54,14 +65,38 @@ class FrameServer:
         """Listen on a socket that is bound, and serve in the background."""
         self._server = await asyncio.get_running_loop().create_server(self._connect, sock=bound, ssl=tls)
 
-    async def close(self) -> None:
-        """Close the connections, after the answers that are ready."""
+    def say_goodbye(self) -> None:
+        """Take no more connections and requests."""
+        self.leaving = True
         self._server.close()
+        for each in self._open:
+            each.say_goodbye()
+        self._notice_left()
+
+    async def close(self) -> None:
+        """Close the connections, after `say_goodbye`: once the others have all answers, or after a while."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(LEAVE_SECONDS):
+                await self._left.wait()
         for each in list(self._open):
             each.close()
 
+    def opened(self, connection: "_Connection") -> None:
+        """A connection is open."""
+        self._open.add(connection)
+
+    def closed(self, connection: "_Connection") -> None:
+        """It is closed."""
+        self._open.discard(connection)
+        self._notice_left()
+
+    def _notice_left(self) -> None:
+        """Notice that everybody has left who was told goodbye."""
+        if self.leaving and not any(each.leaving for each in self._open):
+            self._left.set()
+
     def _connect(self) -> "_Connection":
-        return _Connection(self._handler, self._runs, self._open, self._greeting)
+        return _Connection(self)
 
     def _find(self, method: bytes) -> Any:
         details = _Details(method.decode(), ())
@@ -83,26 +118,31 @@ class _Request(NamedTuple):
 
 
 class _Connection(Frames):
-    def __init__(
-        self, handler: Any, runs: Mapping[bytes, RunHandler], among: "set[_Connection]", greeting: bytes
-    ) -> None:
+    def __init__(self, server: FrameServer) -> None:
         super().__init__()
-        self._greeting = greeting
-        self._handler = handler
-        self._runs = runs
-        self._among = among
+        self.leaving = False
+        self._server = server
+        self._greeting = server.greeting
+        self._version = 0 if server.greeting else VERSION  # without a greeting, both ends are of one program
+        self._last = 0
         self._arrived: list[_Request] = []
         self._running: dict[int, asyncio.Task[None]] = {}
         self._running_runs: set[asyncio.Task[None]] = set()
 
+    def say_goodbye(self) -> None:
+        """Take no more requests, if the other end understands that."""
+        if self._version:
+            self.leaving = True
+            self.send(self._last, Kind.GOODBYE)
+
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
-        self._among.add(self)
+        self._server.opened(self)
 
     def connection_lost(self, error: Exception | None) -> None:
-        """The gateway has ended: so have its callers."""
+        """The gateway has ended, and so have its callers; or it has all answers."""
         super().connection_lost(error)
-        self._among.discard(self)
+        self._server.closed(self)
         for task in (*self._running.values(), *self._running_runs):
             task.cancel()
 
@@ -117,13 +157,17 @@ class _Connection(Frames):
 
     def received(self, number: int, kind: Kind, rest: bytes) -> None:
         if self._greeting:
-            if kind is not Kind.GREETING or not hmac.compare_digest(rest, self._greeting):
+            known = kind is Kind.GREETING and hmac.compare_digest(rest, self._greeting)
+            if not known or self._server.leaving:
                 self.abort()
                 return
             self._greeting = b""
+            self._version = number
             self.send(number, Kind.ANSWER)
         elif kind is Kind.REQUEST:
-            self._arrived.append(_Request(number, *unpack_request(rest)))
+            if not self.leaving:
+                self._last = number
+                self._arrived.append(_Request(number, *unpack_request(rest)))
         elif number in self._running:
             self._running[number].cancel()
         else:  # it has been answered, or has just arrived
@@ -146,7 +190,7 @@ class _Connection(Frames):
     def _run_of(self, arrived: list[_Request], index: int) -> Run | None:
         """The run that begins with a request; none that waits for a revision, because each may be cancelled."""
         first = arrived[index]
-        handler = self._runs.get(first.method)
+        handler = self._server.runs.get(first.method)
         if handler is None or index + 1 == len(arrived) or not _alike(first, arrived[index + 1]):
             return None
         alike = takewhile(partial(_alike, first), islice(arrived, index, None))
@@ -159,7 +203,7 @@ class _Connection(Frames):
         task.add_done_callback(lambda task: self._ended(request.number, task))
 
     async def _serve(self, request: _Request) -> None:
-        handler = self._handler(request.method)
+        handler = self._server.handler(request.method)
         context = FrameContext(handler.request_deserializer(request.message), request.caller)
         answer = await handler.stream_unary(None, context)
         if context.status is None:
@@ -179,7 +223,7 @@ class _Connection(Frames):
 
     async def _serve_run(self, run: Run, requests: list[_Request]) -> None:
         context = FrameContext((run, run.request.ByteSize()), requests[0].caller)
-        answers = await self._runs[requests[0].method].handle(None, context)
+        answers = await self._server.runs[requests[0].method].handle(None, context)
         if context.status is not None:  # one of them may be at fault, or all
             for each in requests:
                 self._begin(each)

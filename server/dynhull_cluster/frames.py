@@ -7,6 +7,15 @@ control.
 A frame is a header, which has the length of the rest, the number of the call and a kind, and the rest: of a request the
 method, the caller and the message, each but the last one with its length; of an answer the message, or a
 google.rpc.Status. Where others than gateways could connect, the first frame is a greeting: it proves to come from one.
+
+A worker that stops as planned says goodbye, as HTTP/2 does (GOAWAY), with the number of the last request that it has
+taken. It answers these, and what came after them has not begun: it is for the next worker. The other end closes the
+connection, once it has all answers; until then the worker refuses what comes through gRPC, so that nothing is lost on
+the way.
+
+Servers of two versions understand each other, while one after the other is replaced. The number of a greeting is the
+version of its sender's frames, and a worker has that for the number of its answer. One that does not know this sends 0,
+gets no goodbye, and takes the end of the connection for that of the worker. Frames of an unknown kind are passed over.
 """
 
 import asyncio
@@ -19,6 +28,8 @@ LENGTHS = Struct("<HH")
 
 # A larger request goes through gRPC, so that it does not keep others waiting.
 MOST_BYTES = 2**18
+# The version of the frames: of those with a goodbye.
+VERSION = 1
 
 
 class Kind(IntEnum):
@@ -29,6 +40,10 @@ class Kind(IntEnum):
     ANSWER = 2
     REFUSAL = 3
     GREETING = 4
+    GOODBYE = 5
+
+
+KINDS = {each.value: each for each in Kind}
 
 
 class Frames(asyncio.Protocol):
@@ -86,7 +101,8 @@ class Frames(asyncio.Protocol):
                 if rest + length > size:
                     break
                 begin = rest + length
-                self.received(number, Kind(kind), bytes(unread[rest:begin]))
+                if kind in KINDS:
+                    self.received(number, KINDS[kind], bytes(unread[rest:begin]))
         del self._unread[:begin]
 
     def _flush(self) -> None:

@@ -17,7 +17,7 @@ from dynhull_server.rpc.status import ANSWERED, HullsApartError, RelayedError, W
 
 from .callers import metadata_of
 from .relay import Relay
-from .worker_link import WorkerLink
+from .worker_link import Patience, WorkerLink
 
 if TYPE_CHECKING:
     from .upstream import Upstream
@@ -150,7 +150,7 @@ class _WorkerAnswers:
         self._answers: deque[pb.ReadAnswer] = deque()
         self._stream: Upstream | None = None
         self._failure: RelayedError | WorkerAwayError | None = None
-        self._until: float | None = None  # when waiting for another worker is in vain
+        self._patience = Patience()
         self._connect()
 
     def _connect(self) -> None:
@@ -178,12 +178,12 @@ class _WorkerAnswers:
                 await self._read()
                 continue
             try:
-                self._until = await self._link.again(QUERY, b"", self._failure, self._until)
+                await self._link.again(QUERY, b"", self._failure, self._patience)
+                await self._link.arrive(self._patience)
             except (RelayedError, WorkerAwayError) as error:
                 answer = pb.ReadAnswer()
                 answer.error.MergeFromString(error_status(error).SerializeToString())
                 return answer
-            await self._link.arrive()
             async with self._writing:
                 self._connect()
                 if self._stream is not None and self._unanswered:
@@ -202,7 +202,7 @@ class _WorkerAnswers:
         else:
             assert response is not None  # it reads for as long as it is sent reads
             self._answers.extend(pb.QueryResponse.FromString(response).answers)
-            self._until = None
+            self._patience = Patience()
 
     def close(self) -> None:
         """End the call."""

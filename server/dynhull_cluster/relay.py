@@ -13,7 +13,7 @@ from dynhull_server.state.errors import LimitExceededError
 from .callers import metadata_of
 from .placement import worker_of
 from .upstream import Upstream, one_request
-from .worker_link import WorkerLink
+from .worker_link import Patience, WorkerLink
 
 Route = Callable[[bytes, Call], WorkerLink]
 
@@ -76,8 +76,6 @@ class Relay:
         """Pass on the responses of a worker to a request, until the last; `sending` is around the sending of each."""
 
         async def pass_on() -> None:
-            with call.cutoff():
-                await link.arrive()
             async with one_request(link.stream(method, metadata_of(call)), message, call.cutoff()) as upstream:
                 while True:
                     with call.cutoff():
@@ -101,7 +99,7 @@ class Relay:
             # Without any request, every worker refuses the call with the same words.
             link = self.links[0] if first is None else self.route(first, call)
             with call.cutoff():
-                await link.arrive()
+                await link.arrive(Patience())
             upstream = link.stream(method, metadata_of(call))
             feeding = asyncio.create_task(self._feed(call, first, upstream))
             try:

@@ -65,8 +65,6 @@ class SharedFences:
     ) -> None:
         """Pass on a watch of the caller's own and the feed by turns, until the watch ends."""
         feed: FenceFeed | None = None
-        with call.cutoff():
-            await link.arrive()
         while True:
             found = await self._catch_up(call, link, request, feed, joined, sending)
             if found is None:

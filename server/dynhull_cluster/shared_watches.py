@@ -75,8 +75,6 @@ class SharedWatches:
         joined: ExitStack,
     ) -> "tuple[Feed, Held] | None":
         """Pass on a watch of the caller's own, until what the caller holds is known; None if it ends before."""
-        with call.cutoff():
-            await link.arrive()
         revision = request.resume.revision
         # Otherwise the first event has to come before the next one of the feed, or after it, or names all vertices.
         may_join = not (request.min_revision > revision or request.max_events_per_second or request.include_keys)

@@ -33,6 +33,7 @@ class Upstream:
     def __init__(self, call: "grpc.aio.StreamStreamCall[bytes, bytes]") -> None:
         self._call = call
         self._severed = False
+        self._ended = asyncio.Event()
         self._waiting: set[asyncio.Task[Any]] = set()
         self._interrupted: set[asyncio.Task[Any]] = set()
         self._responses = aiter(call)
@@ -71,6 +72,10 @@ class Upstream:
         """Whether the call has ended, though responses may be left to read."""
         return bool(self._call.done())
 
+    async def ended(self) -> None:
+        """Wait until it has ended."""
+        await self._ended.wait()
+
     def sever(self) -> None:
         """End the call as one whose connection was lost: nobody will answer it."""
         self._severed = True
@@ -102,6 +107,7 @@ class Upstream:
 
     def _note(self, call: Any) -> None:
         """Keep the status that the call has now."""
+        self._ended.set()
         code, details, metadata = (_now(each) for each in (call.code(), call.details(), call.trailing_metadata()))
         status = _details(code, details, metadata)
         if status is None and code not in BROKEN:

@@ -76,8 +76,13 @@ class PrivateEntrance:
         await self._frames.listen(self._sockets.frames(self._number))
         return address
 
+    def say_goodbye(self) -> None:
+        """Have gateways and other workers go to the next process."""
+        if self._frames is not None:
+            self._frames.say_goodbye()
+
     async def close(self) -> None:
         """Close the socket for frames, and the connections."""
-        self._peers.close()
         if self._frames is not None:
             await self._frames.close()
+        self._peers.close()

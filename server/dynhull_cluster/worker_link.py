@@ -3,22 +3,22 @@
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from contextlib import nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import partial
 from typing import Any, TypeVar
 from weakref import WeakSet
 
 import grpc
-from google.rpc.status_pb2 import Status
 from grpc_health.v1 import health_pb2
 
 from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 
-from .again import may_repeat
+from .again import READS, may_repeat
+from .asking_frames import AskingFrames
 from .callers import Metadata, metadata_of
-from .frames import MOST_BYTES, Frames, Kind, pack_request
-from .upstream import LATE_SECONDS, Upstream, lost_status, one_request
+from .frames import MOST_BYTES
+from .upstream import LATE_SECONDS, Upstream, one_request
 from .ways import PATIENCE, Ways
 
 # Seconds until a worker that is away is looked for again.
@@ -51,7 +51,7 @@ class WorkerLink:
         self._ways = ways
         self._changed = changed
         self._connection: Connection | None = None
-        self._leaving: set[asyncio.Task[None]] = set()
+        self._leaving: dict[asyncio.Task[None], AskingFrames] = {}
         self._closed = asyncio.Event()
         self._arrived = asyncio.Event()
         self._elsewhere = asyncio.Event()
@@ -67,10 +67,9 @@ class WorkerLink:
         """Connect, and connect again whenever the worker has ended."""
         loop = asyncio.get_running_loop()
         while True:
-            lost: asyncio.Future[None] = loop.create_future()
             self._elsewhere.clear()
             try:
-                frames = await self._ways.connect(self.number, partial(AskingFrames, lost))
+                frames = await self._ways.connect(self.number, AskingFrames)
             except OSError:
                 await _until(self._elsewhere)
                 continue
@@ -83,32 +82,30 @@ class WorkerLink:
                     self._again.set()
                     self._again = asyncio.Event()
                     self._changed()
-                    await lost
+                    await frames.left
                     for each in watches:
                         each.cancel()
             finally:
                 self._connection = None
                 self._arrived.clear()
                 self.health = dict.fromkeys(self.health, UNKNOWN)
-                frames.close()
-                leaving = loop.create_task(connection.end(self._closed))
-                self._leaving.add(leaving)
-                leaving.add_done_callback(self._leaving.discard)
+                leaving = loop.create_task(connection.leave(self._closed))
+                self._leaving[leaving] = frames
+                leaving.add_done_callback(self._leaving.pop)
                 self._changed()
 
     async def close(self) -> None:
         """End what is left of former connections, after `run`."""
         self._closed.set()
+        for frames in self._leaving.values():
+            frames.gone.set()
         await asyncio.gather(*self._leaving)
 
-    async def arrive(self) -> None:
-        """Wait for a worker that is away, but not for ever; `stream` says if that was in vain."""
+    async def arrive(self, patience: "Patience") -> None:
+        """Wait for a worker that is away, but not for ever. Raises WorkerAwayError if that was in vain."""
         if self._connection is None:
-            try:
-                async with asyncio.timeout(PATIENCE):
-                    await self._arrived.wait()
-            except TimeoutError:
-                return
+            await patience.wait(self._arrived)
+        self._present()
 
     async def ask(self, method: str, call: Call, message: bytes) -> bytes:
         """The response of the worker to a request.
@@ -119,46 +116,50 @@ class WorkerLink:
             WorkerAwayError: the worker is away; it has not seen the request.
             RelayedError: the worker refuses it, or has ended meanwhile.
         """
-        return await self._repeat(method, message, partial(self._ask, method, call, message), lambda: False)
+        return await self._repeat(
+            method, message, partial(self._ask, method, call, message), lambda: False, nullcontext
+        )
 
     async def answer(self, method: str, call: Call, message: bytes, work: Callable[[], Awaitable[T]]) -> T:
         """Do the work of a call with many responses; again, as `ask` does, as long as its caller has none of them."""
-        return await self._repeat(method, message, work, lambda: call.begun)
+        return await self._repeat(method, message, work, lambda: call.begun, call.cutoff)
 
     async def _repeat(
-        self, method: str, message: bytes, work: Callable[[], Awaitable[T]], begun: Callable[[], bool]
+        self,
+        method: str,
+        message: bytes,
+        work: Callable[[], Awaitable[T]],
+        begun: Callable[[], bool],
+        waiting: Callable[[], AbstractContextManager[None]],
     ) -> T:
-        until: float | None = None
+        patience = Patience()
         while True:
             try:
+                with waiting():
+                    await self.arrive(patience)
                 return await work()
             except (WorkerAwayError, RelayedError) as error:
                 if begun():
                     raise
-                until = await self.again(method, message, error, until)
+                await self.again(method, message, error, patience)
 
     async def again(
-        self, method: str, message: bytes, error: WorkerAwayError | RelayedError, until: float | None
-    ) -> float:
+        self, method: str, message: bytes, error: WorkerAwayError | RelayedError, patience: "Patience"
+    ) -> None:
         """Wait until a request that has failed may succeed; raises its error if that is in vain or not allowed.
 
         Args:
             method: the path of the method.
             message: the request.
             error: the error.
-            until: what this returned for the error before it, None for the first: when it is in vain.
+            patience: that of the request.
         """
-        now = asyncio.get_running_loop().time()
-        if until is None:
-            until = now + PATIENCE
         repeatable = isinstance(error, WorkerAwayError) or may_repeat(method, message, error.status)
-        if now > until or not repeatable:
+        if patience.over or not repeatable:
             raise error
-        await _until(self._again)
-        return until
+        await patience.wait(self._again, LOOK_SECONDS)
 
     async def _ask(self, method: str, call: Call, message: bytes) -> bytes:
-        await self.arrive()
         frames = self._present().frames
         if len(message) <= MOST_BYTES:
             while not frames.writable.is_set():  # what a worker that does not read has not got is its caller's alone
@@ -188,7 +189,9 @@ class WorkerLink:
         """Connect again: the worker is elsewhere."""
         self._elsewhere.set()
         if self._connection is not None:
-            self._connection.frames.abort()
+            self._connection.frames.replaced()
+        for frames in self._leaving.values():
+            frames.replaced()
 
     async def _watch(self, connection: "Connection", service: str) -> None:
         """Follow one health service of the worker."""
@@ -207,6 +210,24 @@ class WorkerLink:
             finally:
                 responses.cancel()
             await asyncio.sleep(LOOK_SECONDS)
+
+
+class Patience:
+    """The time that one call waits for workers that are away: PATIENCE, however often they are."""
+
+    def __init__(self) -> None:
+        self._left = PATIENCE
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing of it is left."""
+        return self._left <= 0
+
+    async def wait(self, event: asyncio.Event, seconds: float = PATIENCE) -> None:
+        """Wait for an event, for so many seconds at most."""
+        begun = asyncio.get_running_loop().time()
+        await _until(event, min(seconds, self._left))
+        self._left -= asyncio.get_running_loop().time() - begun
 
 
 async def _until(event: asyncio.Event, seconds: float = LOOK_SECONDS) -> None:
@@ -230,86 +251,32 @@ class Connection:
         self.frames = frames
         self.channel = channel
         self._upstreams: WeakSet[Upstream] = WeakSet()
+        self._writes: WeakSet[Upstream] = WeakSet()  # of them, those that cannot be repeated
 
     def stream(self, method: str, metadata: Metadata) -> Upstream:
         """A call of the worker."""
         upstream = Upstream(self.channel.stream_stream(method)(metadata=metadata, wait_for_ready=True))
         self._upstreams.add(upstream)
+        if method not in READS:
+            self._writes.add(upstream)
         return upstream
 
-    async def end(self, at_once: asyncio.Event) -> None:
-        """End the calls: they have a moment for what has arrived, or end `at_once`, then without an answer."""
+    async def leave(self, at_once: asyncio.Event) -> None:
+        """Have the worker complete what it has begun. Once it is gone, the calls have a moment for what has arrived.
+
+        They end `at_once` if that is set, then without an answer.
+        """
+        finishing = asyncio.create_task(self._finish())
+        await self.frames.gone.wait()
         await _until(at_once, LATE_SECONDS)
+        finishing.cancel()
+        self.frames.abort()
         for each in list(self._upstreams):
             each.sever()
         await self.channel.close()
 
-
-class AskingFrames(Frames):
-    """The calls in progress.
-
-    Args:
-        lost: set when the connection is lost.
-
-    Attributes:
-        writable: set while the worker takes what is sent, and when the connection is lost.
-    """
-
-    def __init__(self, lost: "asyncio.Future[None]") -> None:
-        super().__init__()
-        self.writable = asyncio.Event()
-        self.writable.set()
-        self._lost = lost
-        self._last = 0
-        self._waiting: dict[int, asyncio.Future[bytes]] = {}
-
-    async def greet(self, greeting: bytes) -> None:
-        """Prove to be a gateway. Raises RelayedError if the other end does not accept that."""
-        answer = self._waiting[0] = self._loop.create_future()
-        self.send(0, Kind.GREETING, greeting)
-        try:
-            await answer
-        finally:
-            del self._waiting[0]
-
-    async def ask(self, method: str, caller: bytes, message: bytes) -> bytes:
-        """The answer to a request. Raises RelayedError if it is refused, or the connection is lost."""
-        self._last = number = (self._last + 1) % 2**32
-        answer: asyncio.Future[bytes] = self._loop.create_future()
-        self._waiting[number] = answer
-        self.send(number, Kind.REQUEST, *pack_request(method.encode(), caller, message))
-        try:
-            return await answer
-        except asyncio.CancelledError:
-            self.send(number, Kind.CANCEL)
-            raise
-        finally:
-            self._waiting.pop(number, None)
-
-    def received(self, number: int, kind: Kind, rest: bytes) -> None:
-        """Resume the caller."""
-        answer = self._waiting.get(number)
-        if answer is None or answer.done():
-            return
-        if kind is Kind.ANSWER:
-            answer.set_result(rest)
-        else:
-            answer.set_exception(RelayedError(Status.FromString(rest)))
-
-    def pause_writing(self) -> None:
-        """The worker has not read for a while."""
-        self.writable.clear()
-
-    def resume_writing(self) -> None:
-        """It has read on."""
-        self.writable.set()
-
-    def connection_lost(self, error: Exception | None) -> None:
-        """Refuse what waits."""
-        super().connection_lost(error)
-        self.writable.set()
-        for answer in self._waiting.values():
-            if not answer.done():
-                answer.set_exception(RelayedError(lost_status()))
-        if not self._lost.done():
-            self._lost.set_result(None)
+    async def _finish(self) -> None:
+        """Say that nothing is left to ask, once the worker has ended what cannot be repeated."""
+        for each in list(self._writes):
+            await each.ended()
+        self.frames.leave()

@@ -215,9 +215,10 @@ class Server:
             log.info("draining")
         self._health.stop()
         await self._supervisor.stop()
+        self._entrance.say_goodbye()
         await self._calls.drain(self._settings.grace)
-        await self._server.stop(last_statuses)
         await self._entrance.close()
+        await self._server.stop(last_statuses)
         self._stop_metrics()
         await self._engine.close()
         if served:

@@ -52,8 +52,11 @@ class Entrance(Protocol):
             OSError: it cannot listen there.
         """
 
+    def say_goodbye(self) -> None:
+        """Take no more requests beside those of the server, which refuses its own from now on."""
+
     async def close(self) -> None:
-        """Close what `listen` has opened beside the server, after the last call."""
+        """Close what `listen` has opened beside the server, after the last call, and before the server stops."""
 
 
 class PublicEntrance:
@@ -88,6 +91,9 @@ class PublicEntrance:
             server.add_insecure_port(address) if credentials is None else server.add_secure_port(address, credentials)
         )
         return f"{settings.host}:{port}"
+
+    def say_goodbye(self) -> None:
+        """Nothing beside the server is open."""
 
     async def close(self) -> None:
         """Nothing beside the server is open."""

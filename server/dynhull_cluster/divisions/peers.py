@@ -8,8 +8,8 @@ import grpc
 
 from dynhull_server.rpc.status import RelayedError
 
+from ..asking_frames import AskingFrames
 from ..ways import Ways
-from ..worker_link import AskingFrames
 
 SERVICE, METHOD = "dynhull.Shards", "Send"
 PATH = f"/{SERVICE}/{METHOD}"
@@ -49,14 +49,19 @@ class Peers:
         connecting = self._connections.get(worker)
         if connecting is None:
             self._ways.when_moved(worker, partial(self._leave, worker))
-            loop = asyncio.get_running_loop()
-            lost: asyncio.Future[None] = loop.create_future()
-            connecting = loop.create_task(self._ways.connect(worker, partial(AskingFrames, lost)))
+            connecting = asyncio.create_task(self._ways.connect(worker, AskingFrames))
             self._connections[worker] = connecting
-            ended = partial(self._forget, worker, connecting)
-            lost.add_done_callback(ended)
-            connecting.add_done_callback(lambda done: ended(done) if _failed(done) else None)
+            connecting.add_done_callback(partial(self._follow, worker))
         return await asyncio.shield(connecting)
+
+    def _follow(self, worker: int, connected: "asyncio.Future[AskingFrames]") -> None:
+        """Forget a connection that has failed, or once the worker takes nothing more."""
+        if _failed(connected):
+            self._forget(worker, connected)
+        else:
+            frames = connected.result()
+            frames.left.add_done_callback(partial(self._forget, worker, connected))
+            frames.left.add_done_callback(lambda _: frames.leave())
 
     def _leave(self, worker: int) -> None:
         """End the connection: the worker is elsewhere, and who was it before may not answer any more."""
@@ -64,7 +69,7 @@ class Peers:
         if connected is not None and connected.done() and not _failed(connected):
             connected.result().abort()
 
-    def _forget(self, worker: int, which: "asyncio.Future[AskingFrames]", _: object) -> None:
+    def _forget(self, worker: int, which: "asyncio.Future[AskingFrames]", _: object = None) -> None:
         if self._connections.get(worker) is which:
             del self._connections[worker]
 

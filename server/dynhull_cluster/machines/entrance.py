@@ -112,6 +112,11 @@ class PartitionEntrance:
         self.address = f"{host} {port} {bound.getsockname()[1]}"
         return self.address
 
+    def say_goodbye(self) -> None:
+        """Have gateways and other workers go to the next owner."""
+        if self._frames is not None:
+            self._frames.say_goodbye()
+
     async def close(self) -> None:
         """Close the port for frames."""
         if self._frames is not None:
