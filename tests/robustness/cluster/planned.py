@@ -1,0 +1,216 @@
+"""Changes of a cluster that an operator plans, one after the other, beside callers who must notice none of them.
+
+    python tests/robustness/cluster/planned.py --changes 300 --seed 1
+
+Real servers share a real PostgreSQL. Partitions are moved by hand, machines join and leave, workers give up what they
+have, and all processes of a machine are restarted one at a time. Callers of every kind (steady_callers.py) call a
+machine that stays, without sending anything again themselves. In the end there is a table, and no error.
+"""
+
+import argparse
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[2] / "support"))
+from forked import COMMAND, Process
+from patience import PATIENCE, wait_until
+from postgresql import PostgreSQL, postgresql, query
+from server_process import run
+from steady_callers import KINDS, Caller
+
+PARTITIONS = 4
+MOST_MACHINES = 3
+OPTIONS = ("--cluster", "--partitions", str(PARTITIONS), "--scrub-cpu", "0", "--log-level", "info")
+SERVED = "SELECT worker FROM owners WHERE until > '-infinity' AND address <> '' ORDER BY partition"
+RESTARTED = "all processes are restarted"
+COMPLAINTS = "warning", "error"
+# What is changed, and how often in relation to the others.
+CHANGES = {"move": 6, "join": 2, "leave": 2, "drain": 1, "restart": 1}
+
+
+class Machine:
+    """A server of the cluster, and what it logs."""
+
+    def __init__(self, url: str, *options: str) -> None:
+        self._log = tempfile.NamedTemporaryFile("w+")  # noqa: SIM115  # it is closed in `stop`
+        command = [COMMAND, "serve", "--port", "0", "--journal", url, *OPTIONS, *options]
+        self.process = Process(command, stdout=subprocess.PIPE, stderr=self._log, text=True)
+        self.address = self.process.stdout.readline().split()[-1]
+        self.drained = False
+
+    def said(self) -> str:
+        """Its log so far."""
+        return Path(self._log.name).read_text()
+
+    def complaints(self) -> list[str]:
+        """What it logs of errors and warnings."""
+        return [line for line in self.said().splitlines() if any(each in line for each in COMPLAINTS)]
+
+    def stop(self) -> None:
+        """End it as systemd does, which is planned: its partitions move first."""
+        self.process.terminate()
+        assert self.process.wait(PATIENCE) == 0, self.said()[-2_000:]
+        self.process.stdout.close()
+
+
+class Planned:
+    """A cluster, its callers, and the changes."""
+
+    def __init__(self, url: str, seed: int, kinds: Sequence[type[Caller]]) -> None:
+        self._url = url
+        self._random = random.Random(seed)
+        self._all: list[Machine] = []
+        self.machines = [self._started("--gateways", "2"), self._started()]
+        self.counts: Counter[str] = Counter()
+        self._settle()
+        self.callers = [kind(self.machines[0].address) for kind in kinds]
+        for caller in self.callers:
+            caller.begin()
+
+    def _started(self, *options: str) -> Machine:
+        machine = Machine(self._url, *options)
+        self._all.append(machine)
+        return machine
+
+    def change(self) -> None:
+        """One change, to its end."""
+        able = {"move": len(self._able()) > 1, "join": len(self.machines) < MOST_MACHINES}
+        able |= {"leave": len(self.machines) > 2, "drain": len(self._able()) > 2, "restart": len(self._able()) > 1}
+        weights = [CHANGES[each] * able[each] for each in CHANGES]
+        kind = self._random.choices(list(CHANGES), weights)[0]
+        begun = time.monotonic()
+        getattr(self, f"_{kind}")()
+        self.counts[kind] += 1
+        print(f"{self.counts.total()}: {kind}, {time.monotonic() - begun:.1f} s", file=sys.stderr)
+
+    def _able(self) -> list[Machine]:
+        """The machines that can have partitions."""
+        return [each for each in self.machines if not each.drained]
+
+    def _owners(self) -> list[str]:
+        return [worker for (worker,) in query(self._url, SERVED)]
+
+    def _settle(self) -> None:
+        """Wait until every partition is served, and every machine has its share."""
+
+        def is_settled() -> bool:
+            owners = self._owners()
+            return len(owners) == PARTITIONS and all(self._has(owners, each) for each in self._able())
+
+        wait_until(is_settled)
+
+    def _has(self, owners: Sequence[str], machine: Machine) -> bool:
+        return any(f"-{machine.process.pid}-" in each for each in owners)
+
+    def _command(self, *words: str) -> None:
+        done = run("cluster", *words, "--journal", self._url)
+        assert done.returncode == 0, done.stderr
+
+    def _worker(self, machine: Machine) -> str:
+        workers = [worker for (worker,) in query(self._url, "SELECT worker FROM workers")]
+        return next(each for each in workers if f"-{machine.process.pid}-" in each)
+
+    def _move(self) -> None:
+        partition = self._random.randrange(PARTITIONS)
+        owner = self._owners()[partition]
+        to = self._random.choice([each for each in self._able() if f"-{each.process.pid}-" not in owner])
+        worker = self._worker(to)
+        self._command("move", str(partition), worker)
+        wait_until(lambda: len(owners := self._owners()) == PARTITIONS and owners[partition] == worker)
+        self._command("move", str(partition), "anywhere")
+        self._settle()
+
+    def _join(self) -> None:
+        self.machines.append(self._started())
+        self._settle()
+
+    def _leave(self) -> None:
+        drained = [each for each in self.machines[1:] if each.drained]
+        machine = drained[0] if drained else self._random.choice(self.machines[1:])
+        self.machines.remove(machine)
+        machine.stop()
+        self._settle()
+
+    def _drain(self) -> None:
+        machine = self._random.choice([each for each in self._able() if each is not self.machines[0]])
+        machine.drained = True
+        self._command("drain", self._worker(machine))
+        wait_until(lambda: len(owners := self._owners()) == PARTITIONS and not self._has(owners, machine))
+        self._settle()
+
+    def _restart(self) -> None:
+        """All processes of the machine that everybody calls, or of another one."""
+        machine = self._random.choice(self._able())
+        before = machine.said().count(RESTARTED)
+        machine.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: machine.said().count(RESTARTED) > before)
+        self._settle()
+
+    def finish(self) -> list[str]:
+        """End the callers. Returns what went wrong."""
+        errors = []
+        for caller in self.callers:
+            print(f"{type(caller).__name__}: {caller.errors}", file=sys.stderr)
+            caller.finish()
+            errors += [f"{type(caller).__name__}, {each}" for each in caller.errors]
+        errors += [line for machine in self._all for line in machine.complaints()]
+        while self.machines:
+            self.machines[-1].stop()
+            self.machines.pop()
+        return errors
+
+    def kill(self) -> None:
+        """End what is left, without a plan."""
+        for machine in self.machines:
+            machine.process.kill()
+
+    def table(self) -> str:
+        """What has been done."""
+        rows = [f"{kind:<22}{count:>9,}" for kind, count in sorted(self.counts.items())]
+        rows += ["", f"{'calls':<22}{'answered':>9}{'errors':>8}{'longest, s':>12}"]
+        rows += [
+            f"{type(each).__name__:<22}{each.calls:>9,}{len(each.errors):>8}{each.longest:>12.2f}"
+            for each in self.callers
+        ]
+        return "\n".join([f"{'changes':<22}{self.counts.total():>9,}", *rows])
+
+
+def torture(
+    database: PostgreSQL, changes: int, seed: int, kinds: Sequence[type[Caller]] = KINDS
+) -> tuple[str, list[str]]:
+    """Make so many changes. Returns the table, and what went wrong."""
+    planned = Planned(database.new_database(), seed, kinds)
+    try:
+        while planned.counts.total() < changes and not any(each.errors for each in planned.callers):
+            planned.change()
+        errors = planned.finish()
+    finally:
+        planned.kill()
+    return planned.table(), errors
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Change a cluster as planned while callers go on.")
+    parser.add_argument("--changes", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    begun = time.monotonic()
+    with ExitStack() as stack:
+        database = stack.enter_context(postgresql())
+        table, errors = torture(database, options.changes, options.seed)
+    print(f"seed {options.seed}, {time.monotonic() - begun:.0f} s\n{table}")
+    for each in errors:
+        print(each)
+    sys.exit(bool(errors))
+
+
+if __name__ == "__main__":
+    main()
