@@ -229,6 +229,26 @@ def test_the_batches_are_those_that_the_owner_has_committed(url):
     heir.close()
 
 
+def test_a_fence_that_has_come_and_gone_meanwhile_is_not_written_over(url):
+    """Its rows may be there, though there is no fence: those of the next one get other numbers."""
+    owner = on(url)
+    owner.open(no_progress)
+    owner.commit([Create(HullRow(1, "fleet", "u", 1.5))])
+    heir = on(url)
+    heir.follow(no_progress)
+    owner.commit([AddFence(fence_row(2, "first"), Inside()), appended(2, events(1, 3))])
+    owner.commit([DropFence(2)])
+    heir.follow(no_progress)
+    owner.close()
+    heir.open(no_progress)
+    heir.commit([AddFence(fence_row(3, "second"), Inside()), appended(3, events(1, 2))])
+    heir.close()
+    again = on(url)
+    assert [row.name for row in again.open(no_progress).fences] == ["second"]
+    assert len(again.read_events(3, 0, 9)) == 2
+    again.close()
+
+
 def test_nothing_is_taken_from_an_owner_by_following_it(url):
     owner = on(url)
     owner.open(no_progress)

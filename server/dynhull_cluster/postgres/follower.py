@@ -113,9 +113,7 @@ class Follower:
             self._drop_superfluous()
         if self._hulls.batches > totals.batches:
             self._drop_ends()
-        fences = FoundFences()
-        if totals.fence_rows or self.ledger.fences:
-            fences = self._examine_fences()
+        fences = self._examine_fences()  # also where there are none: those deleted meanwhile may have left rows
         there = self._hulls.plus(0, 0, fences.sum, fences.rows)
         if (there.hulls, there.batches, there.sum, there.fence_rows) != (
             totals.hulls,

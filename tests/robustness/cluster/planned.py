@@ -96,16 +96,19 @@ class Planned:
         return [each for each in self.machines if not each.drained]
 
     def _owners(self) -> list[str]:
-        return [worker for (worker,) in query(self._url, SERVED)]
+        """The workers that serve the partitions, once all are served."""
+        owners: list[str] = []
+
+        def all_are_served() -> bool:
+            owners[:] = [worker for (worker,) in query(self._url, SERVED)]
+            return len(owners) == PARTITIONS
+
+        wait_until(all_are_served)
+        return owners
 
     def _settle(self) -> None:
-        """Wait until every partition is served, and every machine has its share."""
-
-        def is_settled() -> bool:
-            owners = self._owners()
-            return len(owners) == PARTITIONS and all(self._has(owners, each) for each in self._able())
-
-        wait_until(is_settled)
+        """Wait until every machine has its share."""
+        wait_until(lambda: all(self._has(owners, each) for owners in [self._owners()] for each in self._able()))
 
     def _has(self, owners: Sequence[str], machine: Machine) -> bool:
         return any(f"-{machine.process.pid}-" in each for each in owners)
@@ -124,7 +127,7 @@ class Planned:
         to = self._random.choice([each for each in self._able() if f"-{each.process.pid}-" not in owner])
         worker = self._worker(to)
         self._command("move", str(partition), worker)
-        wait_until(lambda: len(owners := self._owners()) == PARTITIONS and owners[partition] == worker)
+        wait_until(lambda: self._owners()[partition] == worker)
         self._command("move", str(partition), "anywhere")
         self._settle()
 
@@ -143,7 +146,7 @@ class Planned:
         machine = self._random.choice([each for each in self._able() if each is not self.machines[0]])
         machine.drained = True
         self._command("drain", self._worker(machine))
-        wait_until(lambda: len(owners := self._owners()) == PARTITIONS and not self._has(owners, machine))
+        wait_until(lambda: not self._has(self._owners(), machine))
         self._settle()
 
     def _restart(self) -> None:
