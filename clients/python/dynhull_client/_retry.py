@@ -14,6 +14,8 @@ FIRST_PAUSE = 0.1
 LONGEST_PAUSE = 5.0
 # A hull that is awaited is asked for this often: a missing hull costs the server little.
 LONGEST_PAUSE_FOR_A_HULL = 1.0
+# Refusals of a server that has not begun to do what was asked, as it starts or stops.
+NOT_BEGUN = {"STARTING", "DRAINING"}
 
 Answer = TypeVar("Answer")
 
@@ -50,7 +52,8 @@ class Attempts:
         self._timeout = timeout
         self._deadline = None if timeout is None else monotonic() + timeout
         self._pauses = pauses(LONGEST_PAUSE_FOR_A_HULL if call.awaits_hull else LONGEST_PAUSE)
-        self._left = retries if call.repeatable else 0
+        self._left = retries
+        self._repeatable = call.repeatable
 
     def timeout(self) -> float | None:
         """Seconds left."""
@@ -69,7 +72,8 @@ class Attempts:
                 raise DeadlineError(message, grpc.StatusCode.DEADLINE_EXCEEDED, "", {}) from error
             return call, pause
         self._left -= 1
-        if self._left < 0 or late or not passes(error):
+        safe = self._repeatable or error.reason in NOT_BEGUN
+        if self._left < 0 or late or not passes(error) or not safe:
             raise self._explained(call, error) from None
         return call, pause
 
