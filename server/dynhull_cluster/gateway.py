@@ -126,8 +126,11 @@ class Gateway:
         if served:  # one that could not start has its error to say, and nothing else
             log.info("draining")
         self._health.stop()
+        # At once, so that callers connect to another gateway, and not when the last call has ended.
+        stopping = asyncio.create_task(self._server.stop(self._settings.grace + LAST_STATUSES))
         await self._calls.drain(self._settings.grace)
         await self._server.stop(LAST_STATUSES)
+        await stopping
         await self._supervisor.stop()
         for link in self._links:
             await link.close()

@@ -209,9 +209,11 @@ CODES: Mapping[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.Sta
 
 # What gRPC's asyncio says of a call that ended while a message was sent; the status that it ended with is lost.
 ENDED_IN_A_WRITE = "Internal error from Core"
-# What gRPC says of a call that this process has cancelled. Servers that stop cancel those that they have not begun
-# (github.com/grpc/grpc/issues/41785).
+# What gRPC says of a call that this process has cancelled.
 CANCELLED_HERE = "Locally cancelled by application!", "Channel closed!"
+# What servers that stop say of calls that they have not begun (github.com/grpc/grpc/issues/41785). Of those that they
+# have begun, and do not complete in time, they say that all calls are cancelled, with the code UNAVAILABLE.
+CANCELLED_UNBEGUN = "CANCELLED"
 
 
 def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
@@ -221,7 +223,8 @@ def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
         return UnavailableError("the connection was lost while a message was sent", grpc.StatusCode.INTERNAL, "", {})
     status = rpc_status.from_call(call)
     if status is None and call.code() == grpc.StatusCode.CANCELLED and call.details() not in CANCELLED_HERE:
-        return UnavailableError("the server ended the call, as one that stops", grpc.StatusCode.UNAVAILABLE, "", {})
+        reason = "DRAINING" if call.details() == CANCELLED_UNBEGUN else ""
+        return UnavailableError("the server ended the call, as one that stops", grpc.StatusCode.UNAVAILABLE, reason, {})
     return _error(call.code(), call.details(), () if status is None else status.details)
 
 
