@@ -152,6 +152,7 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100 --workers
 	$(BIN)/python tests/robustness/cluster/machines_torture.py --faults 100
+	$(BIN)/python tests/robustness/cluster/planned.py --changes 300
 
 cluster: .venv/.test  ## all tests of several processes and machines; `make test` runs the cheaper ones
 	CLUSTER_CASES=all $(BIN)/pytest tests/cluster -n 4

@@ -1,28 +1,45 @@
 """A server that stops: gRPC cancels the calls that have arrived, and that the server has not begun."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent import futures
 
 import grpc
 import numpy as np
 import pytest
+from grpc_status.rpc_status import to_status
 
 from dynhull_client import HullClient, UnavailableError
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.batch_pb2 import BatchResult
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceServicer, add_HullServiceServicer_to_server
 from dynhull_proto.v1.points_pb2 import Points
+from dynhull_server.rpc.status import DrainingError, StartingError, error_status
+
+Ending = Callable[[grpc.ServicerContext], None]
+
+NOT_BEGUN: dict[str, Ending] = {
+    "gRPC": lambda context: context.abort(grpc.StatusCode.CANCELLED, "CANCELLED"),
+    "draining": lambda context: context.abort_with_status(to_status(error_status(DrainingError()))),
+    "starting": lambda context: context.abort_with_status(to_status(error_status(StartingError()))),
+}
+
+
+def begun(context: grpc.ServicerContext) -> None:
+    """What gRPC says of a call that the server has begun, and does not complete in time."""
+    context.abort(grpc.StatusCode.UNAVAILABLE, "Cancelling all calls")
 
 
 class Stopping(HullServiceServicer):
-    """Ends each second call without a word.
+    """Ends each second call.
 
     Attributes:
+        end: how.
         applied: the numbers of the batches that it was sent in streams.
         stopped: how many calls it has ended.
     """
 
     def __init__(self) -> None:
+        self.end = NOT_BEGUN["gRPC"]
         self.applied: list[int] = []
         self.stopped = 0
         self._calls = self._watches = 0
@@ -31,7 +48,7 @@ class Stopping(HullServiceServicer):
         self._calls += 1
         if self._calls % 2:
             self.stopped += 1
-            context.abort(grpc.StatusCode.CANCELLED, "CANCELLED")
+            self.end(context)
 
     def GetHull(self, _: pb.GetHullRequest, context: grpc.ServicerContext) -> pb.GetHullResponse:  # noqa: N802
         self._may_stop(context)
@@ -72,13 +89,28 @@ def stopping() -> Iterator[tuple[Stopping, str]]:
     server.stop(None).wait()
 
 
-def test_reads_are_repeated_and_batches_without_a_number_are_not(
+@pytest.mark.parametrize("end", NOT_BEGUN.values(), ids=NOT_BEGUN)
+def test_calls_that_the_server_has_not_begun_are_repeated_whatever_they_are(
+    stopping: tuple[Stopping, str], connect: type[HullClient], end: Ending
+) -> None:
+    servicer, address = stopping
+    servicer.end = end
+    with connect(address) as client:
+        client.get_hull("fleet")
+        client.apply("fleet", insert=[[1, 2]])
+    assert servicer.stopped == 2
+    with connect(address, retries=0) as client, pytest.raises(UnavailableError):
+        client.apply("fleet", insert=[[1, 2]])
+
+
+def test_of_those_that_it_may_have_begun_batches_without_a_number_are_not(
     stopping: tuple[Stopping, str], connect: type[HullClient]
 ) -> None:
     servicer, address = stopping
+    servicer.end = begun
     with connect(address) as client:
         client.get_hull("fleet")
-        with pytest.raises(UnavailableError, match="the server ended the call"):
+        with pytest.raises(UnavailableError, match="Cancelling all calls"):
             client.apply("fleet", insert=[[1, 2]])
     assert servicer.stopped == 2
 

@@ -21,6 +21,7 @@ from one_gateway import entries
 from patience import wait_until
 from postgresql import PostgreSQL, query
 from server_process import Server, server_process
+from steady_callers import Consumes, Creates, Large, Pipes, Plain, PlainOverShards
 from steady_writer import SteadyWriter
 
 from dynhull_client import HullClient, HullCopy
@@ -117,6 +118,9 @@ def test_every_partition_moves_to_and_fro_and_nobody_complains(postgres: Postgre
     url = postgres.new_database()
     with two_servers(url, "") as servers, HullClient(servers[0].address, retries=1000) as client:
         fleet, copy = Fleet(url, servers, "fleet"), HullCopy()
+        callers = [kind(servers[0].address) for kind in (Plain, PlainOverShards, Large, Consumes, Pipes, Creates)]
+        for caller in callers:
+            caller.begin()
         over = threading.Event()
 
         def watch() -> None:
@@ -136,6 +140,9 @@ def test_every_partition_moves_to_and_fro_and_nobody_complains(postgres: Postgre
         over.set()
         fleet.writer.more()
         thread.join()
+        for caller in callers:
+            caller.finish()
+            assert caller.errors == []
         fleet.check()
         with client.watch("fleet", copy=copy) as events:
             next(iter(events))

@@ -50,7 +50,8 @@ class HullClient(Client[BlockingConnection]):
         tls: how to encrypt; None for no encryption. `grpc.ssl_channel_credentials()` trusts the certificate authorities
             of this machine; it also takes a root certificate, and a client's key and certificate.
         retries: how often a call that reached no server is repeated, after a growing pause. Only calls that are safe to
-            repeat are: reads, and batches with a producer and a sequence number.
+            repeat are: reads, batches with a producer and a sequence number, and calls that have certainly not begun,
+            as a server says that starts or stops.
     """
 
     _connect = BlockingConnection

@@ -31,7 +31,7 @@ MOST_MACHINES = 3
 OPTIONS = ("--cluster", "--partitions", str(PARTITIONS), "--scrub-cpu", "0", "--log-level", "info")
 SERVED = "SELECT worker FROM owners WHERE until > '-infinity' AND address <> '' ORDER BY partition"
 RESTARTED = "all processes are restarted"
-COMPLAINTS = "warning", "error"
+COMPLAINTS = ("[error ", "[critical ")
 # What is changed, and how often in relation to the others.
 CHANGES = {"move": 6, "join": 2, "leave": 2, "drain": 1, "restart": 1}
 
@@ -51,7 +51,7 @@ class Machine:
         return Path(self._log.name).read_text()
 
     def complaints(self) -> list[str]:
-        """What it logs of errors and warnings."""
+        """What it logs of errors."""
         return [line for line in self.said().splitlines() if any(each in line for each in COMPLAINTS)]
 
     def stop(self) -> None:
