@@ -93,6 +93,12 @@ class ChildProcess:
                     await self._stop.wait()
             pause = min(2 * pause, LONGEST_PAUSE)
 
+    def heir(self) -> "ChildProcess":
+        """Another one that is to serve in its place. It has served, as it were: it is started until it does."""
+        heir = ChildProcess(self.name, self._begin, self._grace)
+        heir.starts, heir.address = self.starts, self.address
+        return heir
+
     async def restart(self) -> None:
         """Have it end its calls, and wait until its successor serves."""
         self._restarting = self._process is not None

@@ -101,7 +101,7 @@ async def _serve(settings: Settings) -> None:
 class Processes:
     """The workers and the gateways, from `start` until `stop`."""
 
-    def __init__(self, workers: Sequence[ChildProcess], gateways: Sequence[ChildProcess]) -> None:
+    def __init__(self, workers: Sequence[ChildProcess], gateways: list[ChildProcess]) -> None:
         self._workers = workers
         self._gateways = gateways
         self.all = [*workers, *gateways]
@@ -130,7 +130,8 @@ class Processes:
         If it is set while they are restarted, they are restarted once more, however often it was.
         """
         self._tasks.add(asyncio.create_task(self._restart_whenever(again), name=RESTART))
-        await self._wait(stop, stop)
+        while await self._wait(stop, stop):  # a gateway has been replaced
+            continue
 
     async def stop(self) -> None:
         """Stop the gateways, which end their calls, and then the workers."""
@@ -145,10 +146,26 @@ class Processes:
         while True:
             await again.wait()
             again.clear()
-            for each in self.all:
+            for each in list(self.all):
                 log.info("a process is restarted", extra={"restarted": each.name})
-                await each.restart()
+                if each in self._gateways:
+                    await self._replace(each)
+                else:
+                    await each.restart()
             log.info("all processes are restarted")
+
+    async def _replace(self, gateway: ChildProcess) -> None:
+        """Restart a gateway, which ends only when its heir serves on the same port: there may be no other one."""
+        heir = gateway.heir()
+        self._tasks.add(asyncio.create_task(heir.run(), name=heir.name))
+        try:
+            await heir.serving.wait()
+        except asyncio.CancelledError:
+            await heir.stop()
+            raise
+        for group in (self._gateways, self.all):
+            group[group.index(gateway)] = heir
+        await gateway.stop()
 
     async def _wait(self, stop: asyncio.Event, *events: asyncio.Event) -> bool:
         """Wait for all of the events, or for `stop`; returns False for that.

@@ -4,7 +4,7 @@
 
 Real servers share a real PostgreSQL. Partitions are moved by hand, machines join and leave, workers give up what they
 have, and all processes of a machine are restarted one at a time. Callers of every kind (steady_callers.py) call a
-machine that stays, without sending anything again themselves. In the end there is a table, and no error.
+machine that stays, with the defaults of the client. In the end there is a table, and no error.
 """
 
 import argparse
@@ -161,7 +161,6 @@ class Planned:
         """End the callers. Returns what went wrong."""
         errors = []
         for caller in self.callers:
-            print(f"{type(caller).__name__}: {caller.errors}", file=sys.stderr)
             caller.finish()
             errors += [f"{type(caller).__name__}, {each}" for each in caller.errors]
         errors += [line for machine in self._all for line in machine.complaints()]
