@@ -19,6 +19,7 @@ from grpc_health.v1 import health_pb2, health_pb2_grpc
 from logged_process import logged_process
 from patience import PATIENCE, wait_until
 from server_process import Server, run, server_process
+from steady_callers import AsyncPipes, Consumes, Plain, PlainOverShards
 
 from dynhull_client import HullClient, UnavailableError
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -176,6 +177,22 @@ def test_all_processes_are_restarted_one_at_a_time(server: Server) -> None:
         wait_until(lambda: processes(server.process.pid).keys() == before.keys())
         wait_until(lambda: reaches(client))
         assert client.get_hull(NAMES[0]).info.points == points + written
+
+
+def test_callers_notice_no_restart_even_of_the_only_gateway(tmp_path: Path) -> None:
+    options = ("--workers", "2", "--gateways", "1", "--data", str(tmp_path))
+    with server_process(*options) as server:
+        callers = [kind(server.address) for kind in (Plain, PlainOverShards, Consumes, AsyncPipes)]
+        for caller in callers:
+            caller.begin()
+        for _ in range(2):
+            before = processes(server.process.pid)
+            server.process.send_signal(signal.SIGHUP)
+            wait_until(lambda before=before: processes(server.process.pid).items().isdisjoint(before.items()))
+            wait_until(lambda before=before: processes(server.process.pid).keys() == before.keys())
+        for caller in callers:
+            caller.finish()
+            assert caller.errors == []
 
 
 def test_signals_during_a_restart_make_one_more() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from dynhull_client import AsyncHullClient, HullClient, HullCopy
 
-BREATH = 0.01  # seconds between two calls, which leave the processor to others
+BREATH = 0.05  # seconds between two calls, which leave the processor to others
 SHARDS = 3
 # More bytes than one frame between a gateway and a worker may have.
 LARGE = 20_000
