@@ -136,19 +136,31 @@ def test_a_large_request_that_was_begun_is_answered_before_the_connection_ends(t
     asyncio.run(run())
 
 
+class SkippingLoop(asyncio.SelectorEventLoop):
+    """A loop whose time passes at once where somebody would wait."""
+
+    skipped = 0.0
+
+    def time(self) -> float:
+        return super().time() + self.skipped
+
+
 def test_nobody_waits_longer_than_the_pages_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    seconds = 1.0
-    monkeypatch.setattr(worker_link, "PATIENCE", seconds)
+    async def skip(_: asyncio.Event, seconds: float) -> None:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, SkippingLoop)
+        loop.skipped += seconds
 
-    async def run() -> float:
-        async with linked(tmp_path) as link:
-            loop = asyncio.get_running_loop()
-            begun = loop.time()
-            with pytest.raises(WorkerAwayError):
-                await link.ask(WRITE, CALL, b"")
-            return loop.time() - begun
+    async def seconds_waited() -> float:
+        link = WorkerLink(0, Sockets(tmp_path), (), lambda: None)
+        begun = asyncio.get_running_loop().time()
+        with pytest.raises(WorkerAwayError):
+            await link.ask(WRITE, CALL, b"")
+        return asyncio.get_running_loop().time() - begun
 
-    assert seconds <= asyncio.run(run()) < 2 * seconds
+    monkeypatch.setattr(worker_link, "_until", skip)
+    with asyncio.Runner(loop_factory=SkippingLoop) as runner:
+        assert 10.0 <= runner.run(seconds_waited()) < 15.0
 
 
 class Asker:

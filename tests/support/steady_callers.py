@@ -210,12 +210,16 @@ class AsyncWrites(Writes):
 
 
 class Watches(Caller):
-    """A watch whose copy must be the hull; a call is an event. Somebody else writes, without numbers."""
+    """A watch whose copy must be the hull; a call is an event, and what it takes is the time since the one before.
+
+    Somebody else writes, without numbers.
+    """
 
     def prepare(self, _: HullClient) -> None:
         self.copy = HullCopy()
         self._written = 0
         self._last: int | None = None  # the revision of the last event
+        self._heard = time.monotonic()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
 
@@ -245,7 +249,8 @@ class Watches(Caller):
     def heard(self, revision: int) -> bool:
         """Count an event; returns whether it is the last one."""
         self.require(revision >= self.calls, f"event {revision} after {self.calls}")
-        self.calls = revision
+        self.done(self._heard)
+        self.calls, self._heard = revision, time.monotonic()
         return revision == self._last
 
     def check(self, client: HullClient) -> None:
