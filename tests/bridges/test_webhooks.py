@@ -240,14 +240,16 @@ def test_a_watcher_that_the_server_gave_up_delivers_nothing_twice(tmp_path: Path
         keys = [f"{i:0200}" for i in range(total)]
         with relay_process(server.address, tmp_path, "a", "--to", endpoint.url, "--batch", 1000, *PLAIN) as relay:
             wait_until(lambda: client.get_fence("a").consumers)
-            for _ in range(5):
-                client.put("a", keys, np.ones((total, 2)))
-                client.put("a", keys, 9 * np.ones((total, 2)))
-            wait_until(lambda: scrape(metrics)["dynhull_watch_lag_seconds"] > 0.5)
+            events = 0
+            while (lag := scrape(metrics)["dynhull_watch_lag_seconds"]) <= 0.5:
+                if lag == 0:  # gRPC takes more ahead where answers are slower
+                    client.put("a", keys, np.ones((total, 2)))
+                    client.put("a", keys, 9 * np.ones((total, 2)))
+                    events += 2 * total
             hold.set()
-            wait_until(lambda: acknowledged(client, "a") == 10 * total)
+            wait_until(lambda: acknowledged(client, "a") == events)
             assert relay.said("no events from the server, trying again")
-    assert sequences(endpoint, "a") == list(range(1, 10 * total + 1))
+    assert sequences(endpoint, "a") == list(range(1, events + 1))
 
 
 def test_batches(client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path) -> None:
