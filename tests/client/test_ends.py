@@ -9,6 +9,7 @@ import asyncio
 import gc
 import itertools
 import os
+import socket
 import sys
 import threading
 import time
@@ -16,6 +17,7 @@ from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
+from functools import partial
 from types import NoneType
 from typing import Any
 
@@ -25,7 +27,7 @@ from faulty_way import WAYS, faulty_way
 from patience import PATIENCE, wait_until
 from server_process import Server, server_process
 
-from dynhull_client import AsyncHullClient, DynhullError, HullClient
+from dynhull_client import AsyncHullClient, DynhullError, HullClient, UnavailableError
 
 ALL = os.environ.get("CLIENT_CASES") == "all"
 STEPS = range(41) if ALL else (0, 1, 2, 3, 5, 8, 13)
@@ -165,7 +167,7 @@ KINDS: dict[str, Callable[[AsyncHullClient], Awaitable[Waiting]]] = {
 }
 LASTING = "hull awaited", "watch", "fence"  # whose waits have not ended when the server fails
 READS_ARE_CANCELLED = tuple(f"{how} pipeline, close" for how in WAYS)  # as documented, where a pipeline is left
-ENDS = "cancel", "close", "client"
+ENDS = "cancel", "cancel twice", "close", "client"
 Task = asyncio.Future[Any]
 
 
@@ -194,8 +196,11 @@ async def end_after(steps: int, end: str, waiting: Waiting, task: Task | None, c
         await asyncio.sleep(0)
     over = task.done()
     begun = time.monotonic()
-    if end == "cancel":
+    if end.startswith("cancel"):
         task.cancel()
+        if end == "cancel twice":  # also what cleans up after the first
+            await asyncio.sleep(0)
+            task.cancel()
         ending = {task}
     elif end == "close" and waiting.close is not None:
         ending = {task, asyncio.ensure_future(waiting.close())}
@@ -208,7 +213,7 @@ async def end_after(steps: int, end: str, waiting: Waiting, task: Task | None, c
         each.cancel()
     for each in ending - late:
         error = None if each.cancelled() else each.exception()
-        if each is task and end == "cancel":
+        if each is task and end.startswith("cancel"):
             if not over and not each.cancelled():
                 cells.wrong.append(f"{name}: cancelled, but ended with {error!r}")
         elif each is task and each.cancelled() and not (over or name.startswith(READS_ARE_CANCELLED)):
@@ -259,6 +264,38 @@ def test_async_waits_end(server: Server, how: str) -> None:
     for kind in KINDS:
         asyncio.run_coroutine_threadsafe(end_all(server, how, kind, cells), loop()).result()
     checked(cells)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_task_that_was_cancelled_before_it_waits(server: Server, kind: str) -> None:
+    async def begin(waiting: Waiting) -> None:
+        running = asyncio.current_task()
+        assert running is not None
+        running.cancel()  # as asyncio does for an interrupt while the main task runs
+        await waiting.begin()
+
+    async def end() -> None:
+        async with AsyncHullClient(server.address, timeout=PATIENCE) as client:
+            waiting = await KINDS[kind](client)
+            with pytest.raises(asyncio.CancelledError):
+                await asyncio.ensure_future(begin(waiting))
+            if waiting.close is not None:
+                await waiting.close()
+
+    asyncio.run_coroutine_threadsafe(end(), loop()).result()
+
+
+def test_a_stream_that_was_left_has_no_thread(server: Server) -> None:
+    async def use() -> Any:
+        async with AsyncHullClient(server.address) as client, client.ingest(HULL) as stream:
+            await stream.apply(insert=[[1, 1]])
+        return stream
+
+    stream = asyncio.run_coroutine_threadsafe(use(), loop()).result()
+    wait_until(lambda: not [each for each in threading.enumerate() if each.name.startswith("ingest to")])
+    assert stream.summary.batches == 1
+    with pytest.raises(RuntimeError, match="was left"):
+        asyncio.run_coroutine_threadsafe(stream.apply(insert=[[1, 1]]), loop()).result()
 
 
 def exit_by_error(context: Any) -> None:
@@ -336,3 +373,26 @@ def test_blocked_threads_end(server: Server, how: str, end: str) -> None:
                 cells.wrong.append(f"{name}: it ended with {thread.error!r}")
             clients[kind].close()
     checked(cells)
+
+
+def test_calls_that_begin_while_the_client_is_closed() -> None:
+    def work(client: HullClient, refused: threading.Semaphore) -> None:
+        while True:
+            try:
+                client.get_hull(HULL)
+            except UnavailableError:
+                refused.release()
+
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        host, port = unused.getsockname()
+        for _ in range(20):
+            refused = threading.Semaphore(0)
+            client = HullClient(f"{host}:{port}", retries=0)
+            threads = [Blocked(partial(work, client, refused)) for _ in range(4)]
+            for _ in range(8):
+                refused.acquire()
+            client.close()
+            for each in threads:
+                each.join(PATIENCE)
+                assert type(each.error) is DynhullError

@@ -22,7 +22,13 @@ class CallErrors:
     gRPC does not keep these apart. It may go on, or raise another error, although the task was cancelled, because it
     waits in tasks of its own, which catch the cancellation (`UnaryUnaryCall._invoke`, `StreamStreamCall._prepare_rpc`);
     and it raises CancelledError where nobody cancelled the task, but the channel was closed.
+
+    Args:
+        closed: set when the channel is closed.
     """
+
+    def __init__(self, closed: asyncio.Event) -> None:
+        self._closed = closed
 
     def __enter__(self) -> Self:
         task = asyncio.current_task()
@@ -38,7 +44,8 @@ class CallErrors:
             if not isinstance(error, asyncio.CancelledError):
                 raise asyncio.CancelledError from error
         elif isinstance(error, asyncio.CancelledError):
-            raise client_is_closed() from None
+            if self._closed.is_set():  # else the task was cancelled before, while it ran
+                raise client_is_closed() from None
         elif isinstance(error, grpc.RpcError):
             raise error_of(error) from None
 
@@ -65,7 +72,7 @@ class AsyncConnection(Connection):
         while True:
             method = getattr(self.stub, call.method)
             try:
-                with CallErrors():
+                with CallErrors(self._closed):
                     begun = self.begin(method, call.request, attempts.timeout())
                     response = [part async for part in begun] if call.in_parts else await begun
                 return call.decode(response)
@@ -93,7 +100,7 @@ class AsyncConnection(Connection):
             What ended the call.
         """
         try:
-            with CallErrors():
+            with CallErrors(self._closed):
                 call = self.begin(method, None, None)
                 sending = asyncio.create_task(_send(call, requests))
                 try:
@@ -124,15 +131,20 @@ async def end(task: asyncio.Task[Any]) -> None:
 async def unless(ended: asyncio.Event, work: Coroutine[Any, Any, Result]) -> Result | None:
     """The result of work; None if `ended` is set before, which cancels it."""
     working, ending = asyncio.create_task(work), asyncio.create_task(ended.wait())
+    working.add_done_callback(note)
     try:
         await asyncio.wait([working, ending], return_when=asyncio.FIRST_COMPLETED)
     finally:
-        await end(ending)
-        await end(working)
-        failure = None if working.cancelled() else working.exception()  # noted, also where this is cancelled
-    if failure is not None:
-        raise failure
+        working.cancel()
+        ending.cancel()
+        await asyncio.wait([working, ending])
     return None if working.cancelled() else working.result()
+
+
+def note(task: asyncio.Future[Any]) -> None:
+    """Note the error of a task that nobody may wait for any more."""
+    if not task.cancelled():
+        task.exception()
 
 
 async def _send(call: Any, requests: AsyncIterator[Any]) -> None:

@@ -32,6 +32,7 @@ class AsyncIngest:
         self._ingest = Ingest(self._connection, ingesting)
         # Of its own, as those that threads share could all wait for a server that does not read.
         self._thread = ThreadPoolExecutor(1, f"ingest to {ingesting.name}")
+        self._left = False
 
     @property
     def summary(self) -> Ingested | None:
@@ -71,7 +72,12 @@ class AsyncIngest:
             else:
                 leave()
         finally:
+            self._left = True
             self._connection.close()  # ends what waits in the thread
+            self._thread.shutdown(wait=False)
 
     async def _in_thread(self, function: Callable[[], None]) -> None:
-        await asyncio.get_running_loop().run_in_executor(self._thread, function)
+        if self._left:  # nothing waits any more
+            function()
+        else:
+            await asyncio.get_running_loop().run_in_executor(self._thread, function)

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import grpc
 
-from ._async_connection import AsyncConnection, unless
+from ._async_connection import AsyncConnection, note, unless
 from ._calls import Watching
 from ._connection import client_is_closed
 from ._errors import DynhullError, error_of
@@ -51,7 +51,7 @@ class AsyncFollower(AsyncIterator[Happening]):
                 self._begin()
             if self._reading is None:
                 self._reading = asyncio.ensure_future(anext(self._events))
-                self._reading.add_done_callback(_heard)
+                self._reading.add_done_callback(note)
             reading = self._reading
             if not reading.done():
                 await asyncio.wait([reading])  # a wait that is cancelled leaves the read to the next one
@@ -95,12 +95,6 @@ class AsyncFollower(AsyncIterator[Happening]):
         method = getattr(self._connection.stub, self._place.method)
         self._call = self._connection.begin(method, self._place.request, self._place.timeout())
         self._events = aiter(self._call)
-
-
-def _heard(reading: asyncio.Task[Any]) -> None:
-    """Note the error of a read that nobody may wait for any more."""
-    if not reading.cancelled():
-        reading.exception()
 
 
 class AsyncWatch(AsyncFollower[Event]):

@@ -133,6 +133,15 @@ class BlockingConnection(Connection):
         super().__init__(address, **options)
         self._news = Condition()
 
+    def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
+        """Begin a call; an error of ours, too, if another thread closes the connection meanwhile."""
+        try:
+            return super().begin(method, requests, timeout)
+        except ValueError:
+            if self._closed.is_set():
+                raise client_is_closed() from None
+            raise
+
     def answer(
         self,
         call: Call[Result],
