@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
+from pacing import pause_async
 
 from dynhull_client import AsyncHullClient, HullClient, HullCopy
 
@@ -206,7 +207,7 @@ class AsyncWrites(Writes):
                 begun = time.monotonic()
                 await (await writer.put(insert=[place(self.calls + 1)]))
                 self.done(begun)
-                await asyncio.sleep(BREATH)
+                await pause_async(BREATH)
 
 
 class Watches(Caller):
@@ -370,7 +371,7 @@ class AsyncPipes(Pipes):
                 sides = [(await each).sides.tolist() for each in located]
                 self.require(sides == [[1], [0], [-1]] * 2, f"read {self.calls}: {sides}")
                 self.done(begun)
-                await asyncio.sleep(BREATH)
+                await pause_async(BREATH)
 
 
 class Reads(Pipes):
