@@ -150,7 +150,7 @@ class _WorkerAnswers:
         self._answers: deque[pb.ReadAnswer] = deque()
         self._stream: Upstream | None = None
         self._failure: RelayedError | WorkerAwayError | None = None
-        self._patience = Patience()
+        self._patience: Patience | None = None  # from the first failure since an answer
         self._connect()
 
     def _connect(self) -> None:
@@ -177,6 +177,7 @@ class _WorkerAnswers:
             if self._failure is None:
                 await self._read()
                 continue
+            self._patience = self._patience or Patience()
             try:
                 await self._link.again(QUERY, b"", self._failure, self._patience)
                 await self._link.arrive(self._patience)
@@ -202,7 +203,7 @@ class _WorkerAnswers:
         else:
             assert response is not None  # it reads for as long as it is sent reads
             self._answers.extend(pb.QueryResponse.FromString(response).answers)
-            self._patience = Patience()
+            self._patience = None
 
     def close(self) -> None:
         """End the call."""

@@ -213,21 +213,22 @@ class WorkerLink:
 
 
 class Patience:
-    """The time that one call waits for workers that are away: PATIENCE, however often they are."""
+    """The time in which a call that meets workers that are away is tried again: PATIENCE from its beginning.
+
+    A root has waited as long for a shard before it says that one is away, so that is not tried again.
+    """
 
     def __init__(self) -> None:
-        self._left = PATIENCE
+        self._until = asyncio.get_running_loop().time() + PATIENCE
 
     @property
     def over(self) -> bool:
         """Whether nothing of it is left."""
-        return self._left <= 0
+        return asyncio.get_running_loop().time() >= self._until
 
     async def wait(self, event: asyncio.Event, seconds: float = PATIENCE) -> None:
         """Wait for an event, for so many seconds at most."""
-        begun = asyncio.get_running_loop().time()
-        await _until(event, min(seconds, self._left))
-        self._left -= asyncio.get_running_loop().time() - begun
+        await _until(event, min(seconds, self._until - asyncio.get_running_loop().time()))
 
 
 async def _until(event: asyncio.Event, seconds: float = LOOK_SECONDS) -> None:

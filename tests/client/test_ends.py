@@ -302,30 +302,68 @@ def exit_by_error(context: Any) -> None:
     context.__exit__(ZeroDivisionError, ZeroDivisionError(), None)
 
 
-def blocking(client: HullClient) -> dict[str, tuple[Callable[[], Any], Callable[[], Any]]]:
-    """What waits, and what ends it from another thread; begun while the server answers."""
-    opened, writer, pipeline, stream = client.writer(HULL), client.writer(HULL), client.pipeline(), client.ingest(HULL)
-    full = client.writer(HULL, in_flight=1, batch_points=1)
-    watch, fence = client.watch(HULL), client.watch_fence(FENCE, after=0)
+Work = Callable[[], Any]
+
+
+def only_client(method: str, *arguments: Any) -> Callable[[HullClient], tuple[Work, Work]]:
+    return lambda client: (lambda: getattr(client, method)(*arguments), client.close)
+
+
+def watched(client: HullClient) -> tuple[Work, Work]:
+    watch = client.watch(HULL)
     next(watch)
-    for each in (writer, full):
-        each.put(insert=[[1, 1]]).result()
+    return lambda: next(watch), watch.close
+
+
+def watched_fence(client: HullClient) -> tuple[Work, Work]:
+    watch = client.watch_fence(FENCE, after=0)
+    return lambda: [*watch], watch.close
+
+
+def started(client: HullClient) -> tuple[Work, Work]:
+    writer = client.writer(HULL)
+    return lambda: writer.put(insert=[[1, 1]]), lambda: exit_by_error(writer)
+
+
+def full(client: HullClient) -> tuple[Work, Work]:
+    writer = client.writer(HULL, in_flight=1, batch_points=1)
+    writer.put(insert=[[1, 1]]).result()
+    return lambda: [writer.put(insert=[[1, 1]]) for _ in range(20)], lambda: exit_by_error(writer)
+
+
+def flushed(client: HullClient) -> tuple[Work, Work]:
+    writer = client.writer(HULL)
+    writer.put(insert=[[1, 1]]).result()
+    return lambda: [writer.put(insert=[[1, 1]]), writer.flush()], lambda: exit_by_error(writer)
+
+
+def piped(client: HullClient) -> tuple[Work, Work]:
+    pipeline = client.pipeline()
     pipeline.locate(HULL, [[1, 1]]).result()
+    return lambda: pipeline.locate(HULL, [[1, 1]]).result(), lambda: exit_by_error(pipeline)
+
+
+def ingested(client: HullClient) -> tuple[Work, Work]:
+    stream = client.ingest(HULL)
     stream.__enter__()
     stream.apply(insert=[[1, 1]])
-    return {
-        "read": (lambda: client.get_hull(HULL), client.close),
-        "parts": (lambda: client.entities(KEYED), client.close),
-        "hull awaited": (lambda: client.wait_for_hull("ends/none"), client.close),
-        "list": (lambda: next(client.list_hulls("ends/")), client.close),
-        "watch": (lambda: next(watch), watch.close),
-        "fence": (lambda: [*fence], fence.close),
-        "writer's start": (lambda: opened.put(insert=[[1, 1]]), lambda: exit_by_error(opened)),
-        "writer.put": (lambda: [full.put(insert=[[1, 1]]) for _ in range(20)], lambda: exit_by_error(full)),
-        "writer.flush": (lambda: [writer.put(insert=[[1, 1]]), writer.flush()], lambda: exit_by_error(writer)),
-        "pipeline": (lambda: pipeline.locate(HULL, [[1, 1]]).result(), lambda: exit_by_error(pipeline)),
-        "ingest": (lambda: [stream.apply(insert=[[1, 1]] * 1000) for _ in range(40)], lambda: exit_by_error(stream)),
-    }
+    return lambda: [stream.apply(insert=[[1, 1]] * 1000) for _ in range(40)], lambda: exit_by_error(stream)
+
+
+# What waits in a thread, and what ends it from another one.
+BLOCKING: dict[str, Callable[[HullClient], tuple[Work, Work]]] = {
+    "read": only_client("get_hull", HULL),
+    "parts": only_client("entities", KEYED),
+    "watch": watched,
+    "fence": watched_fence,
+    "writer.put": full,
+    "writer.flush": flushed,
+    "pipeline": piped,
+    "ingest": ingested,
+    "list": lambda client: (lambda: next(client.list_hulls("ends/")), client.close),
+    "hull awaited": only_client("wait_for_hull", "ends/none"),
+    "writer's start": started,
+}
 
 
 class Blocked(threading.Thread):
@@ -353,11 +391,9 @@ class Blocked(threading.Thread):
 @pytest.mark.parametrize("how", WAYS)
 def test_blocked_threads_end(server: Server, how: str, end: str) -> None:
     cells = Cells()
-    kinds = "read", "parts", "watch", "fence", "writer.put", "writer.flush", "pipeline", "ingest", "list"
-    kinds += "hull awaited", "writer's start"
     with faulty_way(server) as way:
-        clients = {kind: HullClient(way.address, timeout=None) for kind in kinds}
-        works = {kind: blocking(client)[kind] for kind, client in clients.items()}
+        clients = {kind: HullClient(way.address, timeout=None) for kind in BLOCKING}
+        works = {kind: BLOCKING[kind](client) for kind, client in clients.items()}
         WAYS[how](way)
         threads = {kind: Blocked(work) for kind, (work, _) in works.items()}
         for kind, thread in threads.items():
