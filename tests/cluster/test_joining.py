@@ -6,6 +6,7 @@ from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
+from cases import with_all_cases
 from command_line import dynhull
 from forked import COMMAND
 from metrics import scrape
@@ -64,6 +65,7 @@ def test_a_machine_that_others_cannot_reach_or_whose_clock_is_wrong_does_not_joi
         assert {name: client.get_hull(name).revision for name in revisions} == revisions
 
 
+@with_all_cases
 def test_a_clock_that_becomes_wrong_is_said(postgres: PostgreSQL, tmp_path: Path) -> None:
     url = postgres.new_database()
     clock = tmp_path / "clock"
@@ -84,6 +86,7 @@ def test_a_clock_that_becomes_wrong_is_said(postgres: PostgreSQL, tmp_path: Path
         assert client.apply("a/hull", insert=[[1, 3]]).revision == 2
 
 
+@with_all_cases
 def test_a_limit_can_be_raised(postgres: PostgreSQL) -> None:
     options = machine(postgres.new_database(), "--max-clock-difference", "7200")
     with server_process(*options, wrap=at("-1h")) as server, HullClient(server.address) as client:

@@ -2,7 +2,6 @@
 
 import os
 import resource
-import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -219,7 +218,7 @@ def test_without_descriptors_what_was_acknowledged_stays_and_all_goes_on_afterwa
         for i, each in enumerate(points[500:], start=500):
             client.apply("a", insert=each, producer="p", sequence=i)
         assert health(server.address) == SERVING
-        server.process.send_signal(signal.SIGKILL)
+        server.process.kill()
     with server_process("--data", data) as server, HullClient(server.address) as client:
         assert client.get_hull("a").info.points == 5 * 600
         assert client.verify("a").equal

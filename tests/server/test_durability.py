@@ -1,7 +1,6 @@
 """What survives a stop or a kill of the server, as clients of real processes see it."""
 
 import os
-import signal
 from pathlib import Path
 
 import grpc
@@ -29,7 +28,7 @@ def apply(address, name, points, producer, sequence):
 
 
 def kill(server):
-    server.process.send_signal(signal.SIGKILL)
+    server.process.kill()
     server.process.wait(PATIENCE)
 
 

@@ -1,7 +1,6 @@
 """Geographic hulls from outside: degrees in and out, metres, refusals with row and reason, restarts."""
 
 import json
-import signal
 
 import grpc
 import numpy as np
@@ -256,7 +255,7 @@ def test_a_restart_gives_the_very_doubles_and_the_centre(tmp_path, sudden, snaps
             held = next(watch)
         assert before[0].info.center == (179, -20)
         if sudden:
-            server.process.send_signal(signal.SIGKILL)
+            server.process.kill()
             server.process.wait(PATIENCE)
     with server_process(*options) as server, HullClient(server.address) as client:
         after = [client.get_hull(each) for each in ("fleet", "given")]

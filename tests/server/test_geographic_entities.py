@@ -1,6 +1,5 @@
 """Keys, times and windows of geographic hulls, from outside."""
 
-import signal
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -122,7 +121,7 @@ def test_a_restart_gives_keys_times_and_the_centre(tmp_path, sudden, snapshot_po
         before = [client.get_hull(each) for each in names]
         known = [client.entities(each) for each in ("fleet", "numbers")]
         if sudden:
-            server.process.send_signal(signal.SIGKILL)
+            server.process.kill()
             server.process.wait(PATIENCE)
     with server_process(*options) as server, HullClient(server.address) as client:
         for each, there, center in zip(names, before, [(0, 80), (90, 85), (0, 90)], strict=True):

@@ -1,7 +1,5 @@
 """Fences about geographic hulls: edges are great circles, distances metres, positions the very doubles."""
 
-import signal
-
 import numpy as np
 import pytest
 from patience import PATIENCE, wait_until
@@ -210,7 +208,7 @@ def test_a_restart_continues_the_events(tmp_path, sudden):
         for points in moves[:6]:
             client.put("fleet", keys, points)
         if sudden:
-            server.process.send_signal(signal.SIGKILL)
+            server.process.kill()
             server.process.wait(PATIENCE)
     with server_process(*options) as server, HullClient(server.address) as client:
         for points in moves[6:]:

@@ -1,7 +1,6 @@
 """Event times, windows and deadlines through a real server: what leaves, when, and after a restart."""
 
 import asyncio
-import signal
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -212,7 +211,7 @@ def test_a_kill_loses_no_key_no_time_and_no_clock(tmp_path: Path) -> None:
         before = {each: hull_of(stub, each) for each in ("data", "evicting", "plain", "points")}
         entities = {each: everyone(stub, each) for each in ("data", "deadlines", "plain")}
         samples = {each: everything(stub, each) for each in ("evicting", "points")}
-        server.process.send_signal(signal.SIGKILL)
+        server.process.kill()
     with server_process(*options) as server, grpc.insecure_channel(server.address) as channel:
         stub = HullServiceStub(channel)
         assert {each: hull_of(stub, each) for each in before} == before
