@@ -149,7 +149,7 @@ def note(task: asyncio.Future[Any]) -> None:
 
 async def _send(call: Any, requests: AsyncIterator[Any]) -> None:
     """Send requests until the call ends, which its responses explain."""
-    with suppress(grpc.RpcError, asyncio.InvalidStateError):  # the latter where the call has ended already
+    with suppress(grpc.RpcError, grpc.aio.InternalError, asyncio.InvalidStateError):  # the call has ended meanwhile
         async for request in requests:
             await call.write(request)
         await call.done_writing()
