@@ -125,6 +125,19 @@ def test_an_endpoint_says_when_to_come_back(
     assert asked[1] - asked[0] >= 0.9  # a date has whole seconds
 
 
+def test_an_odd_time_to_come_back_ends_nothing(
+    client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path
+) -> None:
+    odd = iter(
+        ["Wed, 21 Oct 99999999999999999999 07:28:00 GMT", "Wed, 21 Oct 2015 07:28:00 +99999999999999999999", "-1"]
+    )
+    endpoint.answer = lambda _: next(((503, {"Retry-After": each}) for each in odd), (200, {}))
+    with relay_process(address, tmp_path, name, "--to", endpoint.url, *PLAIN):
+        pass_through(client, name, ["truck"])
+        wait_until(lambda: acknowledged(client, name) == 2)
+    assert sequences(endpoint, name) == [1, 2]
+
+
 def test_what_is_refused_becomes_a_dead_letter_and_can_be_sent_again(
     client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path
 ) -> None:

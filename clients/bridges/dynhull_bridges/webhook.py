@@ -104,7 +104,7 @@ def retry_after(text: str | None) -> float | None:
         return float(text)
     try:
         then = parsedate_to_datetime(text)
-    except ValueError:
+    except (ValueError, OverflowError):
         return None
     then = then.replace(tzinfo=UTC) if then.tzinfo is None else then
     return max(0.0, (then - datetime.now(UTC)).total_seconds())
