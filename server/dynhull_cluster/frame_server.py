@@ -91,7 +91,7 @@ class FrameServer:
         self._notice_left()
 
     def _notice_left(self) -> None:
-        """Notice that everybody has left who was told goodbye."""
+        """Notice that all have left to whom it has said goodbye."""
         if self.leaving and not any(each.leaving for each in self._open):
             self._left.set()
 

@@ -227,7 +227,7 @@ class Patience:
         return asyncio.get_running_loop().time() >= self._until
 
     async def wait(self, event: asyncio.Event, seconds: float = PATIENCE) -> None:
-        """Wait for an event, for so many seconds at most."""
+        """Wait for an event, no longer than this and no longer than the patience lasts."""
         await _until(event, min(seconds, self._until - asyncio.get_running_loop().time()))
 
 

@@ -16,6 +16,7 @@ import time
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import CancelledError
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from types import NoneType
@@ -23,7 +24,7 @@ from typing import Any
 
 import pytest
 from client_kinds import loop
-from faulty_way import WAYS, faulty_way
+from faulty_way import WAYS, FaultyWay
 from patience import PATIENCE, wait_until
 from server_process import Server, server_process
 
@@ -234,7 +235,7 @@ async def end_all(server: Server, how: str, kind: str, cells: Cells) -> None:
     running.set_exception_handler(lambda _, context: cells.wrong.append(f"{how} {kind}: {context}"))
     early = (False, True) if kind in LASTING else (False,)
     cases = [*itertools.product(ENDS, STEPS, early)]
-    with faulty_way(server) as way:
+    with closing(FaultyWay(server)) as way:
         clients = [AsyncHullClient(way.address, timeout=None) for _ in cases]
         waits = await asyncio.gather(*(KINDS[kind](each) for each in clients))
         begun = [asyncio.ensure_future(each.begin()) if c[-1] else None for c, each in zip(cases, waits, strict=True)]
@@ -391,7 +392,7 @@ class Blocked(threading.Thread):
 @pytest.mark.parametrize("how", WAYS)
 def test_blocked_threads_end(server: Server, how: str, end: str) -> None:
     cells = Cells()
-    with faulty_way(server) as way:
+    with closing(FaultyWay(server)) as way:
         clients = {kind: HullClient(way.address, timeout=None) for kind in BLOCKING}
         works = {kind: BLOCKING[kind](client) for kind, client in clients.items()}
         WAYS[how](way)

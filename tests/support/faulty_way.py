@@ -4,8 +4,7 @@ import os
 import signal
 import socket
 import struct
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 from proxy import Proxy
 from server_process import Server
@@ -52,12 +51,3 @@ WAYS: dict[str, Callable[[FaultyWay], None]] = {
     "dark": FaultyWay.darken,
     "shut": FaultyWay.shut,
 }
-
-
-@contextmanager
-def faulty_way(server: Server) -> Iterator[FaultyWay]:
-    way = FaultyWay(server)
-    try:
-        yield way
-    finally:
-        way.close()
