@@ -72,9 +72,13 @@ def opened(browser: Browser, url: str, *hulls: str, fences: Sequence[str] = (), 
 
 
 def wait_for_vertices(page: Page, name: str, vertices: list[list[float]]) -> None:
-    """Wait until the page shows this polygon."""
-    same = f"([name, vertices]) => JSON.stringify(({VERTICES})(name)) == JSON.stringify(vertices)"
-    page.wait_for_function(same, arg=[name, vertices])
+    """Wait until the page shows this polygon, in a picture that fills its place.
+
+    With the table comes another size of the picture, but only with the next frame, a moment after the vertices.
+    """
+    shown = f"""([name, vertices]) => JSON.stringify(({VERTICES})(name)) == JSON.stringify(vertices)
+        && picture.width == picture.element.clientWidth && picture.height == picture.element.clientHeight"""
+    page.wait_for_function(shown, arg=[name, vertices])
 
 
 def let_go(page: Page, name: str) -> None:
