@@ -24,6 +24,7 @@ from typing import Any
 
 import pytest
 from client_kinds import loop
+from complaints import complaints_of
 from faulty_way import WAYS, FaultyWay
 from patience import PATIENCE, wait_until
 from server_process import Server, server_process
@@ -232,7 +233,7 @@ async def end_all(server: Server, how: str, kind: str, cells: Cells) -> None:
     """All cells of something that waits, begun after the server has failed or, where it lasts, before."""
     running = asyncio.get_running_loop()
     before = asyncio.all_tasks()
-    running.set_exception_handler(lambda _, context: cells.wrong.append(f"{how} {kind}: {context}"))
+    complaints = complaints_of(running)
     early = (False, True) if kind in LASTING else (False,)
     cases = [*itertools.product(ENDS, STEPS, early)]
     with closing(FaultyWay(server)) as way:
@@ -250,6 +251,7 @@ async def end_all(server: Server, how: str, kind: str, cells: Cells) -> None:
     cells.wrong += [f"{how} {kind}: {each} is left" for each in asyncio.all_tasks() - before]
     gc.collect()
     await asyncio.sleep(0)
+    cells.wrong += [f"{how} {kind}: {each}" for each in complaints]
     running.set_exception_handler(None)
 
 

@@ -9,6 +9,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from complaints import Complaint, complaints_of
 
 from dynhull_client import AsyncHullClient, HullNotFoundError, PointMissingError
 
@@ -41,10 +42,9 @@ def test_a_hull_that_is_deleted_meanwhile_is_said_to_be_missing(address: str, na
 
 def test_a_refused_batch_is_raised_and_not_logged_as_well(address: str, name: str) -> None:
     """Nobody looks at the futures: `flush` says what was refused."""
-    complaints: list[object] = []
 
-    async def run() -> None:
-        asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+    async def run() -> list[Complaint]:
+        complaints = complaints_of(asyncio.get_running_loop())
         async with AsyncHullClient(address) as client:
             await client.create_hull(name)
             async with client.writer(name, batch_points=1) as writer:
@@ -57,6 +57,6 @@ def test_a_refused_batch_is_raised_and_not_logged_as_well(address: str, name: st
             with pytest.raises(HullNotFoundError):
                 await writer.put(insert=[[1, 1]])
         gc.collect()
+        return complaints
 
-    asyncio.run(run())
-    assert not complaints
+    assert asyncio.run(run()) == []
