@@ -9,15 +9,14 @@ HERE = Path(__file__).parent
 KEPT = (HERE / "seeds.txt").read_text().split()
 SEEDS = {"points": KEPT, "entities": map(str, range(20)), "windows": [], "fences": map(str, range(20))}
 # Without sanitizers and optimization, which take long to compile.
-FLAGS = ["-std=c++20", "-O0", "-ffp-contract=off", "-pthread", "-DDYNHULL_FAIL_ALLOCATIONS"]
+FLAGS = ["-O0", "-ffp-contract=off", "-pthread", "-DDYNHULL_FAIL_ALLOCATIONS"]
 FLAGS += ["-DDYNHULL_LEAF=4", "-DDYNHULL_HASH_SEED=1", "-DDYNHULL_ROWS_A_THREAD=3"]
 
 
 @pytest.mark.long
-def test_random_lives(compiler, tmp_path):
+def test_random_lives(fuzzer):
     """Kept seeds, then random ones."""
-    program = tmp_path / "fuzz"
-    subprocess.run([compiler, *FLAGS, HERE / "fuzz_together.cpp", "-o", program], check=True)
+    program = fuzzer("fuzz_together.cpp", *FLAGS)
     for what, seeds in SEEDS.items():
         for arguments in filter(None, [[*seeds], ["--seconds", "1"]]):
             done = subprocess.run([program, what, *arguments], capture_output=True, text=True, check=False)
