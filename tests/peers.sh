@@ -10,7 +10,7 @@ skipped() { echo "tests/peers.sh: $1; some tests will be skipped" >&2; }
 
 packages=()
 command -v prometheus >/dev/null && command -v promtool >/dev/null || packages+=(prometheus)
-command -v chromium >/dev/null || packages+=(chromium)
+command -v chromium-headless-shell >/dev/null || packages+=(chromium-headless-shell)
 command -v systemd-analyze >/dev/null || packages+=(systemd)
 command -v faketime >/dev/null || packages+=(faketime)
 command -v mosquitto >/dev/null || packages+=(mosquitto)

@@ -2,16 +2,16 @@
 
 import json
 import re
-import shutil
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 
 import pytest
+from chromium import chromium
 from command_line import dynhull
 from killers import KILLERS
 from patience import PATIENCE
 from PIL import Image
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 
 from dynhull import DynamicHull
 from dynhull_cli.explain.page import MOST_STEPS
@@ -107,12 +107,9 @@ def test_the_tree_of_the_example(tmp_path):
 
 def test_the_page_in_a_browser(tmp_path):
     """Keys move through the steps; a point shows its coordinates; the console stays empty."""
-    chromium = shutil.which("chromium")
-    assert chromium, "chromium is not installed; tests/peers.sh installs it (Debian's package chromium)"
     assert explain("tree", "--out", tmp_path / "page.html").exit_code == 0
     said = []
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with chromium() as browser:
         page = browser.new_page()
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
@@ -126,7 +123,6 @@ def test_the_page_in_a_browser(tmp_path):
         expect(page.locator("polyline[stroke-dasharray]")).to_have_count(1)
         expect(page.locator("#drawing title", has_text="(8, 9.5)")).not_to_have_count(0)
         expect(page.locator(".legend")).to_contain_text("old bridge")
-        browser.close()
     assert not said
 
 

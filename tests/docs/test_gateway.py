@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from chromium import chromium
 from command_line import dynhull
 from gateway_process import Events, gateway_process
 from patience import PATIENCE
 from peers import program
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 from server_process import server_process
 
 ADDRESS = "http://127.0.0.1:8080"
@@ -79,7 +80,7 @@ def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], si
         server_process() as server,
         served(tmp_path) as origin,
         gateway_process(server.address, "--origin", origin) as gateway,
-        sync_playwright() as playwright,
+        chromium() as browser,
     ):
         for each in (create, put, upload, show, wrong):
             assert lasting(shell(each.replace(ADDRESS, gateway.url), tmp_path)) == lasting(next(answers))
@@ -87,7 +88,6 @@ def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], si
         events = Events(gateway, follow.removeprefix(ADDRESS))
         assert events.next()[0] == "snapshot"
         (tmp_path / "index.html").write_text(page.read_text().replace(ADDRESS, gateway.url))
-        browser = playwright.chromium.launch(executable_path=program("chromium"), args=["--no-sandbox"])
         shown = browser.new_page()
         shown.goto(origin)
         state = shown.locator("#state")
@@ -107,7 +107,6 @@ def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], si
         assert str(inside).replace("'", '"').replace(" ", "") in text_of(site, "browser")
         events.close()
         assert shown.locator("polygon").get_attribute("points") == "0,0 4,0 4,3 2,4"
-        browser.close()
 
 
 @pytest.mark.long

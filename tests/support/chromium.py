@@ -9,8 +9,8 @@ from playwright.sync_api import Browser, sync_playwright
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """Debian's Chromium, or the one that this machine has."""
-    path = program("chromium", "chromium-browser", "google-chrome", "chrome")
+    """Debian's Chromium that needs no screen, or the one that this machine has, which takes half as much time again."""
+    path = program("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "chrome")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield browser

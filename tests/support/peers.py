@@ -14,7 +14,7 @@ import pytest
 JAVASCRIPT = Path(__file__).parents[1] / "javascript"
 INSTALLED_BY = {
     "caddy": "Debian's package caddy",
-    "chromium": "Debian's package chromium",
+    "chromium-headless-shell": "Debian's package chromium-headless-shell",
     "faketime": "Debian's package faketime",
     "mosquitto": "Debian's package mosquitto",
     "nats-server": "Debian's package nats-server",

@@ -92,7 +92,8 @@ class PostgreSQL:
     def new_database(self, template: str = "template1") -> str:
         """The address of an empty database, or of a copy of one that nobody uses."""
         name = f"test{next(self._databases)}"
-        self.query(f"CREATE DATABASE {name} TEMPLATE {template}", database="postgres")
+        # As copies of files: that takes a quarter of the processor time of copying through the log.
+        self.query(f"CREATE DATABASE {name} TEMPLATE {template} STRATEGY file_copy", database="postgres")
         return self.url(name)
 
     def restored_copy(self, url: str, folder: Path) -> str:
