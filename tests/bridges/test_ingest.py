@@ -232,16 +232,59 @@ def stored(port: int, stream: str) -> int:
     return asyncio.run(run())
 
 
-def test_a_stream_that_was_created_again_is_refused(address: str, name: str, nats_port: int) -> None:
+@pytest.mark.parametrize("stored", [1, 3, 5], ids=["shorter", "as long", "longer"])
+def test_a_stream_that_was_created_again_is_refused(address: str, name: str, nats_port: int, stored: int) -> None:
+    """Its messages count from 1 again, so those with numbers that the hull knows would be passed over."""
     options = (f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, "--x", "$.x", "--y", "$.y")
     publish(nats_port, name, [("p", {"x": 1, "y": 1})] * 3)
     ingested(address, *options)
-    publish(nats_port, name, [("p", {"x": 1, "y": 1})], anew=True)
-    with ingest_process(address, *options, code=2) as ingest:
+    publish(nats_port, name, [("p", {"x": 1, "y": 1})] * stored, anew=True)
+    refused(address, *options)
+    said = ingested(address, *options, "--producer", "again")
+    assert said[-1]["points"] == stored
+
+
+def refused(address: str, *options: object) -> None:
+    with ingest_process(address, *options, "--to-end", code=2) as ingest:
         ingest.process.wait(PATIENCE)
         assert "was created again. Give another --producer" in ingest.lines()[-1]
-    said = ingested(address, *options, "--producer", "again")
+
+
+def test_a_stream_that_was_created_again_under_hulls_by_subject(address: str, name: str, nats_port: int) -> None:
+    """The broker keeps the place, and each hull knows its stream: the place may be lost with the stream."""
+    url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*"
+    options = (url, "--hull", f"{name}/{{1}}", "--x", "$.x", "--y", "$.y")
+    publish(nats_port, name, [("a", {"x": 1, "y": 1})] * 3)
+    assert ingested(address, *options)[-1]["points"] == 3
+    publish(nats_port, name, [("a", {"x": 1, "y": 1})] * 5, anew=True)
+    refused(address, *options)
+    refused(address, *options[:-1], "$['y']")
+
+
+def test_a_stream_that_is_created_again_meanwhile(address: str, name: str, nats_port: int) -> None:
+    options = (f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, "--x", "$.x", "--y", "$.y")
+    publish(nats_port, name, [("p", {"x": 1, "y": 1})] * 3)
+    with ingest_process(address, *options, code=2) as ingest, HullClient(address) as client:
+        wait_until(lambda: last_sequence(client, name, f"nats/{name}") == 3)
+        publish(nats_port, name, [("p", {"x": 1, "y": 1})] * 5, anew=True)
+        ingest.process.wait(PATIENCE)
+        assert "was created again. Give another --producer" in ingest.lines()[-1]
+
+
+def test_a_hull_without_the_identity_of_its_stream_adopts_it(
+    client: HullClient, address: str, name: str, nats_port: int
+) -> None:
+    """As the first ingest after an upgrade does: the hull has only the numbers."""
+    options = (f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, "--x", "$.x", "--y", "$.y")
+    publish(nats_port, name, [("p", {"x": 1, "y": 1})] * 3)
+    client.create_hull(name)
+    client.apply(name, insert=[[1, 1]] * 2, producer=f"nats/{name}", sequence=2, may_skip=True)
+    said = ingested(address, *options)
+    assert [line["feed"] for line in said if "taken for this log" in line["event"]] == [options[0]]
     assert said[-1]["points"] == 1
+    assert not [line for line in ingested(address, *options) if "taken for this log" in line["event"]]
+    publish(nats_port, name, [("p", {"x": 1, "y": 1})] * 5, anew=True)
+    refused(address, *options)
 
 
 @pytest.mark.parametrize(("version", "share"), [("3.1.1", ""), ("5", "$share/g/")])

@@ -56,6 +56,19 @@ class Message:
     token: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """Where a feed begins.
+
+    Attributes:
+        after: the number of the message that it begins after.
+        identity: differs from that of any other log that has, had or will have the same name; 0 where there is none.
+    """
+
+    after: int
+    identity: int = 0
+
+
 class Feed(Protocol):
     """Messages of one log, or of one subscription where the broker has no log.
 
@@ -67,8 +80,8 @@ class Feed(Protocol):
     name: str
     producer: str | None
 
-    async def begin(self, known: int | None) -> int:
-        """Connect, and begin after the message with this number; returns the number it begins after.
+    async def begin(self, known: int | None) -> Beginning:
+        """Connect, and begin after the message with this number.
 
         None begins after the last message that was kept track of with `keep`, or at the oldest one.
 

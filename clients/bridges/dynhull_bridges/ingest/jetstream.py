@@ -5,21 +5,25 @@ import json
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
+from datetime import timedelta
 from time import monotonic
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
 from nats.aio.msg import Msg
 from nats.errors import Error
-from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig
+from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig, StreamInfo
 from nats.js.errors import BadRequestError, BucketNotFoundError, KeyNotFoundError
 from nats.js.kv import KeyValue
+
+from dynhull_cli.times import EPOCH
 
 from ..nats_connection import closed, connected
 from ..refusals.nats import NATS, code_of
 from ..refusals.table import Meaning
 from ..urls import check_subject, options_of, without_secrets
-from .feed import FeedError, Message, feed_error, producer_name, refusal
+from .feed import Beginning, FeedError, Message, feed_error, producer_name, refusal
+from .identity import adopted, made_again
 from .topics import captures_of
 
 if TYPE_CHECKING:
@@ -79,9 +83,10 @@ class JetStream:
         self._asked = 0  # messages asked for that have not come
         self._delivered = 0  # by the consumer
         self._left = 0  # messages after the last one read
+        self._identity = 0
         self._keeps = False
 
-    async def begin(self, known: int | None) -> int:
+    async def begin(self, known: int | None) -> Beginning:
         """Connect; see `Feed.begin`."""
         try:
             return await self._begin(known)
@@ -97,18 +102,15 @@ class JetStream:
             return refusal(meaning, f"the broker refuses the connection: {error}")
         return feed_error("NATS", error) if meaning is Meaning.PASSES else refusal(meaning, f"NATS: {error}")
 
-    async def _begin(self, known: int | None) -> int:
+    async def _begin(self, known: int | None) -> Beginning:
         self._client = await connected(self._server, TIMEOUT)
         self._context = self._client.jetstream(timeout=TIMEOUT)
         stream = await self._context.stream_info(self._stream)
-        state = stream.state
-        self._keeps = known is None
+        self._identity = _microseconds(stream)
+        self._keeps |= known is None
         after = await self._kept() if known is None else known
-        if after > state.last_seq:
-            raise ValueError(
-                f"the stream {self._stream!r} ends at {state.last_seq}, but {after} messages of it have been taken: it "
-                "was created again. Give another --producer, or another hull"
-            )
+        if after > (end := stream.state.last_seq):
+            raise made_again(f"the stream {self._stream!r} ends at {end}, but {after} messages of it have been taken")
         wanted = ConsumerConfig(
             ack_policy=AckPolicy.NONE,
             deliver_policy=DeliverPolicy.BY_START_SEQUENCE,
@@ -135,7 +137,7 @@ class JetStream:
         await self._client.subscribe(inbox, cb=self._arrive)
         self._inbox = inbox
         await self._ask()
-        return after
+        return Beginning(after, self._identity)
 
     async def _arrive(self, message: Msg) -> None:
         self._arrived.append(message)
@@ -189,13 +191,13 @@ class JetStream:
         self._asked += PULLED
 
     async def keep(self, messages: Sequence[Message]) -> None:
-        """Keep the number of the last one in the bucket, unless the hull keeps it."""
+        """Keep the number of the last one, with the identity of the stream, in the bucket, unless the hull does."""
         if not self._keeps:
             return
         number = messages[-1].number
         try:
             bucket = await self._positions()
-            await bucket.put(self._key, str(number).encode())
+            await bucket.put(self._key, f"{number} {self._identity}".encode())
         except (Error, OSError, TimeoutError) as error:
             raise feed_error("NATS", error) from None
 
@@ -204,7 +206,12 @@ class JetStream:
             entry = await (await self._context.key_value(POSITIONS)).get(self._key)
         except (BucketNotFoundError, KeyNotFoundError):
             return 0
-        return int(entry.value or 0)
+        number, _, identity = (entry.value or b"0").decode().partition(" ")
+        if not identity:
+            adopted(self.name)
+        elif int(identity) != self._identity:
+            raise made_again(f"the stream {self._stream!r} is another one than that of which {number} have been taken")
+        return int(number)
 
     async def _positions(self) -> KeyValue:
         try:
@@ -221,3 +228,8 @@ class JetStream:
         client, self._client = self._client, None
         if client is not None:
             await closed(client)
+
+
+def _microseconds(stream: StreamInfo) -> int:
+    """When a stream was created, in microseconds since 1970; 0 if its server does not say."""
+    return 0 if stream.created is None else (stream.created - EPOCH) // timedelta(microseconds=1)

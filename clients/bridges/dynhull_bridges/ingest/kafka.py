@@ -9,7 +9,8 @@ from aiokafka.errors import KafkaConnectionError, KafkaError, UnknownTopicOrPart
 
 from ..refusals.kafka import KAFKA
 from ..urls import options_of, without_secrets
-from .feed import FeedError, Message, feed_error, producer_name, refusal
+from .feed import Beginning, FeedError, Message, feed_error, producer_name, refusal
+from .identity import made_again
 
 WAIT = 1000  # milliseconds that a read waits for messages
 MOST = 4096  # messages of one read
@@ -38,7 +39,7 @@ class Kafka:
         self._next = 0
         self._keeps = False
 
-    async def begin(self, known: int | None) -> int:
+    async def begin(self, known: int | None) -> Beginning:
         """Connect; see `Feed.begin`."""
         consumer = AIOKafkaConsumer(
             bootstrap_servers=self._servers,
@@ -52,20 +53,17 @@ class Kafka:
         try:
             await consumer.start()
             consumer.assign([partition])
-            self._keeps = known is None
+            self._keeps |= known is None
             after = (await consumer.committed(partition) or 0) if known is None else known
             oldest = (await consumer.beginning_offsets([partition]))[partition]
             end = (await consumer.end_offsets([partition]))[partition]
         except (KafkaError, OSError) as error:
             raise _failure(error) from None
         if after > end:
-            raise ValueError(
-                f"{self.name} ends at offset {end}, but {after} offsets of it have been taken: the topic was created "
-                "again. Give another --producer, or another hull"
-            )
+            raise made_again(f"{self.name} ends at offset {end}, but {after} offsets of it have been taken")
         self._next = max(after, oldest)
         consumer.seek(partition, self._next)
-        return after
+        return Beginning(after)
 
     async def read(self) -> Sequence[Message]:
         """The next messages; see `Feed.read`."""

@@ -24,6 +24,7 @@ from dynhull_client import (
 from ..waiting import Absence
 from .chunk import Chunk
 from .feed import Message
+from .identity import ANSWER, LogIdentity
 
 if TYPE_CHECKING:
     from dynhull_client import AsyncWriter
@@ -32,7 +33,6 @@ log = structlog.get_logger("dynhull_ingest")
 IN_FLIGHT = 32  # batches that are not acknowledged
 WAITING = 4  # chunks beyond these, before the feed is read on
 PATIENCE = 10.0  # seconds without a server, after which the log says so
-ANSWER = 10.0  # seconds for an answer of the server
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
 
 
@@ -60,6 +60,7 @@ class Lane:
         client: the client.
         hull: the name of the hull.
         producer: the name under which the hull counts the numbers of the messages; None without numbers.
+        identity: of the log that has the messages.
         keyed: whether rows have keys.
         degrees: whether rows seem to be longitudes and latitudes.
         create: settings of the hull if there is none; None to create none.
@@ -74,6 +75,7 @@ class Lane:
         client: AsyncHullClient,
         hull: str,
         producer: str | None,
+        identity: LogIdentity,
         *,
         keyed: bool,
         degrees: bool,
@@ -86,6 +88,7 @@ class Lane:
         self._client = client
         self._hull = hull
         self._producer = producer
+        self._identity = identity
         self._keyed = keyed
         self._degrees = degrees
         self._create = create
@@ -115,6 +118,7 @@ class Lane:
         Raises:
             DynhullError: the server refuses the writer itself, for example its token, or has been away for too long.
             NotCreatedError: there is no hull that can take the points.
+            ValueError: the hull has messages of another log.
             OSError, TooManyBadError: bad messages cannot be kept aside.
         """
         pause = FIRST_PAUSE
@@ -147,6 +151,7 @@ class Lane:
     async def _write(self) -> None:
         """Send chunks with one writer, until it fails."""
         await self._require_hull()
+        await self._identity.require_in(self._hull)
         self._waiting.extendleft(reversed(self._flying))
         self._flying.clear()
         self._failure = None

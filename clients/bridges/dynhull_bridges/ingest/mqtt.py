@@ -19,7 +19,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 from ..refusals.mqtt import MQTT
 from ..refusals.table import Meaning
 from ..urls import options_of, without_secrets
-from .feed import FeedError, Message, feed_error, refusal
+from .feed import Beginning, FeedError, Message, feed_error, refusal
 from .topics import captures_of
 
 PORT, TLS_PORT = 1883, 8883
@@ -87,7 +87,7 @@ class Mqtt:
         self._lost: str | None = None
         self._closed = False
 
-    async def begin(self, known: int | None) -> int:  # noqa: ARG002  # a subscription has no numbers
+    async def begin(self, known: int | None) -> Beginning:  # noqa: ARG002  # a subscription has no numbers
         """Connect; see `Feed.begin`."""
         self._loop = asyncio.get_running_loop()
         self._ready = self._loop.create_future()
@@ -105,7 +105,7 @@ class Mqtt:
                 await self._ready
         except (OSError, TimeoutError) as error:
             raise feed_error("MQTT", error) from None
-        return 0
+        return Beginning(0)
 
     async def read(self) -> Sequence[Message]:
         """The next messages; see `Feed.read`."""

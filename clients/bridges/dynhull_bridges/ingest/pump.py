@@ -14,9 +14,10 @@ from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, Un
 from ..waiting import Absence, unless
 from .bad import BadMessages
 from .chunk import Taken, chunks_of
-from .feed import DoubtfulError, Feed, FeedError, Message
+from .feed import Beginning, DoubtfulError, Feed, FeedError, Message
 from .figures import Figures
-from .lane import ANSWER, Lane
+from .identity import ANSWER, LogIdentity
+from .lane import Lane
 from .mapping import Mapping, Row
 
 log = structlog.get_logger("dynhull_ingest")
@@ -73,6 +74,7 @@ class Pump:
         self._broker_away = Absence(BROKER_AWAY, settings.patience, feed=feed.name)
         self._doubt = Absence(BROKER_AWAY, DOUBT, feed=feed.name)
         self._read_so_far = 0  # messages
+        self._identity = LogIdentity(client, feed)
         self._was_there = False  # what the feed reads, now or for an ingest before
         self._lanes: dict[str, Lane] = {}
         self._sending: list[asyncio.Task[None]] = []
@@ -136,9 +138,10 @@ class Pump:
 
     async def _connection(self, stop: asyncio.Event) -> None:
         feed = self._feed
-        begun = await unless(stop, self._begin())
-        if begun is None:
+        beginning = await unless(stop, self._begin())
+        if beginning is None:
             return
+        begun = beginning.after
         log.info("reading", feed=feed.name, **({} if feed.producer is None else {"after": begun}))
         if begun and not self.reached:
             log.info("goes on where it stopped; --producer NAME reads all again, as if nothing had been taken")
@@ -160,15 +163,18 @@ class Pump:
         await self._keep()
         self.at_end = at_end
 
-    async def _begin(self) -> int:
+    async def _begin(self) -> Beginning:
         known = self.reached or await self._known()
         self._was_there |= bool(known)
         self._broker_away.begins()
-        begun = await self._feed.begin(known)
+        beginning = await self._feed.begin(known)
         self._broker_away.ends()
         self._doubt.ends()
         self._was_there = True
-        return begun
+        self._identity.is_now(beginning.identity)
+        if known and not self.reached and (hull := self._settings.mapping.hull) is not None:
+            await self._identity.require_in(hull)
+        return beginning
 
     async def _known(self) -> int | None:
         """The number of the last message that the hull has, if all messages are for one hull."""
@@ -232,6 +238,7 @@ class Pump:
             self._client,
             hull,
             self._feed.producer,
+            self._identity,
             keyed=settings.mapping.keyed,
             degrees=settings.mapping.degrees,
             create=settings.create,
