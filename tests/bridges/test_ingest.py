@@ -19,6 +19,7 @@ from patience import PATIENCE, wait_until
 from ports import free_port
 from server_process import server_process
 
+from dynhull_bridges.ingest import jetstream
 from dynhull_client import HullClient, HullNotFoundError
 
 
@@ -36,7 +37,7 @@ def client(address: str) -> Iterator[HullClient]:
         yield client
 
 
-def publish(port: int, stream: str, messages: Sequence[tuple[str, Any]], *, anew: bool = False) -> None:
+def publish(port: int, stream: str, messages: Sequence[tuple[str, Any]], *, anew: bool = False, **limits: int) -> None:
     """Publish to subjects below the stream's name; each message is stored when this returns."""
 
     async def run() -> None:
@@ -44,7 +45,7 @@ def publish(port: int, stream: str, messages: Sequence[tuple[str, Any]], *, anew
             context = connection.jetstream()
             if anew:
                 await context.delete_stream(stream)
-            await context.add_stream(name=stream, subjects=[f"{stream}.>"])
+            await context.add_stream(name=stream, subjects=[f"{stream}.>"], **limits)
             for subject, message in messages:
                 payload = message if isinstance(message, bytes) else json.dumps(message).encode()
                 await context.publish(f"{stream}.{subject}", payload)
@@ -285,6 +286,50 @@ def test_a_hull_without_the_identity_of_its_stream_adopts_it(
     assert not [line for line in ingested(address, *options) if "taken for this log" in line["event"]]
     publish(nats_port, name, [("p", {"x": 1, "y": 1})] * 5, anew=True)
     refused(address, *options)
+
+
+def test_what_the_stream_removed_before_it_was_read(address: str, name: str, nats_port: int) -> None:
+    """It is named, and an error unless gaps are accepted."""
+    options = (f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, "--x", "$.x", "--y", "$.y")
+    message = ("p", {"x": 1, "y": 1})
+    publish(nats_port, name, [message] * 8, max_msgs=5)
+    assert ingested(address, *options)[-1]["points"] == 5, "nothing before the first start is missed"
+    publish(nats_port, name, [message] * 8, max_msgs=5)
+    with ingest_process(address, *options, "--to-end", code=1) as ingest:
+        ingest.process.wait(PATIENCE)
+        assert "messages 9 to 11, 3 at most, were removed before they were read: --accept-gaps" in ingest.lines()[-1]
+    said = ingested(address, *options, "--accept-gaps")
+    assert (said[-1]["points"], said[-1]["lost"]) == (5, 3)
+    assert [(line["first"], line["last"]) for line in said if line["level"] == "warning"] == [(9, 11)]
+    assert "lost" not in ingested(address, *options)[-1]
+
+
+def test_what_the_stream_replaced_by_newer_messages_of_its_subject_is_no_gap(
+    address: str, name: str, nats_port: int
+) -> None:
+    options = (f"nats://127.0.0.1:{nats_port}/{name}", "--hull", name, "--key", "{topic}")
+    for _ in range(2):
+        publish(nats_port, name, [("p", {"lon": i, "lat": 1}) for i in range(3)], max_msgs_per_subject=1)
+        assert ingested(address, *options)[-1]["points"] == 1
+
+
+def test_what_the_stream_removes_while_it_is_read(monkeypatch: pytest.MonkeyPatch, name: str, nats_port: int) -> None:
+    """A feed asks for one message at a time, and the stream keeps one."""
+    monkeypatch.setattr(jetstream, "PULLED", 1)
+    publish(nats_port, name, [("p", {})], max_msgs=1)
+
+    async def read() -> list[tuple[int, int]]:
+        feed = jetstream.JetStream(f"nats://127.0.0.1:{nats_port}/{name}", None, "mapping")
+        await feed.begin(0)
+        (first,) = await feed.read()
+        await asyncio.to_thread(publish, nats_port, name, [("p", {})] * 3, max_msgs=1)
+        found = [first]
+        while found[-1].number < 4:
+            found += await feed.read()
+        await feed.close()
+        return [(each.number, each.lost) for each in found]
+
+    assert asyncio.run(read()) == [(1, 0), (2, 0), (4, 1)]
 
 
 @pytest.mark.parametrize(("version", "share"), [("3.1.1", ""), ("5", "$share/g/")])

@@ -64,6 +64,14 @@ def ingest(
     max_bad: Annotated[
         int | None, typer.Option(min=0, help="End if there are more bad messages than this. Default: never.")
     ] = None,
+    accept_gaps: Annotated[
+        bool,
+        typer.Option(
+            "--accept-gaps",
+            help="NATS, Kafka: go on where the broker has removed messages before they were read, and count them. "
+            "Default: end.",
+        ),
+    ] = False,
     to_end: Annotated[
         bool, typer.Option("--to-end", help="NATS, Kafka: end when no message is left, rather than wait.")
     ] = False,
@@ -95,7 +103,8 @@ def ingest(
     the numbers (dynhull_client: last_sequence). MQTT does not: a message may be applied twice, which changes nothing
     for a key; so --key is required there.
 
-    Bad messages are counted, logged and, with --bad, kept aside. Exit code 1 if there were more than --max-bad.
+    Bad messages are counted, logged and, with --bad, kept aside. Exit code 1 if there were more than --max-bad, or if
+    the broker has removed messages that were not read yet, unless --accept-gaps.
     """
     import asyncio
 
@@ -121,6 +130,7 @@ def ingest(
         {"geographic": on_globe} if create else None,
         to_end,
         None if limit is None else limit.total_seconds(),
+        accept_gaps,
     )
     logs.configure(log_format.value)
     if mapping.swapped:

@@ -47,6 +47,7 @@ class Message:
         payload: its contents; None for a message without any.
         number: its place in the log, from 1, rising and perhaps with gaps; 0 where the broker has no log.
         token: what the feed needs to acknowledge it.
+        lost: so many messages, at most, were removed from right before it before they were read.
     """
 
     topic: str
@@ -54,6 +55,7 @@ class Message:
     payload: bytes | None
     number: int = 0
     token: int = 0
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +65,12 @@ class Beginning:
     Attributes:
         after: the number of the message that it begins after.
         identity: differs from that of any other log that has, had or will have the same name; 0 where there is none.
+        oldest: the number of the oldest message that has not been removed; 0 where all that matter are there.
     """
 
     after: int
     identity: int = 0
+    oldest: int = 0
 
 
 class Feed(Protocol):

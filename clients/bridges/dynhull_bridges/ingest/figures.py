@@ -17,12 +17,13 @@ class Figures:
         self.messages = counter("messages", "Messages read.")
         self.points = counter("points", "Points acknowledged by the server.")
         self.bad = counter("bad", "Messages that could not be taken.")
+        self.lost = counter("lost", "Messages, at most, that the broker removed before they were read.")
         self.restarts = counter("restarts", "Times that the feed began again after an error of the broker.")
         self.lag = Gauge("dynhull_ingest_lag", "Messages that are not taken.", ["feed"], registry=self._registry)
 
     def add(self, feed: str) -> None:
         """Show a feed from the start, not only after its first message."""
-        for each in (self.messages, self.points, self.bad, self.restarts):
+        for each in (self.messages, self.points, self.bad, self.lost, self.restarts):
             each.labels(feed)
 
     def serve(self, host: str, port: int) -> int:

@@ -16,7 +16,7 @@ from .feed import DoubtfulError, Feed, FeedError, check_producer
 from .figures import Figures
 from .lane import NotCreatedError
 from .mapping import Mapping
-from .pump import BROKER_AWAY, DOUBT, FIRST_PAUSE, LONGEST_PAUSE, Pump, Settings
+from .pump import BROKER_AWAY, DOUBT, FIRST_PAUSE, LONGEST_PAUSE, GapError, Pump, Settings
 
 log = structlog.get_logger("dynhull_ingest")
 Find = Callable[[], Awaitable[Sequence[Feed]]]
@@ -90,7 +90,7 @@ async def run(
         DynhullError: the server refuses to take points, or has been away for too long.
         FeedError: the broker has been away for too long.
         DoubtfulError: it has denied for some seconds what is to be read.
-        IngestError: points cannot be sent, or there are too many bad messages.
+        IngestError: points cannot be sent, messages are gone, or too many are bad.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -109,7 +109,7 @@ async def run(
         await running
     except ExceptionGroup as group:
         error = _first(group)
-        if isinstance(error, (NotCreatedError, TooManyBadError)):
+        if isinstance(error, (GapError, NotCreatedError, TooManyBadError)):
             raise IngestError(str(error)) from None
         raise error from None
     except asyncio.CancelledError:
@@ -124,8 +124,9 @@ async def run(
     ended, begun = [each.ended for each in pumps], [each.begun for each in pumps]
     seconds = max(ended, default=0.0) - min(begun, default=0.0)
     known = sum(each.known for each in pumps)
-    already = {"known_before": known} if known else {}
-    log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count, **already)
+    lost = sum(each.lost for each in pumps)
+    more = {**({"lost": lost} if lost else {}), **({"known_before": known} if known else {})}
+    log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count, **more)
     return bool(pumps) and all(each.at_end for each in pumps)
 
 

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 
 from nats.aio.msg import Msg
 from nats.errors import Error
-from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig, StreamInfo
+from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig, StreamConfig, StreamInfo
 from nats.js.errors import BadRequestError, BucketNotFoundError, KeyNotFoundError
 from nats.js.kv import KeyValue
 
@@ -85,6 +85,8 @@ class JetStream:
         self._left = 0  # messages after the last one read
         self._identity = 0
         self._keeps = False
+        self._next = 1  # the number of the next message, if there is no gap
+        self._without_gaps = False
 
     async def begin(self, known: int | None) -> Beginning:
         """Connect; see `Feed.begin`."""
@@ -106,6 +108,7 @@ class JetStream:
         self._client = await connected(self._server, TIMEOUT)
         self._context = self._client.jetstream(timeout=TIMEOUT)
         stream = await self._context.stream_info(self._stream)
+        config, oldest = stream.config, stream.state.first_seq
         self._identity = _microseconds(stream)
         self._keeps |= known is None
         after = await self._kept() if known is None else known
@@ -124,11 +127,13 @@ class JetStream:
         except BadRequestError as error:
             if error.err_code != NOT_IN_STREAM:
                 raise
-            there = ", ".join(stream.config.subjects or ())
+            there = ", ".join(config.subjects or ())
             raise ValueError(
                 f"the stream {self._stream!r} stores nothing of {self._subject!r}: its subjects are {there}"
             ) from None
         self._left = consumer.num_pending or 0
+        self._next = max(after + 1, oldest)
+        self._without_gaps = config.max_msgs_per_subject <= 0 and self._subject in (">", *_only(config.subjects))
         self._pull = f"$JS.API.CONSUMER.MSG.NEXT.{self._stream}.{consumer.name}"
         self._arrived.clear()
         self._asked = self._delivered = 0
@@ -137,7 +142,7 @@ class JetStream:
         await self._client.subscribe(inbox, cb=self._arrive)
         self._inbox = inbox
         await self._ask()
-        return Beginning(after, self._identity)
+        return Beginning(after, self._identity, 0 if _only_replaces(config) else oldest)
 
     async def _arrive(self, message: Msg) -> None:
         self._arrived.append(message)
@@ -160,6 +165,8 @@ class JetStream:
             raise FeedError(f"NATS: the server has said nothing for {SILENCE:.0f} s")
         if self._asked <= PULLED // 2:
             await self._ask()
+        if messages:
+            await self._look_for_gaps(messages)
         return messages
 
     def _take(self, message: Msg, messages: list[Message]) -> None:
@@ -179,6 +186,18 @@ class JetStream:
         if delivered != self._delivered:
             raise FeedError(f"NATS: message {self._delivered} of the consumer is missing")
         messages.append(Message(message.subject, self._captures(message.subject), message.data or None, number))
+
+    async def _look_for_gaps(self, messages: Sequence[Message]) -> None:
+        """Note what the stream has removed between messages, where its numbers have no other gaps."""
+        if self._without_gaps and messages[-1].number - self._next >= len(messages):
+            try:
+                oldest = (await self._context.stream_info(self._stream)).state.first_seq
+            except (Error, OSError, TimeoutError) as error:
+                raise self._failure(error) from None
+            for each in messages:
+                each.lost = max(0, min(each.number, oldest) - self._next)
+                self._next = each.number + 1
+        self._next = messages[-1].number + 1
 
     async def _ask(self) -> None:
         """Ask for more messages, so that some are always under way."""
@@ -228,6 +247,16 @@ class JetStream:
         client, self._client = self._client, None
         if client is not None:
             await closed(client)
+
+
+def _only(subjects: Sequence[str] | None) -> Sequence[str]:
+    return subjects if subjects is not None and len(subjects) == 1 else ()
+
+
+def _only_replaces(config: StreamConfig) -> bool:
+    """Whether a stream removes a message only when it has newer ones of the same subject."""
+    limits = config.max_age, config.max_msgs, config.max_bytes
+    return config.max_msgs_per_subject > 0 and all(each is None or each <= 0 for each in limits)
 
 
 def _microseconds(stream: StreamInfo) -> int:

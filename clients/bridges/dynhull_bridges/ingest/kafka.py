@@ -63,7 +63,7 @@ class Kafka:
             raise made_again(f"{self.name} ends at offset {end}, but {after} offsets of it have been taken")
         self._next = max(after, oldest)
         consumer.seek(partition, self._next)
-        return Beginning(after)
+        return Beginning(after, oldest=oldest + 1)
 
     async def read(self) -> Sequence[Message]:
         """The next messages; see `Feed.read`."""

@@ -37,12 +37,18 @@ class Settings:
         create: settings of hulls that do not exist; None to create none.
         to_end: whether to end once no message is left.
         patience: the seconds after which a broker that does not answer is given up; None for never.
+        accept_gaps: whether to go on where the broker has removed messages before they were read.
     """
 
     mapping: Mapping
     create: dict[str, Any] | None
     to_end: bool
     patience: float | None
+    accept_gaps: bool = False
+
+
+class GapError(Exception):
+    """The broker has removed messages before they were read."""
 
 
 class Pump:
@@ -63,6 +69,7 @@ class Pump:
     ) -> None:
         self.reached = 0  # the number of the last message read
         self.points = 0  # acknowledged
+        self.lost = 0  # messages, at most, that the broker removed before they were read
         self.at_end = False  # whether no message was left, and all were taken
         self.begun = self.ended = monotonic()  # when the first message was read, and the last point acknowledged
         self._client = client
@@ -145,7 +152,9 @@ class Pump:
         log.info("reading", feed=feed.name, **({} if feed.producer is None else {"after": begun}))
         if begun and not self.reached:
             log.info("goes on where it stopped; --producer NAME reads all again, as if nothing had been taken")
-        self.reached = max(self.reached, begun)
+        if begun and beginning.oldest > begun + 1:
+            self._lose(begun + 1, beginning.oldest - 1)
+        self.reached = max(self.reached, begun, beginning.oldest - 1)
         at_end = False
         while not stop.is_set():
             messages = await feed.read()
@@ -192,6 +201,9 @@ class Pump:
     async def _take(self, messages: Sequence[Message]) -> None:
         """Hand the rows of some messages to the lanes of their hulls."""
         self._figures.messages.labels(self._feed.name).inc(len(messages))
+        for each in messages:
+            if each.lost:
+                self._lose(each.number - each.lost, each.number - 1)
         self._read_so_far += len(messages)
         if not self.reached and not self.points and not self._under_way:
             self.begun = monotonic()
@@ -206,6 +218,18 @@ class Pump:
         taken.whole = True
         self._news.set()
         self.reached = max(self.reached, messages[-1].number)
+
+    def _lose(self, first: int, last: int) -> None:
+        """Count messages that were removed before they were read; GapError unless that is accepted."""
+        count = last - first + 1
+        if not self._settings.accept_gaps:
+            raise GapError(
+                f"{self._feed.name}: messages {first} to {last}, {count} at most, were removed before they were read: "
+                "--accept-gaps goes on without them"
+            )
+        log.warning("messages were removed before they were read", feed=self._feed.name, first=first, last=last)
+        self.lost += count
+        self._figures.lost.labels(self._feed.name).inc(count)
 
     def _tell(self) -> None:
         """Log, once, how the first time was read."""
