@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster cluster ray simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster cluster ray kafka simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -162,6 +162,13 @@ ray: .venv/.test  ## all tests of Ray: Datasets, and as a launcher of servers; `
 
 ends: .venv/.test  ## whatever waits in the SDK is cancelled and closed after each of 41 steps beside servers that have failed: how long it takes
 	CLIENT_CASES=all $(BIN)/pytest tests/client/test_ends.py -s
+
+build/kafka/.jars: tests/bridges/kafka/pom.xml
+	mvn -q -B -f $< dependency:copy-dependencies -DincludeScope=runtime -DoutputDirectory=$(CURDIR)/build/kafka
+	touch $@
+
+kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, which Maven brings (Debian: maven, default-jre-headless)
+	KAFKA_CASES=all $(BIN)/pytest tests/bridges/test_kafka.py
 
 soak: fuzz fuzz-server fuzz-gateway properties robustness robustness-cluster workers shards cluster ray ends simulate  ## all that takes too long for every run, for hours; `make test` has a short run of each
 	PYTHONPATH=tests $(BIN)/python -m simulation mutants

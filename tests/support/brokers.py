@@ -8,6 +8,9 @@ from pathlib import Path
 
 from patience import PATIENCE, wait_until
 from peers import program
+from ports import free_port
+
+KAFKA_JARS = Path(__file__).parents[2] / "build" / "kafka"
 
 
 @contextmanager
@@ -33,6 +36,32 @@ def mosquitto(folder: Path, port: int, *settings: str) -> list[object]:
 def nats_server(folder: Path, port: int) -> list[object]:
     """The command of a NATS server with JetStream."""
     return [program("nats-server"), "-js", "-a", "127.0.0.1", "-p", port, "-sd", folder / "nats"]
+
+
+def kafka(folder: Path, port: int) -> list[object]:
+    """The command of a Kafka broker that is its own controller; `make kafka` brings its jars."""
+    config = folder / "kafka.properties"
+    controller = free_port()
+    settings = {
+        "process.roles": "broker,controller",
+        "node.id": 1,
+        "controller.quorum.voters": f"1@127.0.0.1:{controller}",
+        "controller.listener.names": "CONTROLLER",
+        "listeners": f"PLAINTEXT://127.0.0.1:{port},CONTROLLER://127.0.0.1:{controller}",
+        "log.dirs": folder / "log",
+        "auto.create.topics.enable": "false",
+        "offsets.topic.num.partitions": 1,
+        "offsets.topic.replication.factor": 1,
+        "transaction.state.log.num.partitions": 1,
+        "transaction.state.log.replication.factor": 1,
+        "transaction.state.log.min.isr": 1,
+    }
+    config.write_text("".join(f"{name}={value}\n" for name, value in settings.items()))
+    java = [program("java"), "-XX:TieredStopAtLevel=1", "-Xmx512m", "-cp", KAFKA_JARS / "*"]
+    cluster = "AAAAAAAAAAAAAAAAAAAAAQ"  # any id
+    formatting = [*java, "kafka.tools.StorageTool", "format", "-t", cluster, "-c", config]
+    subprocess.run([*map(str, formatting)], check=True, capture_output=True)
+    return [*java, "kafka.Kafka", config]
 
 
 def _listens(port: int) -> bool:

@@ -36,10 +36,10 @@ class LogIdentity:
         self._adopted = False  # whether the log says so
 
     def is_now(self, number: int) -> None:
-        """Note the identity, 0 for none; ValueError if the feed began with another one before."""
-        if self._number not in (0, number):
+        """Note the identity, 0 where the broker says none; ValueError if the feed began with another one before."""
+        if number and self._number not in (0, number):
             raise made_again(f"{self._feed.name} is another log than before")
-        self._number = number
+        self._number = number or self._number
 
     async def require_in(self, hull: str) -> None:
         """Have a hull take the messages of this log only.

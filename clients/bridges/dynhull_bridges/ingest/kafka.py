@@ -1,6 +1,7 @@
 """A partition of a Kafka topic as a log: the number of a message is its offset, plus one."""
 
 from collections.abc import Sequence
+from time import monotonic
 from urllib.parse import unquote, urlsplit
 
 from aiokafka import AIOKafkaConsumer, TopicPartition
@@ -11,10 +12,12 @@ from ..refusals.kafka import KAFKA
 from ..urls import options_of, without_secrets
 from .feed import Beginning, FeedError, Message, feed_error, producer_name, refusal
 from .identity import made_again
+from .topic_id import topic_id
 
 WAIT = 1000  # milliseconds that a read waits for messages
 MOST = 4096  # messages of one read
 GROUP = "dynhull-ingest"
+ASK_EVERY = 30.0  # seconds after which a topic is asked again for its id
 
 
 class Kafka:
@@ -36,7 +39,8 @@ class Kafka:
         self._partition = TopicPartition(topic, partition)
         self._captures = (topic,)
         self._consumer: AIOKafkaConsumer | None = None
-        self._next = 0
+        self._identity = 0
+        self._asked = 0.0  # when the topic was asked for its id
         self._keeps = False
 
     async def begin(self, known: int | None) -> Beginning:
@@ -57,23 +61,36 @@ class Kafka:
             after = (await consumer.committed(partition) or 0) if known is None else known
             oldest = (await consumer.beginning_offsets([partition]))[partition]
             end = (await consumer.end_offsets([partition]))[partition]
+            self._identity = await self._id()
         except (KafkaError, OSError) as error:
             raise _failure(error) from None
         if after > end:
             raise made_again(f"{self.name} ends at offset {end}, but {after} offsets of it have been taken")
-        self._next = max(after, oldest)
-        consumer.seek(partition, self._next)
-        return Beginning(after, oldest=oldest + 1)
+        consumer.seek(partition, max(after, oldest))
+        self._asked = monotonic()
+        return Beginning(after, self._identity, oldest + 1)
+
+    async def _id(self) -> int:
+        """The id of the topic as a number of a batch: 63 of its bits, most of them random; 0 if it has none."""
+        found = await topic_id(self._servers, self._partition.topic)
+        return 0 if found is None else int.from_bytes(found[:8]) >> 1
 
     async def read(self) -> Sequence[Message]:
-        """The next messages; see `Feed.read`."""
+        """The next messages; see `Feed.read`.
+
+        aiokafka goes on at its offset in a topic that was made again, if that is as long already.
+        """
+        same = True
         try:
             found = await self._connected.getmany(self._partition, timeout_ms=WAIT, max_records=MOST)
+            if monotonic() - self._asked > ASK_EVERY:
+                self._asked = monotonic()
+                same = await self._id() == self._identity
         except (KafkaError, OSError) as error:
             raise _failure(error) from None
+        if not same:
+            raise FeedError("Kafka: the topic has another id")
         records = found.get(self._partition, ())
-        if records:
-            self._next = records[-1].offset + 1
         return [Message(each.topic, self._captures, each.value, each.offset + 1) for each in records]
 
     async def keep(self, messages: Sequence[Message]) -> None:
@@ -88,7 +105,14 @@ class Kafka:
     async def lag(self) -> int | None:
         """The number of messages that are not read yet."""
         end = self._connected.highwater(self._partition)
-        return None if end is None else max(0, end - self._next)
+        if end is None:
+            return None
+        try:
+            # Beyond the last record, as the mark that ends a transaction has an offset, too.
+            position = await self._connected.position(self._partition)
+        except KafkaError as error:
+            raise feed_error("Kafka", error) from None
+        return max(0, int(end - position))
 
     async def close(self) -> None:
         """Disconnect."""
