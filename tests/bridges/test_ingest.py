@@ -76,6 +76,17 @@ def test_each_message_is_a_position_of_a_key(client: HullClient, address: str, n
     assert said[-1]["points"] == 1
 
 
+def test_messages_without_contents_delete_keys(client: HullClient, address: str, name: str, nats_port: int) -> None:
+    """In the order of the log, and once: a key that comes back afterwards stays."""
+    at = {"lon": 1, "lat": 2}
+    publish(nats_port, name, [("a", at), ("b", at), ("a", b""), ("b", b""), ("b", at), ("unknown", b"")])
+    options = (f"nats://127.0.0.1:{nats_port}/{name}/{name}.*", "--hull", name, "--key", "{1}")
+    said = ingested(address, *options, "--tombstones", "delete")
+    assert (said[-1]["points"], said[-1]["bad"]) == (6, 0)
+    assert client.get_hull(name).info.points == 1
+    assert positions(client, name, ["b"]) == {"b": (1, 2)}
+
+
 def test_a_mapping_that_looks_wrong_is_warned_about(address: str, name: str, nats_port: int) -> None:
     publish(nats_port, name, [("p", {"lon": 1, "lat": 2, "ts": 1_700_000_000})] * 3)
     options = ("--key", "{topic}", "--time", "$.ts", "--time-unit", "ms", "--x", "$.lat", "--y", "$.lon")
@@ -442,11 +453,14 @@ def test_a_server_that_is_away(name: str, nats_port: int) -> None:
         (["nats://b/s", "--hull", "h", "--producer", "a b"], "--producer 'a b': a name has 1 to 200 letters"),
         (["nats://b/a.b", "--hull", "h"], "no stream of NATS is called 'a.b'"),
         (["nats://b/s", "--hull", "h", "--key", "{1"], "--key '{1': { has no other brace; {1}, {2}, ..."),
-        (["nats://b/s", "--hull", "h", "--key", "{tpic}"], "--key: {tpic} is not {topic}, a path {$.name}"),
+        (["nats://b/s", "--hull", "h", "--key", "{tpic}"], "--key: {tpic} is not {topic}, {key}, a path {$.name}"),
         (["nats://b/s", "--hull", "h", "--x", "$.a b"], "' b' at position 4 is no .name, [index] or ['name']"),
         (["nats://b/s", "--hull", "h", "--x", "lon"], "--x 'lon' is the same for all messages"),
         (["nats://b/s", "--hull", "h/{0}"], "--hull: {0} is not {topic}"),
         (["nats://b/s", "--hull", "h", "--each", "points"], "--each 'points' is no path"),
+        (["nats://b/s", "--hull", "h", "--tombstones", "delete"], "--tombstones delete is for points with keys"),
+        (["kafka://b/s", "--hull", "h", "--tombstones", "delete", "--key", "$.id"], "--key '$.id' is in the message"),
+        (["nats://b/s", "--hull", "{$.h}", "--tombstones", "delete", "--key", "{1}"], "--hull '{$.h}' is in the"),
         (["nats://b/s", "--hull", "h", "--report", "soon"], "--report"),
         (["nats://b/s", "--hull", "h", "--patience", "-1s"], "--patience '-1s' is not a time span"),
     ],

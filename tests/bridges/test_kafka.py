@@ -195,6 +195,21 @@ def test_a_hull_without_the_identity_of_its_topic_adopts_it(
     refused(address, *options(servers, topic, name))
 
 
+def test_records_without_a_value_delete_their_keys(
+    client: HullClient, address: str, servers: str, topic: str, name: str
+) -> None:
+    made(servers, topic)
+    for key in (b"a", b"b"):
+        send(servers, topic, [POINT], key)
+    send(servers, topic, [None], b"a")
+    send(servers, topic, [POINT])
+    given = (*options(servers, topic, name), "--key", "{key}", "--tombstones", "delete")
+    said = ingested(address, *given)[-1]
+    assert (said["points"], said["bad"]) == (3, 1), "one has no key"
+    assert client.get_hull(name).info.points == 1
+    assert client.positions(name, ["b"]).positions.tolist() == [[1, 1]]
+
+
 def test_what_the_topic_removed_before_it_was_read(address: str, servers: str, topic: str, name: str) -> None:
     made(servers, topic)
     send(servers, topic, [POINT] * 3)

@@ -34,6 +34,9 @@ class Chunk:
 
     Args:
         taken: what the messages belong to; it waits for the chunk.
+
+    Attributes:
+        deletes: whether its keys are deleted, rather than put.
     """
 
     def __init__(self, taken: Taken) -> None:
@@ -42,6 +45,7 @@ class Chunk:
         self.keys: list[Any] = []
         self.points: list[tuple[float, float]] = []
         self.times: list[int | None] = []
+        self.deletes = False
         self._known: set[Any] = set()
         taken.left += 1
 
@@ -54,11 +58,14 @@ class Chunk:
         """Whether the rows of another message fit."""
         if not self.messages:
             return True
+        if rows[0].deletes != self.deletes:
+            return False
         return len(self.points) + len(rows) <= MOST_ROWS and self._known.isdisjoint(row.key for row in rows)
 
     def add(self, message: Message, rows: list[Row]) -> None:
         """Add the rows of a message."""
         self.messages.append((message, rows))
+        self.deletes = rows[0].deletes
         for row in rows:
             self.points.append((row.x, row.y))
             self.times.append(row.time)

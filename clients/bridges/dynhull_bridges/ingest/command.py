@@ -1,5 +1,6 @@
 """`dynhull ingest`."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +12,13 @@ from dynhull_cli.exits import Exit
 from dynhull_cli.times import TimeUnit
 
 from ..command import LogForm
+
+
+class Tombstones(StrEnum):
+    """What a message without contents is."""
+
+    BAD = "bad"
+    DELETE = "delete"
 
 
 def _mapping(text: str, *names: str) -> Any:
@@ -43,6 +51,13 @@ def ingest(
     each: Annotated[
         str | None, _mapping("Path to an array with a point in each element. Default: a message is one point.")
     ] = None,
+    tombstones: Annotated[
+        Tombstones,
+        typer.Option(
+            help="What a message without contents is: bad, or one that deletes its key.",
+            rich_help_panel="From messages to points",
+        ),
+    ] = Tombstones.BAD,
     create: Annotated[bool, typer.Option(help="Create hulls that do not exist.")] = True,
     geographic: Annotated[
         bool | None,
@@ -97,7 +112,8 @@ def ingest(
         dynhull ingest kafka://broker:9092/positions --hull fleet --key '$.vehicle.id' --x '$.pos[0]' --y '$.pos[1]'
 
     Messages are JSON. An expression is a path into it, as $.position.lon, or a text in which {1}, {2}, ... are what the
-    wildcards of the topic stand for, {topic} is the topic, {$.path} is taken from the message, and {{ is a brace.
+    wildcards of the topic stand for, {topic} is the topic, {key} the key of a Kafka record, {$.path} is taken from the
+    message, and {{ is a brace.
 
     NATS JetStream and Kafka number their messages: each is applied exactly once, whatever is killed; the hull counts
     the numbers (dynhull_client: last_sequence). MQTT does not: a message may be applied twice, which changes nothing
@@ -120,7 +136,8 @@ def ingest(
     from .mapping import Mapping
     from .pump import Settings
 
-    mapping = Mapping(hull, x, y, key, time, time_unit, each)
+    deletes = tombstones is Tombstones.DELETE
+    mapping = Mapping(hull, x, y, key, time, time_unit, each, deletes=deletes)
     on_globe = mapping.degrees if geographic is None else geographic
     given = (("--grace", grace), ("--report", report), ("--patience", patience))
     seconds = {option: duration(text, option) for option, text in given}

@@ -1,7 +1,8 @@
 """Expressions that take a value from a message: paths into its JSON, and texts with places to fill in.
 
 A path is a singular query of JSONPath (RFC 9535): `$`, then names and indices, as in `$.position[0]` or `$['a b'].c`.
-A text may have `{1}`, `{2}`, ... for the wildcards of the topic, `{topic}`, and `{$.path}`; `{{` and `}}` are braces.
+A text may have `{1}`, `{2}`, ... for the wildcards of the topic, `{topic}`, `{key}` for the key of a Kafka record, and
+`{$.path}`; `{{` and `}}` are braces.
 """
 
 import re
@@ -15,7 +16,7 @@ STEP = re.compile(
 )
 FIELD = re.compile(r"(\{\{|\}\}|\{[^{}]*\}|[{}])")
 DOUBLED = {"{{": "{", "}}": "}"}
-PLACES = "{1}, {2}, ... (wildcards of the topic), {topic} and {$.path}"
+PLACES = "{1}, {2}, ... (wildcards of the topic), {topic}, {key} and {$.path}"
 MISSING: Any = object()
 
 Value = Callable[[Message, Any], Any]
@@ -51,6 +52,11 @@ def is_fixed(text: str) -> bool:
     return not text.startswith("$") and all(each in DOUBLED for each in FIELD.findall(text))
 
 
+def is_in_document(text: str) -> bool:
+    """Whether an expression takes something from the JSON document."""
+    return text.startswith("$") or any(each.startswith("{$") for each in FIELD.findall(text))
+
+
 def _piece(text: str, whole: str, option: str) -> str | Value:
     """What a brace stands for, with the text up to the one that closes it."""
     if text in DOUBLED:
@@ -67,6 +73,8 @@ def _field(text: str, option: str) -> Value:
         return _at(_steps(text, option))
     if text == "topic":
         return lambda message, _document: message.topic
+    if text == "key":
+        return lambda message, _document: MISSING if message.key is None else _decoded(message.key)
     if text.isdecimal() and int(text) >= 1:
         index = int(text) - 1
 
@@ -75,9 +83,16 @@ def _field(text: str, option: str) -> Value:
 
         return captured
     raise ValueError(
-        f"{option}: {{{text}}} is not {{topic}}, a path {{$.name}}, or the number of a wildcard from {{1}}; "
+        f"{option}: {{{text}}} is not {{topic}}, {{key}}, a path {{$.name}}, or the number of a wildcard from {{1}}; "
         "{{ and }} stand for braces"
     )
+
+
+def _decoded(key: bytes) -> str:
+    try:
+        return key.decode()
+    except UnicodeDecodeError:
+        raise ValueError(f"the key of the record is no text of UTF-8: {key!r}") from None
 
 
 def _text(value: Any, expression: str) -> str:

@@ -45,6 +45,7 @@ class Message:
         topic: the topic or subject it was sent to.
         captures: what the wildcards of the filter stand for in it.
         payload: its contents; None for a message without any.
+        key: its key, where the broker's messages have one.
         number: its place in the log, from 1, rising and perhaps with gaps; 0 where the broker has no log.
         token: what the feed needs to acknowledge it.
         lost: so many messages, at most, were removed from right before it before they were read.
@@ -56,6 +57,7 @@ class Message:
     number: int = 0
     token: int = 0
     lost: int = 0
+    key: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,7 +91,8 @@ class Kafka:
         if not same:
             raise FeedError("Kafka: the topic has another id")
         records = found.get(self._partition, ())
-        return [Message(each.topic, self._captures, each.value, each.offset + 1) for each in records]
+        topic, captures = self._partition.topic, self._captures
+        return [Message(topic, captures, each.value, each.offset + 1, key=each.key) for each in records]
 
     async def keep(self, messages: Sequence[Message]) -> None:
         """Commit the offset after the last one, unless the hull keeps it."""

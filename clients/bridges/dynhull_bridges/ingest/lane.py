@@ -189,7 +189,9 @@ class Lane:
         sequence = rest.number if self._producer is not None else None
         times = rest.times if rest.times[0] is not None else None
         try:
-            if self._keyed:
+            if rest.deletes:
+                outcome = await writer.remove(self._keys(rest), sequence=sequence)
+            elif self._keyed:
                 outcome = await writer.put(keys=self._keys(rest), points=rest.points, times=times, sequence=sequence)
             else:
                 outcome = await writer.put(rest.points, times=times, sequence=sequence)

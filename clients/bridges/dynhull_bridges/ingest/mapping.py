@@ -12,20 +12,21 @@ import orjson
 from dynhull_cli.columns import are_degrees, is_number, plain
 from dynhull_cli.times import EPOCH, NAMES, TimeReader, TimeUnit
 
-from .expressions import MISSING, is_fixed, last_name, value_of
+from .expressions import MISSING, is_fixed, is_in_document, last_name, value_of
 from .feed import Message
 
 EARLIEST, LATEST = 1990, 2100  # years in which positions are taken
 
 
 class Row(NamedTuple):
-    """A position; `time` is in microseconds since 1970."""
+    """A position, or the end of a key; `time` is in microseconds since 1970."""
 
     hull: str
     key: Any
     x: float
     y: float
     time: int | None
+    deletes: bool = False
 
 
 class Mapping:
@@ -38,6 +39,7 @@ class Mapping:
         time: an expression for the event time; None for none.
         time_unit: the unit of times that are numbers; None for that which the first one seems to have.
         each: a path to an array with a row in each element; None if a message is one row.
+        deletes: whether a message without contents deletes its key.
 
     Attributes:
         hull: the hull of all messages; None if it depends on the message.
@@ -52,11 +54,21 @@ class Mapping:
     """
 
     def __init__(
-        self, hull: str, x: str, y: str, key: str | None, time: str | None, time_unit: TimeUnit | None, each: str | None
+        self,
+        hull: str,
+        x: str,
+        y: str,
+        key: str | None,
+        time: str | None,
+        time_unit: TimeUnit | None,
+        each: str | None,
+        *,
+        deletes: bool = False,
     ) -> None:
         self.hull = hull if is_fixed(hull) else None
         self.keyed = key is not None
-        self.digest = sha256(repr((hull, x, y, key, time, str(time_unit), each)).encode()).hexdigest()[:12]
+        more = ("delete",) if deletes else ()
+        self.digest = sha256(repr((hull, x, y, key, time, str(time_unit), each, *more)).encode()).hexdigest()[:12]
         self.degrees = are_degrees(last_name(x), last_name(y))
         self.swapped = are_degrees(last_name(y), last_name(x))
         self.warning: str | None = None
@@ -72,9 +84,21 @@ class Mapping:
         if each is not None and not each.startswith("$"):
             raise ValueError(f"--each {each!r} is no path: it begins with $")
         self._each = None if each is None else value_of(each, "--each")
+        self._deletes = deletes
+        if deletes:
+            if key is None:
+                raise ValueError("--tombstones delete is for points with keys: give --key")
+            for name, text in (("hull", hull), ("key", key)):
+                if is_in_document(text):
+                    raise ValueError(
+                        f"--{name} {text!r} is in the message, and one that deletes is empty: give {{topic}}, "
+                        "{1}, ... or {key}, the key of a record of Kafka"
+                    )
 
     def rows(self, message: Message) -> list[Row]:
         """The rows of a message; ValueError says what is wrong with it."""
+        if message.payload is None and self._deletes:
+            return [Row(self._name(message, None), self._key_of(message, None), math.nan, math.nan, None, deletes=True)]
         return [self._row(message, document) for document in self._documents(message)]
 
     def _documents(self, message: Message) -> Iterator[Any]:
@@ -93,11 +117,7 @@ class Mapping:
         yield from elements
 
     def _row(self, message: Message, document: Any) -> Row:
-        key, time = None, None
-        if self._key is not None:
-            key = self._key(message, document)
-            if not isinstance(key, (str, int)) or isinstance(key, bool):
-                raise ValueError(f"the key is {_shown(key)}, not a string or an integer")
+        key, time = self._key_of(message, document), None
         if self._time is not None:
             found = _present(self._time(message, document), "time")
             time = self.times.read(found)
@@ -106,10 +126,21 @@ class Mapping:
                 self._look_at(found, time)
         x = _number(self._x(message, document), "x")
         y = _number(self._y(message, document), "y")
+        return Row(self._name(message, document), key, x, y, time)
+
+    def _name(self, message: Message, document: Any) -> str:
         hull = self._hull(message, document)
         if not isinstance(hull, str):
             raise ValueError(f"the hull is {_shown(hull)}, not a string")
-        return Row(hull, key, x, y, time)
+        return hull
+
+    def _key_of(self, message: Message, document: Any) -> Any:
+        if self._key is None:
+            return None
+        key = self._key(message, document)
+        if not isinstance(key, (str, int)) or isinstance(key, bool):
+            raise ValueError(f"the key is {_shown(key)}, not a string or an integer")
+        return key
 
     def _look_at(self, found: Any, time: int) -> None:
         """Warn if a number is a time of another age, in this unit."""
