@@ -146,6 +146,7 @@ REFUSALS = [
     refusals.HullNotFoundError("a"),
     refusals.HullExistsError("a"),
     refusals.SequenceGapError("p", 3, 2),
+    refusals.RestoredError("a", "uid", "p", 2),
     refusals.HullEmptyError("a"),
     refusals.HullUnsuitableError("a", "has the point (1.0, 2.0)", (1.0, 2.0)),
     refusals.HullReplacedError("a", "uid"),

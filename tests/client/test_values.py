@@ -83,6 +83,7 @@ EXPORTED = [
     "ProducerInUseError",
     "Progress",
     "Quarantine",
+    "RestoredError",
     "RevisionForgottenError",
     "Sampled",
     "Separation",

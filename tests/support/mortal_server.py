@@ -44,5 +44,5 @@ class MortalServer:
 
     def kill(self) -> None:
         self.up.clear()
-        self._process.kill()
-        self._process.wait()
+        with self._process:
+            self._process.kill()

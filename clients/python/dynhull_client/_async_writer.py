@@ -9,7 +9,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
 
 from ._async_connection import end, unless
-from ._calls import Writing, last_sequence
+from ._calls import Writing, known
 from ._errors import DynhullError
 from ._gathering import put_parts, remove_parts
 from ._outcomes import settle
@@ -49,6 +49,13 @@ class AsyncWriter:
         if self._window is None:
             raise RuntimeError("the writer has not started: put points, or use it in an async with statement")
         return self._window.sequence
+
+    @property
+    def uid(self) -> str:
+        """The uid of the hull, for a later writer. RuntimeError before the writer has started."""
+        if self._window is None:
+            raise RuntimeError("the writer has not started: put points, or use it in an async with statement")
+        return self._window.uid
 
     async def put(
         self,
@@ -135,7 +142,7 @@ class AsyncWriter:
     async def _open(self) -> Window[asyncio.Future[Applied]]:
         async with self._opening:
             if self._window is None:
-                asking = self._connection.answer(last_sequence(self._writing.name, self._writing.producer))
+                asking = self._connection.answer(known(self._writing))
                 begin = await unless(self._closed, asking)
                 if self._closed.is_set() or begin is None:
                     raise RuntimeError(CLOSED)

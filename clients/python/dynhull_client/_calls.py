@@ -480,6 +480,25 @@ def last_sequence(name: str, producer: str, *, timeout: float | None = None) -> 
     return Call("GetProducer", request, lambda response: int(response.last_sequence), timeout)
 
 
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What a hull knows of a producer.
+
+    Attributes:
+        sequence: the number of the last batch that was applied; 0 if there is none.
+        uid: the uid of the hull; empty if the server is an older one.
+    """
+
+    sequence: int
+    uid: str
+
+
+def known(writing: Writing) -> Call[Known]:
+    """What the hull knows of the producer of a writer."""
+    request = pb.GetProducerRequest(name=writing.name, producer=writing.producer, uid=writing.uid)
+    return Call("GetProducer", request, lambda response: Known(int(response.last_sequence), response.uid), None)
+
+
 def locate(
     name: str,
     xy: npt.ArrayLike | None = None,
@@ -736,6 +755,7 @@ class Writing:
     stop_on_error: bool
     patience: float
     may_skip: bool
+    uid: str
 
 
 def writer(
@@ -750,6 +770,7 @@ def writer(
     stop_on_error: bool = False,
     patience: float = 60.0,
     may_skip: bool = False,
+    uid: str = "",
 ) -> Writing:
     """A writer that gathers points into batches, each applied exactly once.
 
@@ -779,6 +800,8 @@ def writer(
             The batch of several puts has the number of the last one, so the writer's `sequence` is where to continue
             after a restart. If another writer with the name has applied batches in the meantime, this one ends with
             SequenceGapError. Needs a `producer`.
+        uid: the uid of the hull that an earlier writer with this name wrote to: RestoredError if a backup of the hull
+            was restored since then. A writer also ends with that error if that happens while it writes.
     """
     if may_skip and producer is None:
         raise ValueError("may_skip needs a producer, whose numbers go on after a restart")
@@ -789,7 +812,7 @@ def writer(
     if coalesce not in (None, "last"):
         raise ValueError(f'coalesce must be None or "last", got {coalesce!r}')
     return Writing(
-        name, producer, batch_points, linger, in_flight, missing, coalesce, stop_on_error, patience, may_skip
+        name, producer, batch_points, linger, in_flight, missing, coalesce, stop_on_error, patience, may_skip, uid
     )
 
 

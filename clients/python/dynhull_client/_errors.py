@@ -87,6 +87,24 @@ class ProducerInUseError(DynhullError):
     """A writer's batch had been applied before it was sent: another writer uses the same producer name."""
 
 
+class RestoredError(DynhullError):
+    """The hull was restored from a backup that lacks some of the producer's batches; nothing was applied.
+
+    `last` is the number of the producer's last batch that the backup has. A new writer with the name of this producer
+    begins there: give it everything after that batch again.
+    """
+
+    @property
+    def last(self) -> int | None:
+        """The number of the last batch that the hull has; 0 if it has none."""
+        return _number(self.metadata.get("last"))
+
+    @property
+    def uid(self) -> str | None:
+        """The present uid of the hull."""
+        return self.metadata.get("uid")
+
+
 class HullEmptyError(DynhullError, ValueError):
     """The query has no answer for a hull without points."""
 
@@ -187,6 +205,7 @@ BY_REASON: Mapping[str, type[DynhullError]] = {
     "OUTCOME_UNKNOWN": OutcomeUnknownError,
     "PERMISSION_DENIED": PermissionDeniedError,
     "POINT_MISSING": PointMissingError,
+    "RESTORED": RestoredError,
     "REVISION_FORGOTTEN": RevisionForgottenError,
     "SEQUENCE_AHEAD": SequenceAheadError,
     "SEQUENCE_GAP": SequenceGapError,

@@ -12,12 +12,13 @@ import grpc
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ._calls import Writing
+from ._calls import Known, Writing
 from ._errors import (
     DynhullError,
     HullNotFoundError,
     PermissionDeniedError,
     ProducerInUseError,
+    RestoredError,
     SequenceGapError,
     UnauthenticatedError,
 )
@@ -30,7 +31,14 @@ if TYPE_CHECKING:
     from concurrent.futures import Future as ThreadFuture
 
 # These refuse the writer, not one of its batches.
-FATAL = (HullNotFoundError, PermissionDeniedError, ProducerInUseError, SequenceGapError, UnauthenticatedError)
+FATAL = (
+    HullNotFoundError,
+    PermissionDeniedError,
+    ProducerInUseError,
+    RestoredError,
+    SequenceGapError,
+    UnauthenticatedError,
+)
 Future = TypeVar("Future", "ThreadFuture[Applied]", "TaskFuture[Applied]")
 LARGEST_SEQUENCE = 2**63 - 1
 # The size up to which batches share a message: beyond that, the cost of a message does not count.
@@ -79,13 +87,15 @@ class Window(Generic[Future]):
 
     Attributes:
         sequence: the number of the last acknowledged batch.
+        uid: the uid of the hull; empty if the server is an older one, which does not say it.
         failure: the error that ended the writer; None while it works.
         begun: the number of batches begun.
         settled: the number of batches applied or refused.
     """
 
-    def __init__(self, writing: Writing, sequence: int, new_outcome: Callable[[], Future]) -> None:
-        self.sequence = sequence
+    def __init__(self, writing: Writing, known: Known, new_outcome: Callable[[], Future]) -> None:
+        self.sequence = sequence = known.sequence
+        self.uid = known.uid
         self.failure: DynhullError | None = None
         self.begun = 0
         self.settled = 0
@@ -158,7 +168,11 @@ class Window(Generic[Future]):
         """The first message of a connection."""
         writing = self._writing
         return pb.StreamRequest(
-            name=writing.name, producer=writing.producer, accept_results=True, may_skip=writing.may_skip
+            name=writing.name,
+            producer=writing.producer,
+            accept_results=True,
+            may_skip=writing.may_skip,
+            uid=self.uid,
         )
 
     @property

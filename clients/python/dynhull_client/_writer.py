@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import grpc
 
-from ._calls import Writing, last_sequence
+from ._calls import Known, Writing, known
 from ._errors import DynhullError, error_of
 from ._gathering import put_parts, remove_parts
 from ._outcomes import Outcome, settle
@@ -60,6 +60,13 @@ class Writer:
         if self._window is None:
             raise RuntimeError("the writer has not started: put points, or use it in a with statement")
         return self._window.sequence
+
+    @property
+    def uid(self) -> str:
+        """The uid of the hull, for a later writer. RuntimeError before the writer has started."""
+        if self._window is None:
+            raise RuntimeError("the writer has not started: put points, or use it in a with statement")
+        return self._window.uid
 
     def put(
         self,
@@ -169,8 +176,7 @@ class Writer:
         with self._opening:
             if self._window is None:
                 try:
-                    asking = last_sequence(self._writing.name, self._writing.producer)
-                    begin = self._connection.answer(asking, self._hold, lambda: self._closed)
+                    begin = self._connection.answer(known(self._writing), self._hold, lambda: self._closed)
                 except DynhullError:
                     if self._closed:
                         raise RuntimeError(CLOSED) from None
@@ -182,8 +188,8 @@ class Writer:
                 raise RuntimeError(CLOSED)
             return self._window
 
-    def _begin(self, sequence: int) -> None:
-        self._window = Window(self._writing, sequence, Outcome)
+    def _begin(self, begin: Known) -> None:
+        self._window = Window(self._writing, begin, Outcome)
         name = f"writer to {self._writing.name}"
         self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
         self._thread.start()

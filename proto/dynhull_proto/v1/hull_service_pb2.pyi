@@ -149,20 +149,22 @@ class ListHeldResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., speeds: _Optional[_Iterable[float]] = ..., growths: _Optional[_Iterable[float]] = ..., revisions: _Optional[_Iterable[int]] = ..., confirmations: _Optional[_Iterable[int]] = ..., held_count: _Optional[int] = ..., next_page_token: _Optional[str] = ...) -> None: ...
 
 class ApplyRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence")
+    __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence", "uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
     AFTER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
     sequence: int
     may_skip: bool
     after_sequence: int
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ...) -> None: ...
+    uid: str
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class ApplyResponse(_message.Message):
     __slots__ = ("result",)
@@ -197,20 +199,22 @@ class ApplyTogetherResponse(_message.Message):
     def __init__(self, results: _Optional[_Iterable[_Union[_batch_pb2.BatchResult, _Mapping]]] = ...) -> None: ...
 
 class IngestRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence")
+    __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence", "uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
     AFTER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
     sequence: int
     may_skip: bool
     after_sequence: int
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ...) -> None: ...
+    uid: str
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class IngestResponse(_message.Message):
     __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates", "moved", "stale", "late", "skipped", "clamped", "evicted", "held", "released", "dropped")
@@ -249,7 +253,7 @@ class IngestResponse(_message.Message):
     def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., held: _Optional[int] = ..., released: _Optional[int] = ..., dropped: _Optional[int] = ...) -> None: ...
 
 class StreamRequest(_message.Message):
-    __slots__ = ("name", "batch", "producer", "sequence", "batches", "accept_results", "may_skip", "after_sequence")
+    __slots__ = ("name", "batch", "producer", "sequence", "batches", "accept_results", "may_skip", "after_sequence", "uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
@@ -258,6 +262,7 @@ class StreamRequest(_message.Message):
     ACCEPT_RESULTS_FIELD_NUMBER: _ClassVar[int]
     MAY_SKIP_FIELD_NUMBER: _ClassVar[int]
     AFTER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
     producer: str
@@ -266,7 +271,8 @@ class StreamRequest(_message.Message):
     accept_results: bool
     may_skip: bool
     after_sequence: int
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., batches: _Optional[_Iterable[_Union[NumberedBatch, _Mapping]]] = ..., accept_results: bool = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ...) -> None: ...
+    uid: str
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., batches: _Optional[_Iterable[_Union[NumberedBatch, _Mapping]]] = ..., accept_results: bool = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class NumberedBatch(_message.Message):
     __slots__ = ("batch", "sequence", "after_sequence")
@@ -301,18 +307,22 @@ class NumberedResult(_message.Message):
     def __init__(self, result: _Optional[_Union[_batch_pb2.BatchResult, _Mapping]] = ..., sequence: _Optional[int] = ...) -> None: ...
 
 class GetProducerRequest(_message.Message):
-    __slots__ = ("name", "producer")
+    __slots__ = ("name", "producer", "uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     PRODUCER_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     producer: str
-    def __init__(self, name: _Optional[str] = ..., producer: _Optional[str] = ...) -> None: ...
+    uid: str
+    def __init__(self, name: _Optional[str] = ..., producer: _Optional[str] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class GetProducerResponse(_message.Message):
-    __slots__ = ("last_sequence",)
+    __slots__ = ("last_sequence", "uid")
     LAST_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     last_sequence: int
-    def __init__(self, last_sequence: _Optional[int] = ...) -> None: ...
+    uid: str
+    def __init__(self, last_sequence: _Optional[int] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class LocateRequest(_message.Message):
     __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer")

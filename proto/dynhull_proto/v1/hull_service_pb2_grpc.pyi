@@ -46,6 +46,10 @@ class HullServiceStub:
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
 
+    A backup lacks the batches after it, so numbers from before it was restored are refused with FAILED_PRECONDITION, reason
+    RESTORED, and the number of the producer's last batch that the hull has ("last"): where a request says of which hull its
+    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored.
+
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
     GetProducer returns where to continue. With the number of the batch before it ("after_sequence") a batch is refused
@@ -203,6 +207,10 @@ class HullServiceAsyncStub(HullServiceStub):
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
 
+    A backup lacks the batches after it, so numbers from before it was restored are refused with FAILED_PRECONDITION, reason
+    RESTORED, and the number of the producer's last batch that the hull has ("last"): where a request says of which hull its
+    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored.
+
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
     GetProducer returns where to continue. With the number of the batch before it ("after_sequence") a batch is refused
@@ -355,6 +363,10 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     1, 2, 3, ..., across all of its calls. A batch sent again is acknowledged as a duplicate. A number beyond the next one is
     refused with FAILED_PRECONDITION, reason SEQUENCE_GAP, and the number expected ("expected"). A refused batch does not
     use its number.
+
+    A backup lacks the batches after it, so numbers from before it was restored are refused with FAILED_PRECONDITION, reason
+    RESTORED, and the number of the producer's last batch that the hull has ("last"): where a request says of which hull its
+    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored.
 
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and

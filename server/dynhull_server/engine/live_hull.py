@@ -88,6 +88,11 @@ class LiveHull:
         return self._hull.uid
 
     @property
+    def restored(self) -> bool:
+        """Whether a backup has brought it back, so that it may lack batches after that backup."""
+        return self._hull.row.restored
+
+    @property
     def created(self) -> datetime:
         """The time of its creation."""
         return datetime.fromtimestamp(self._hull.row.created, UTC)

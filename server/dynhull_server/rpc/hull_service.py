@@ -29,7 +29,14 @@ from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .status import ANSWERED, PartRefusedError
-from .writing import MOST_IN_A_MESSAGE, StreamedBatches, decode_together, decode_write
+from .writing import (
+    MOST_IN_A_MESSAGE,
+    StreamedBatches,
+    decode_together,
+    decode_write,
+    gap_explained,
+    require_present,
+)
 
 # The side of a missing key.
 MISSING_SIDE = -128
@@ -106,10 +113,12 @@ class HullService:
         owner = call.owner if producer else ""  # asking gRPC for the address takes longer than a batch of one point
         write = decode_write(request, call.message_bytes, producer, owner, may_skip)
         try:
+            if request.uid and self._engine.has(name):
+                await require_present(self._engine.get(name), producer, request.uid)
             applied = await self._engine.apply(name, write, create=self._create_on_write)
-        except Exception:
+        except Exception as error:
             self._metrics.batches.refused()
-            raise
+            raise gap_explained(error, self._engine, name, request.uid) from None
         self._metrics.batches.applied(applied, time.perf_counter() - begun)
         response = pb.ApplyResponse()
         encode.encode_applied(applied, response.result)
@@ -125,7 +134,10 @@ class HullService:
             results = await self._engine.apply_together(write)
         except ANSWERED as error:
             self._metrics.batches.refused()
-            raise (error if write.refused is None else PartRefusedError(write.refused, error)) from None
+            if write.refused is None:
+                raise
+            reason = gap_explained(error, self._engine, names[write.refused], "")
+            raise PartRefusedError(write.refused, reason) from None
         response = pb.ApplyTogetherResponse()
         for applied in results:
             self._metrics.batches.applied(applied, time.perf_counter() - begun)
@@ -176,8 +188,9 @@ class HullService:
         if not request.producer:
             raise decode.InvalidFieldError("producer", "", "a producer is required")
         producer = decode.decode_producer(request.producer)
-        last = await self._engine.get(name).last_sequence(producer)
-        return pb.GetProducerResponse(last_sequence=last)
+        hull = self._engine.get(name)
+        await require_present(hull, producer, request.uid)
+        return pb.GetProducerResponse(last_sequence=await hull.last_sequence(producer), uid=hull.uid)
 
     # Reads
 
@@ -500,6 +513,8 @@ class HullService:
                 "name", "", "the first message must name the hull, but the call has no message"
             )
         name = self._written(call, first.name)
+        if first.uid and self._engine.has(name):
+            await require_present(self._engine.get(name), first.producer, first.uid)
         return StreamedBatches(call, first, name, self._engine, self._metrics, create=self._create_on_write)
 
 

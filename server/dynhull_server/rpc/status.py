@@ -31,6 +31,7 @@ from ..state.errors import (
     OutcomeUnknownError,
     PointMissingError,
     RefusedError,
+    RestoredError,
     RevisionForgottenError,
     SequenceAheadError,
     SequenceGapError,
@@ -207,6 +208,11 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case SequenceAheadError():
             metadata = {"field": error.field, "value": str(error.sequence), "last": str(error.last)}
             return _status(code.OUT_OF_RANGE, str(error), "SEQUENCE_AHEAD", metadata)
+        case RestoredError():
+            failure = PreconditionFailure()
+            failure.violations.add(type="RESTORED", subject=error.name, description=str(error))
+            metadata = {"value": error.name, "uid": error.uid, "last": str(error.last), **where}
+            return _status(code.FAILED_PRECONDITION, str(error), "RESTORED", metadata, failure)
         case SequenceGapError():
             failure = PreconditionFailure()
             failure.violations.add(type="SEQUENCE_GAP", subject="sequence", description=str(error))

@@ -10,7 +10,9 @@ from typing import Any, Self
 from dynhull_proto.v1 import hull_service_pb2
 
 from ..engine.engine import Engine
+from ..engine.live_hull import LiveHull
 from ..state.batch import Applied
+from ..state.errors import RestoredError, SequenceGapError
 from ..state.events import WriteBatch, WriteTogether
 from . import decode
 from .calls import Call
@@ -52,6 +54,23 @@ def decode_together(
     return WriteTogether(parts, rows=message_bytes // decode.BYTES_PER_POINT)
 
 
+async def require_present(hull: LiveHull, producer: str, uid: str) -> None:
+    """Raise RestoredError if the hull is no longer the one of this uid, because a backup was restored."""
+    if uid not in ("", hull.uid) and hull.restored:
+        raise RestoredError(hull.name, hull.uid, producer, await hull.last_sequence(producer))
+
+
+def gap_explained(error: Exception, engine: Engine, name: str, uid: str) -> Exception:
+    """The error that refuses a batch; RestoredError for a gap where batches may be missing because of a backup.
+
+    Who says of which hull the numbers are, has skipped some: `require_present` has compared the uid.
+    """
+    if type(error) is not SequenceGapError or uid or not engine.has(name) or not engine.get(name).restored:
+        return error
+    hull = engine.get(name)
+    return RestoredError(name, hull.uid, error.producer, error.expected - 1)
+
+
 class StreamedBatches:
     """The batches of a call to one hull: a task reads and applies them, and the caller answers them.
 
@@ -79,6 +98,8 @@ class StreamedBatches:
         self._producer = decode.decode_producer(first.producer)
         self._may_skip = decode.decode_may_skip(self._producer, first.may_skip)
         self.several = isinstance(first, hull_service_pb2.StreamRequest) and first.accept_results
+        self._engine = engine
+        self._uid: str = first.uid
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._room = asyncio.Event()
@@ -105,7 +126,7 @@ class StreamedBatches:
         while not batches.applied:
             if batches.refusal is not None:
                 self._metrics.batches.refused()
-                raise batches.refusal.with_traceback(None)
+                raise gap_explained(batches.refusal, self._engine, self.name, self._uid).with_traceback(None)
             if self._reading.done() and not batches.batches:
                 if self._failure is not None:
                     raise self._failure

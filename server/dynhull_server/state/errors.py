@@ -141,6 +141,27 @@ class SequenceGapError(RefusedError):
         self.expected = expected
 
 
+class RestoredError(RefusedError):
+    """The numbers of a producer are from before a backup of the hull was restored.
+
+    Attributes:
+        name: the name of the hull.
+        uid: the present uid of the hull.
+        producer: the name of the producer.
+        last: the number of its last batch that the hull has.
+    """
+
+    def __init__(self, name: str, uid: str, producer: str, last: int) -> None:
+        super().__init__(
+            f"the hull {name!r} was restored from a backup, and the last batch of producer {producer!r} that it has is "
+            f"number {last}: those after it are gone, so go on from there, with a new writer"
+        )
+        self.name = name
+        self.uid = uid
+        self.producer = producer
+        self.last = last
+
+
 class SequencesDifferError(SequenceGapError):
     """A producer's batch to several hulls has been applied to some of them, with the same number, but not to all."""
 

@@ -20,6 +20,8 @@ NO_TIME = -(2**63)
 FOREVER = 2**63 - 1
 # The producers in the log of a shard: the steps of its root, and the epochs that were begun.
 STEPS, EPOCHS = "steps", "epochs"
+# In the uids of hulls and fences that a backup has brought back: what follows is new with each copy of the data.
+INCARNATION = "."
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +117,11 @@ class HullRow:
     uid: str
     created: float
     settings: HullSettings = DEFAULT
+
+    @property
+    def restored(self) -> bool:
+        """Whether a backup has brought it back, so that it may lack batches after that backup."""
+        return INCARNATION in self.uid
 
 
 @dataclass(slots=True)

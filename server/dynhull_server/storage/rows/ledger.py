@@ -88,6 +88,11 @@ class HullRows:
         oldest = self.snapshots[-KEPT].revision
         return self.ids[:] if self.last <= oldest else self.ids[: max(0, bisect_right(self.firsts, oldest + 1) - 1)]
 
+    def change(self, row: HullRow, more: int) -> None:
+        """Change the row of the hull itself, whose checksum is `more` by that much."""
+        self.row = row
+        self.sum += more
+
     def append(self, first: int, last: int, place: int, weight: int) -> None:
         """Add a row of batches."""
         self.firsts.append(first)
@@ -216,7 +221,14 @@ class DropDead:
     ids: "array[int]"
 
 
-AnyStep = Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | FenceStep
+@dataclass(frozen=True, slots=True)
+class ChangeHull:
+    """Step: another row of a hull, with the same number."""
+
+    row: HullRow
+
+
+AnyStep = Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull | FenceStep
 
 
 class Group:
@@ -276,6 +288,8 @@ class Group:
                 self._cut(change)
             case DropDead():
                 self._drop_dead(change)
+            case ChangeHull():
+                self._change(change.row)
             case _:
                 self._fences.take(change)
 
@@ -296,6 +310,17 @@ class Group:
         self.totals = self.totals.plus(1, 0, stored)._replace(next_number=next_number)
         self.statements.append(Insert("hulls", (*columns, stored)))
         self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
+
+    def _change(self, row: HullRow) -> None:
+        now = self._hull(row.number)
+        if now is None:
+            raise NotCommittedError(f"there is no hull {row.number}")
+        *columns, stored = values(row)
+        more = stored - values(now.rows.row)[-1]
+        now.sum += more
+        self.totals = self.totals.plus(0, 0, more)
+        self.statements += [Remove("hulls", (row.number,)), Insert("hulls", (*columns, stored))]
+        self._effects.append(lambda: now.rows.change(row, more))
 
     def _append(self, change: Append) -> None:
         now = self._hull(change.number)

@@ -6,13 +6,15 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ...state.changes import Change
 from ...state.records import HullRow, HullSettings, Kept
 from ..port import NEWEST, DamagedError, FormatError, LockedError, Progress, StorageError
 from ..rows import divided
 from ..rows.divided import NoLongerKeptError, Part, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
-from ..rows.ledger import Group, Ledger
+from ..rows.incarnation import new_incarnation, renewing
+from ..rows.ledger import AnyStep, Group, Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
@@ -123,6 +125,9 @@ def copy_all(
     Hulls over shards are copied as of the moment before these, so that the copies belong together: what their roots and
     shards have beyond is left out.
 
+    Hulls and fences have other uids in the copies: these lack what is committed after them, so they must not be taken
+    for the originals.
+
     A copy has a different file name until it is complete and on the disk, so a partial copy is never used.
 
     Args:
@@ -135,13 +140,14 @@ def copy_all(
         StorageError: a source has no database, a target is not empty, or hulls change faster than they are copied.
         DamagedError: the copied data is damaged.
     """
+    incarnation = new_incarnation()
     with _together([source for source, _ in folders], accept_loss=accept_loss) as together:
         for place, (opened, (source, target)) in enumerate(zip(together.sources, folders, strict=True)):
             with _new(source, target) as connection:
                 opened.connection.backup(
                     connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
                 )
-                report = _finish(connection, opened, together.lasts(place))
+                report = _finish(connection, opened, together.lasts(place), incarnation)
             yield target, report
 
 
@@ -348,7 +354,7 @@ def _opened(
             raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
 
 
-def _finish(connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int, int]) -> Report:
+def _finish(connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int, int], incarnation: str) -> Report:
     """Examine copied pages, and turn them into a database of the present format that is marked as not in use.
 
     `lasts` are the last revisions of the hulls that may have later ones.
@@ -358,23 +364,26 @@ def _finish(connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int,
     findings = examine(connection, opened.version, opened.own, lambda *_: None)
     if findings.fatal:
         raise DamagedError(f"the data is damaged and was not copied: {'; '.join(findings.fatal)}")
-    _lead_back(connection, findings.ledger, lasts)
-    findings.ledger.totals = findings.ledger.totals._replace(mode=STOPPED)
+    ledger = findings.ledger
+    _change(connection, ledger, _leading_back(connection, ledger, lasts))
     if opened.version < FORMAT:
-        migrate(connection, opened.version, findings.ledger, findings.starts)
-    else:
-        renew_totals(connection, findings.ledger.totals)
+        migrate(connection, opened.version, ledger, findings.starts)
+    _change(connection, ledger, renewing(ledger, incarnation))
+    renew_totals(connection, ledger.totals._replace(mode=STOPPED))
     connection.execute("COMMIT")
     return _report(findings, opened.notes)
 
 
-def _lead_back(connection: sqlite3.Connection, ledger: Ledger, lasts: Mapping[int, int]) -> None:
-    """Drop what hulls have beyond their last revisions."""
+def _leading_back(connection: sqlite3.Connection, ledger: Ledger, lasts: Mapping[int, int]) -> Iterator[AnyStep]:
+    """What drops that which hulls have beyond their last revisions."""
     reader = SQLiteReader(connection)
-    steps = [step for number, last in lasts.items() for step in dropping(reader, ledger.hulls[number], last)]
-    if not steps:
-        return
-    group = Group(ledger, steps)
+    for number, last in lasts.items():
+        yield from dropping(reader, ledger.hulls[number], last)
+
+
+def _change(connection: sqlite3.Connection, ledger: Ledger, changes: Iterable[Change | AnyStep]) -> None:
+    """Carry out changes of rows."""
+    group = Group(ledger, changes)
     for statement in group.statements:
         for sql, values in sql_of(statement):
             connection.execute(sql, values)

@@ -1,0 +1,138 @@
+"""A restored backup is another incarnation: nobody takes what is in it for what the server had before."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+
+import grpc
+import pytest
+from client_kinds import CLIENTS
+from command_line import dynhull
+from mortal_server import MortalServer
+from refusal import refusal
+
+from dynhull_client import (
+    FenceReplacedError,
+    HullClient,
+    HullCopy,
+    HullReplacedError,
+    Polygon,
+    RestoredError,
+    Snapshot,
+)
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+# Batches in the backup, and those that were acknowledged after it.
+BACKED_UP, GONE = 3, 2
+
+
+@dataclass(frozen=True)
+class Before:
+    """What callers have had from the server before a backup was restored into its folder.
+
+    Attributes:
+        client: a client.
+        writers: writers by kind of client, each to the hull of that name.
+        copy: the hull "sync" at its last revision.
+        fence: the uid of the fence "fence".
+        taken: the uid of the hull "taken", which has no points.
+        address: the address of the server.
+    """
+
+    client: HullClient
+    writers: dict
+    copy: HullCopy
+    fence: str
+    taken: str
+    address: str
+
+
+def put(writer, number: int) -> None:
+    """Put a point, as a batch of its own."""
+    writer.put([[number, number**2]])
+    writer.flush()
+
+
+def numbered(name: str, sequence: int, uid: str = "") -> pb.ApplyRequest:
+    request = pb.ApplyRequest(name=name, producer="before", sequence=sequence, uid=uid)
+    request.batch.inserts.coordinates.extend([0.0, 0.0])
+    return request
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
+    folder = tmp_path_factory.mktemp("restored")
+    with ExitStack() as stack:
+        server = MortalServer(folder)
+        stack.callback(server.kill)
+        clients = {kind: stack.enter_context(connect(server.address)) for kind, connect in CLIENTS.items()}
+        client, copy = clients["sync"], HullCopy()
+        client.create_hull("keyed", keyed="str")
+        taken = client.create_hull("taken").uid
+        fence = client.create_fence("fence", Polygon([[0, 0], [9, 0], [0, 9]]), "keyed")
+        writers = {}
+        for kind, each in clients.items():
+            each.create_hull(kind)
+            writers[kind] = each.writer(kind, producer="before")
+            for number in range(BACKED_UP):
+                put(writers[kind], number)
+        assert dynhull("backup", folder / "backup", "--data", folder / "data").exit_code == 0
+        for writer in writers.values():
+            for number in range(BACKED_UP, BACKED_UP + GONE):
+                put(writer, number)
+        next(iter(client.watch("sync", copy=copy)))
+        server.kill()
+        (folder / "data").rename(folder / "lost")
+        assert dynhull("restore", folder / "backup", "--data", folder / "data").exit_code == 0
+        server.start()
+        yield Before(client, writers, copy, fence.uid, taken, server.address)
+
+
+@pytest.fixture
+def stub(before: Before) -> Iterator[HullServiceStub]:
+    with grpc.insecure_channel(before.address) as channel:
+        yield HullServiceStub(channel)
+
+
+@pytest.mark.parametrize("kind", CLIENTS)
+def test_a_writer_ends(before: Before, kind: str) -> None:
+    writer, revision = before.writers[kind], before.client.get_hull(kind).info.revision
+    with pytest.raises(RestoredError) as caught:
+        put(writer, 100)
+    assert caught.value.last == BACKED_UP
+    with pytest.raises(RestoredError), before.client.writer(kind, producer="before", uid=writer.uid):
+        pass
+    assert before.client.get_hull(kind).info.revision == revision
+
+
+def test_numbers_that_another_writer_has_taken_since_are_no_duplicates(before: Before, stub: HullServiceStub) -> None:
+    with before.client.writer("taken", producer="before") as another:
+        assert another.sequence == 0
+        for number in range(GONE):
+            put(another, -number)
+    code, info, _ = refusal(lambda: stub.Apply(numbered("taken", GONE, before.taken)))
+    assert (code, info.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "RESTORED")
+    assert (info.metadata["last"], info.metadata["uid"]) == (str(GONE), another.uid)
+    assert stub.Apply(numbered("taken", GONE, another.uid)).result.duplicate
+
+
+def test_numbers_that_do_not_say_of_which_hull_they_are(before: Before, stub: HullServiceStub) -> None:
+    """A gap may be one of the backup; numbers of the present hull leave gaps by themselves."""
+    before.client.create_hull("new")
+    uid = before.client.get_hull("keyed").info.uid
+    for name, of, reason in (("keyed", "", "RESTORED"), ("keyed", uid, "SEQUENCE_GAP"), ("new", "", "SEQUENCE_GAP")):
+        _, info, _ = refusal(partial(stub.Apply, numbered(name, GONE, of)))
+        assert info.reason == reason
+
+
+def test_readers_begin_anew(before: Before) -> None:
+    held = before.copy.uid, before.copy.revision
+    with pytest.raises(HullReplacedError):
+        next(iter(before.client.watch("sync", resume=before.copy, reconnect=False)))
+    event = next(iter(before.client.watch("sync", copy=before.copy)))
+    assert isinstance(event, Snapshot)
+    assert event.uid != held[0]
+    with pytest.raises(FenceReplacedError):
+        next(iter(before.client.watch_fence("fence", after=0, uid=before.fence)))
