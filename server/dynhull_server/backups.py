@@ -46,7 +46,7 @@ def restore(
     """Create a data folder from a backup, after checking that every hull in it is intact."""
     from .data_folders import copy_folder
 
-    copy_folder(backup, data, accept_loss=accept_loss)
+    copy_folder(backup, data, accept_loss=accept_loss, restores=True)
 
 
 def check(

@@ -18,7 +18,7 @@ from .storage.sqlite import copies
 from .storage.worker_folders import parts_of, workers_of, write_manifest
 
 
-def copy_folder(source: Path, target: Path, *, accept_loss: bool = False) -> None:
+def copy_folder(source: Path, target: Path, *, accept_loss: bool = False, restores: bool = False) -> None:
     """Copy a data folder, and print what was lost and how many hulls it has; of one with workers, each part."""
     with _errors_reported():
         workers = workers_of(source)
@@ -26,7 +26,7 @@ def copy_folder(source: Path, target: Path, *, accept_loss: bool = False) -> Non
             raise StorageError(f"{target} is not empty")
         folders = [(part, target / part.relative_to(source)) for part in parts_of(source)]
         with progress_bar("pages") as progress:
-            copied = list(copies.copy_all(folders, progress, accept_loss=accept_loss))
+            copied = list(copies.copy_all(folders, progress, accept_loss=accept_loss, restores=restores))
         for copy, report in copied:
             for note in report.notes:
                 typer.echo(note, err=True)

@@ -24,6 +24,10 @@ from dynhull_client import (
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
+AREA = Polygon([[0, 0], [9, 0], [0, 9]])
+INSIDE, OUTSIDE = [1, 1], [20, 20]
+FENCES = {"dwell": {"dwell": 3600}, "delayed": {"min_dwell": 3600}, "silent": {"initial": "none"}}
+
 # Batches in the backup, and those that were acknowledged after it.
 BACKED_UP, GONE = 3, 2
 
@@ -37,7 +41,7 @@ class Before:
         writers: writers by kind of client, each to the hull of that name.
         copy: the hull "sync" at its last revision.
         fence: the uid of the fence "fence".
-        taken: the uid of the hull "taken", which has no points.
+        taken: the uid of the hull "taken", to which nobody has written numbered batches.
         address: the address of the server.
     """
 
@@ -71,21 +75,32 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
         client, copy = clients["sync"], HullCopy()
         client.create_hull("keyed", keyed="str")
         taken = client.create_hull("taken").uid
-        fence = client.create_fence("fence", Polygon([[0, 0], [9, 0], [0, 9]]), "keyed")
+        fence = client.create_fence("fence", AREA, "keyed")
+        for name, more in FENCES.items():
+            client.create_fence(name, AREA, "keyed", **more)
+        client.put("keyed", ["a", "b", "c"], [INSIDE, INSIDE, OUTSIDE])
+        client.ack_fence("fence", "behind", 1)
+        client.ack_fence("fence", "uptodate", 3)
         writers = {}
         for kind, each in clients.items():
             each.create_hull(kind)
             writers[kind] = each.writer(kind, producer="before")
             for number in range(BACKED_UP):
                 put(writers[kind], number)
+        client.apply("taken", insert=[[0, 0]])
+        client.create_fence("near", "taken", other_hull="sync", near=100)
         assert dynhull("backup", folder / "backup", "--data", folder / "data").exit_code == 0
         for writer in writers.values():
             for number in range(BACKED_UP, BACKED_UP + GONE):
                 put(writer, number)
+        client.put("keyed", ["a", "c"], [OUTSIDE, INSIDE])
+        client.ack_fence("fence", "uptodate", 5)
         next(iter(client.watch("sync", copy=copy)))
         server.kill()
         (folder / "data").rename(folder / "lost")
         assert dynhull("restore", folder / "backup", "--data", folder / "data").exit_code == 0
+        checked = dynhull("check", folder / "data")
+        assert checked.exit_code == 0, checked.stderr
         server.start()
         yield Before(client, writers, copy, fence.uid, taken, server.address)
 
@@ -136,3 +151,33 @@ def test_readers_begin_anew(before: Before) -> None:
     assert event.uid != held[0]
     with pytest.raises(FenceReplacedError):
         next(iter(before.client.watch_fence("fence", after=0, uid=before.fence)))
+
+
+@pytest.mark.parametrize(("consumer", "first"), [("behind", 2), ("uptodate", 4)])
+def test_streams_of_fences_begin_with_what_is_lost_and_who_is_inside(before: Before, consumer: str, first: int) -> None:
+    with before.client.watch_fence("fence", consumer) as watch:
+        lost, snapshot = next(watch), next(watch)
+        assert (lost.type, lost.first, lost.last) == ("lost", first, 4)
+        assert (snapshot.type, snapshot.sequence, snapshot.uid) == ("snapshot", 5, lost.uid)
+        assert lost.uid != before.fence
+        assert [(each.hull, list(each.keys)) for each in snapshot.inside] == [("keyed", ["a", "b"])]
+        before.client.put("keyed", [consumer], [INSIDE])
+        assert next(watch).key in ("behind", "uptodate")
+
+
+@pytest.mark.parametrize("fence", ["fence", *FENCES])
+def test_who_is_inside_of_a_restored_fence(before: Before, fence: str) -> None:
+    inside = before.client.fence_inside(fence)
+    keys = {key for each in inside.subjects for key in each.keys}
+    assert keys & {"a", "b", "c"} == (set() if fence == "delayed" else {"a", "b"})
+    verification = before.client.verify("keyed")
+    assert verification.whole
+    assert verification.fences == 1 + len(FENCES)
+
+
+def test_hulls_that_are_near_stay_near(before: Before) -> None:
+    with before.client.watch_fence("near", after=0) as watch:
+        lost, snapshot = next(watch), next(watch)
+    assert (lost.type, snapshot.type) == ("lost", "snapshot")
+    assert [each.hull for each in snapshot.inside] == ["sync"]
+    assert before.client.verify("taken").whole

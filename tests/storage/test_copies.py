@@ -205,7 +205,7 @@ if sys.argv[3] == "fsync":
     os.fsync = lambda descriptor: (strike(), sync(descriptor))
 if sys.argv[3] == "examine":
     finish = copies._finish
-    copies._finish = lambda *given: (strike(), finish(*given))[1]
+    copies._finish = lambda *given, **named: (strike(), finish(*given, **named))[1]
 copies.copy(Path(sys.argv[1]), Path(sys.argv[2]), strike if sys.argv[3] == "progress" else lambda *_: None)
 """
 

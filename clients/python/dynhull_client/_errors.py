@@ -118,7 +118,7 @@ class RevisionForgottenError(DynhullError, LookupError):
 
 
 class HullReplacedError(RevisionForgottenError):
-    """A watch cannot resume: the hull was deleted, and another one has its name now."""
+    """A watch cannot resume: the hull was restored from a backup, or deleted, and another one has its name."""
 
 
 class FenceNotFoundError(DynhullError, LookupError):
@@ -130,7 +130,7 @@ class FenceExistsError(DynhullError):
 
 
 class FenceReplacedError(DynhullError, LookupError):
-    """The fence was deleted, and another one has its name now: sequences begin again at 1."""
+    """The fence was restored from a backup, or deleted, and another one has its name: it has other sequences."""
 
 
 class SequenceAheadError(DynhullError, ValueError):

@@ -194,7 +194,7 @@ def ack_fence(
         name: the fence.
         consumer: the name of the consumer, which is created if it is new.
         sequence: the last sequence that has been processed.
-        uid: the uid of the fence that made the event: FenceReplacedError if the fence was created again since then.
+        uid: the uid of the fence that made the event: FenceReplacedError if it was created again since then.
         timeout: seconds, instead of the client's.
     """
     request = pb.AckFenceRequest(

@@ -228,7 +228,7 @@ class RevisionForgottenError(RefusedError):
 
 
 class HullReplacedError(RefusedError):
-    """The hull of that name has been deleted and created again.
+    """The hull of that name has been deleted and created again, or restored from a backup.
 
     Attributes:
         name: the name.
@@ -236,7 +236,7 @@ class HullReplacedError(RefusedError):
     """
 
     def __init__(self, name: str, uid: str) -> None:
-        super().__init__(f"the hull {name!r} was created again since the watch began: its uid is now {uid}")
+        super().__init__(f"the hull {name!r} was created again, or restored from a backup: its uid is now {uid}")
         self.name = name
         self.uid = uid
 
@@ -258,7 +258,7 @@ class FenceExistsError(RefusedError):
 
 
 class FenceReplacedError(RefusedError):
-    """The fence of that name has been deleted and created again.
+    """The fence of that name has been deleted and created again, or restored from a backup.
 
     Attributes:
         name: the name.
@@ -266,7 +266,7 @@ class FenceReplacedError(RefusedError):
     """
 
     def __init__(self, name: str, uid: str) -> None:
-        super().__init__(f"the fence {name!r} was created again: its uid is now {uid}")
+        super().__init__(f"the fence {name!r} was created again, or restored from a backup: its uid is now {uid}")
         self.name = name
         self.uid = uid
 

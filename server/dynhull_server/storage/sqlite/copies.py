@@ -13,7 +13,7 @@ from ..rows import divided
 from ..rows.divided import NoLongerKeptError, Part, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
-from ..rows.incarnation import new_incarnation, renewing
+from ..rows.incarnation import beginning_anew, new_incarnation, renewing
 from ..rows.ledger import AnyStep, Group, Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
@@ -118,7 +118,7 @@ def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = 
 
 
 def copy_all(
-    folders: Sequence[tuple[Path, Path]], progress: Progress, *, accept_loss: bool = False
+    folders: Sequence[tuple[Path, Path]], progress: Progress, *, accept_loss: bool = False, restores: bool = False
 ) -> Iterator[tuple[Path, Report]]:
     """Copy folders of one server, including their logs, each as of one moment. Yields each copy, and a report on it.
 
@@ -135,6 +135,7 @@ def copy_all(
             it. A target must be empty if it exists.
         progress: called with the pages copied so far and the total.
         accept_loss: whether to copy without the damaged or missing part of the log.
+        restores: whether the copies are to be served in place of what was lost: their fences begin anew.
 
     Raises:
         StorageError: a source has no database, a target is not empty, or hulls change faster than they are copied.
@@ -147,7 +148,7 @@ def copy_all(
                 opened.connection.backup(
                     connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
                 )
-                report = _finish(connection, opened, together.lasts(place), incarnation)
+                report = _finish(connection, opened, together.lasts(place), incarnation, restores=restores)
             yield target, report
 
 
@@ -354,7 +355,9 @@ def _opened(
             raise DamagedError(f"{folder.database} cannot be read ({error}): restore a backup") from error
 
 
-def _finish(connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int, int], incarnation: str) -> Report:
+def _finish(
+    connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int, int], incarnation: str, *, restores: bool
+) -> Report:
     """Examine copied pages, and turn them into a database of the present format that is marked as not in use.
 
     `lasts` are the last revisions of the hulls that may have later ones.
@@ -369,6 +372,9 @@ def _finish(connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int,
     if opened.version < FORMAT:
         migrate(connection, opened.version, ledger, findings.starts)
     _change(connection, ledger, renewing(ledger, incarnation))
+    if restores:
+        for changes in beginning_anew(SQLiteReader(connection), ledger):
+            _change(connection, ledger, changes)
     renew_totals(connection, ledger.totals._replace(mode=STOPPED))
     connection.execute("COMMIT")
     return _report(findings, opened.notes)
