@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import structlog
 
-from dynhull_client import AsyncHullClient
+from dynhull_client import AsyncHullClient, RestoredError
 
 from ..waiting import SERVER_AWAY, Absence, growing_pauses, unless
 from .bad import BadMessages, TooManyBadError
@@ -111,6 +111,8 @@ async def run(
         error = _first(group)
         if isinstance(error, (GapError, NotCreatedError, TooManyBadError)):
             raise IngestError(str(error)) from None
+        if isinstance(error, RestoredError):
+            raise IngestError(f"{error}. {_after_a_restore(settings, feeds)}") from None
         raise error from None
     except asyncio.CancelledError:
         if not stop.is_set():
@@ -128,6 +130,17 @@ async def run(
     more = {**({"lost": lost} if lost else {}), **({"known_before": known} if known else {})}
     log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count, **more)
     return bool(pumps) and all(each.at_end for each in pumps)
+
+
+def _after_a_restore(settings: Settings, feeds: Sequence[Feed]) -> str:
+    """What to do about the messages that a restored hull lacks."""
+    if any(each.producer is None for each in feeds):
+        return "The broker does not keep what came since the backup. Start the ingest again for what comes from now on"
+    if settings.mapping.hull is None:
+        return (
+            "The broker has the place after what is gone. Start the ingest with another --producer, to read all again"
+        )
+    return "Start the ingest again: it reads what comes after that"
 
 
 async def _found(find: Find, patience: float | None) -> Sequence[Feed]:

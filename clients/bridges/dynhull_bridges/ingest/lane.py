@@ -97,6 +97,7 @@ class Lane:
         self._away = away
         self._named_by_messages = named_by_messages
         self._kind: str | None = None
+        self._uid = ""  # of the hull, once it is known
         self._waiting: deque[Chunk] = deque()  # not given to the writer
         self._flying: deque[Chunk] = deque()  # given to it, and not settled
         self._failure: Exception | None = None
@@ -117,6 +118,7 @@ class Lane:
 
         Raises:
             DynhullError: the server refuses the writer itself, for example its token, or has been away for too long.
+            RestoredError: a backup of the hull was restored, which lacks messages that were taken.
             NotCreatedError: there is no hull that can take the points.
             ValueError: the hull has messages of another log.
             OSError, TooManyBadError: bad messages cannot be kept aside.
@@ -164,8 +166,10 @@ class Lane:
             in_flight=IN_FLIGHT,
             stop_on_error=True,
             patience=self._away.pause(PATIENCE),
+            uid=self._uid,
         )
         async with writer:
+            self._uid = writer.uid
             known = writer.sequence if self._producer is not None else -1
             while True:
                 while self._waiting and self._failure is None:
