@@ -99,6 +99,26 @@ def test_backup_beside_a_server_and_restore(paths):
     storage.close()
 
 
+def test_every_copy_has_uids_of_its_own(paths, tmp_path):
+    data, copy, new = paths
+    storage, _ = opened(data)
+    storage.commit([Create(HullRow(1, "a", "0f1e", 0.0))])
+    fill(storage, 3, "b", 2)
+    storage.close()
+    uids = []
+    for command, source, target in (("backup", data, copy), ("restore", copy, new), ("restore", copy, tmp_path / "2")):
+        copied = [target, "--data", source] if command == "backup" else [source, "--data", target]
+        done(command, *copied, says=f"{target}: 2 hulls")
+        done("check", target, says=f"{target}: 2 hulls, all whole")
+        storage, contents = opened(target)
+        uids.append([each.uid for each in contents.hulls])
+        storage.close()
+    assert len({uid for (uid, _) in uids}) == 3
+    assert {uid.partition(".")[0] for (uid, _) in uids} == {"0f1e"}
+    for first, second in uids:
+        assert first.partition(".")[2] == second.partition(".")[2]
+
+
 def test_a_backup_takes_the_moment_it_began_at(paths):
     """Commits go on meanwhile, as fast as they can."""
     data, copy, _ = paths
