@@ -9,6 +9,7 @@ import grpc
 import pytest
 from client_kinds import CLIENTS
 from command_line import dynhull
+from gateway_process import gateway_process
 from mortal_server import MortalServer
 from refusal import refusal
 
@@ -140,6 +141,16 @@ def test_numbers_that_do_not_say_of_which_hull_they_are(before: Before, stub: Hu
     for name, of, reason in (("keyed", "", "RESTORED"), ("keyed", uid, "SEQUENCE_GAP"), ("new", "", "SEQUENCE_GAP")):
         _, info, _ = refusal(partial(stub.Apply, numbered(name, GONE, of)))
         assert info.reason == reason
+
+
+def test_rows_over_http_are_numbered_by_producers_too(before: Before) -> None:
+    before.client.create_hull("another")
+    with gateway_process(before.address) as gateway:
+        for hull, reason in (("taken", "RESTORED"), ("another", "SEQUENCE_GAP")):
+            for call in (("points", {"insert": [[0, 0]]}), ("rows", b"[0, 0]\n", "application/x-ndjson")):
+                path, *body = call
+                answer = gateway.post(f"/hulls/{hull}/{path}", *body, Idempotency_Key="http:9")
+                assert (answer.status, answer.json["reason"], answer.json["expected"]) == (409, reason, 1)
 
 
 def test_readers_begin_anew(before: Before) -> None:

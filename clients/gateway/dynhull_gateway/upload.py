@@ -183,8 +183,10 @@ async def numbering(client: AsyncHullClient, name: str, producer: str, first: in
     """The numbers of a body's rows; ProblemError if they leave a gap after the last that was applied."""
     applied = await client.last_sequence(name, producer)
     if first > applied + 1 and not may_skip:
-        detail = f"the producer {producer!r} continues with {applied + 1}, not with {first}"
-        raise ProblemError(409, detail, "SEQUENCE_GAP", field="Idempotency-Key", expected=applied + 1)
+        detail, reason = f"the producer {producer!r} continues with {applied + 1}, not with {first}", "SEQUENCE_GAP"
+        if (await client.get_hull(name)).info.restored:
+            detail, reason = f"the hull {name!r} was restored from a backup: {detail}", "RESTORED"
+        raise ProblemError(409, detail, reason, field="Idempotency-Key", expected=applied + 1)
     return Numbering(producer, first, applied)
 
 

@@ -20,6 +20,9 @@ from ._keys import KeyTuple, decode_keys, decode_names, join_keys
 from ._quarantine_messages import Quarantine, decode_quarantine
 from ._times import Times, decode_time, decode_times
 
+# In the uid of a hull that a backup has brought back, before what is new with each copy.
+INCARNATION = "."
+
 Clock = Literal["server", "data"]
 Ordering = Literal["arrival", "event_time"]
 Ahead = Literal["refuse", "clamp"]
@@ -89,6 +92,11 @@ class HullInfo:
     quarantine: Quarantine | None = None
     held: int = 0
     shards: int | None = None
+
+    @property
+    def restored(self) -> bool:
+        """Whether a backup has brought the hull back, so that it may lack batches after that backup."""
+        return INCARNATION in self.uid
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

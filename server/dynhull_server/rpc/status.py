@@ -211,8 +211,8 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case RestoredError():
             failure = PreconditionFailure()
             failure.violations.add(type="RESTORED", subject=error.name, description=str(error))
-            metadata = {"value": error.name, "uid": error.uid, "last": str(error.last), **where}
-            return _status(code.FAILED_PRECONDITION, str(error), "RESTORED", metadata, failure)
+            metadata = {"value": error.name, "uid": error.uid, "last": str(error.last), "expected": str(error.last + 1)}
+            return _status(code.FAILED_PRECONDITION, str(error), "RESTORED", metadata | where, failure)
         case SequenceGapError():
             failure = PreconditionFailure()
             failure.violations.add(type="SEQUENCE_GAP", subject="sequence", description=str(error))
