@@ -16,11 +16,11 @@ PARTITION = 3
 
 class Greeted(Frames):
     async def greet(self, greeting: bytes) -> None:
-        assert greeting == b"3/secret"
+        assert greeting == b"3/north-1/0/secret"
 
 
 def owned(port: int) -> Tables:
-    return Tables({PARTITION: Owner(1, "north-1/0", "", f"127.0.0.1 1 {port}", "now", False)}, {}, {}, {})
+    return Tables({PARTITION: Owner(1, "north-1/0", "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {})
 
 
 async def reach(port: int) -> None:
@@ -45,6 +45,6 @@ def test_an_owner_that_cannot_be_reached_is_logged_once_with_the_reason(
         asyncio.run(reach(port))
     refused, reached = caplog.records
     assert refused.getMessage() == "the owner of a partition cannot be reached"
-    assert (refused.partition, refused.address) == (PARTITION, f"127.0.0.1 1 {port}")
+    assert (refused.partition, refused.address) == (PARTITION, f"127.0.0.1:{port}")
     assert "Connection refused" in refused.reason or "Connect call failed" in refused.reason
     assert reached.getMessage() == "the owner of a partition can be reached again"

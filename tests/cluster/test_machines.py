@@ -233,18 +233,21 @@ def test_names_apart_are_refused_wherever_they_are(alone: tuple[str, str]) -> No
 
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_only_gateways_may_call_workers(alone: tuple[str, str]) -> None:
-    host, port, frames = query(alone[1], "SELECT address FROM owners WHERE partition = 0")[0][0].split()
+    worker, address = query(alone[1], "SELECT worker, address FROM owners WHERE partition = 0")[0]
+    host, port, frames = address.split()
+    ((secret,),) = query(alone[1], "SELECT secret FROM cluster")
+    wrong = "0/guess", f"0/{secret}", f"0/{worker}/guess", f"1/{worker}/{secret}", f"0/another/{secret}"
     said = (("dynhull-owner", "me"), ("dynhull-token-hash", "gateway"))
     with grpc.insecure_channel(f"{host}:{port}") as channel:
-        for proof in ((), (("dynhull-gateway-proof", "0/guess"),)):
+        for proof in ((), *((("dynhull-gateway-proof", each),) for each in wrong)):
             with pytest.raises(grpc.RpcError) as refused:
                 HullServiceStub(channel).ListHulls(pb.ListHullsRequest(), metadata=said + proof, timeout=PATIENCE)
             assert refused.value.code() == grpc.StatusCode.UNAVAILABLE
             assert "this worker does not own the partition" in refused.value.details()
-    wrong = b"0/guess"
-    with socket.create_connection((host, int(frames))) as connection:
-        connection.sendall(pack("<IIB", len(wrong), 0, 4) + wrong)
-        assert connection.recv(1) == b"", "the connection is closed"
+    for greeting in (each.encode() for each in wrong):
+        with socket.create_connection((host, int(frames))) as connection:
+            connection.sendall(pack("<IIB", len(greeting), 0, 4) + greeting)
+            assert connection.recv(1) == b"", "the connection is closed"
 
 
 @pytest.fixture(scope="module")

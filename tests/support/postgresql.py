@@ -26,17 +26,23 @@ def postgres_program(name: str) -> str:
 
 
 class PostgreSQL:
-    """A server with a folder and a socket of its own; it runs as `nobody` where root starts it."""
+    """A server with a folder and a socket of its own; it runs as `nobody` where root starts it.
 
-    def __init__(self, home: Path, settings: Sequence[str] = FAST) -> None:
+    Its folder is new, or a physical copy of that of another one, which serves.
+    """
+
+    def __init__(self, home: Path, settings: Sequence[str] = FAST, copied: "PostgreSQL | None" = None) -> None:
         self._home = home
         self._settings = settings
         self._databases = count(1)
         self.process: subprocess.Popen[bytes] | None = None
         home.chmod(0o777)
-        self._run(
-            "initdb", "--auth=trust", "--username=tester", "--no-sync", "--encoding=UTF8", "--locale=C", self._data
-        )
+        if copied is None:
+            options = "--auth=trust", "--username=tester", "--no-sync", "--encoding=UTF8", "--locale=C"
+            self._run("initdb", *options, self._data)
+        else:
+            source = f"host={copied._home} user=tester"
+            self._run("pg_basebackup", "--checkpoint=fast", "--no-sync", "--dbname", source, "--pgdata", self._data)
 
     @property
     def _data(self) -> Path:
@@ -118,11 +124,11 @@ def query(url: str, sql: str, *values: object) -> list[Any]:
 
 
 @contextmanager
-def postgresql(*settings: str) -> Iterator[PostgreSQL]:
-    """A server that answers; it ends with the block."""
+def postgresql(*settings: str, copied: PostgreSQL | None = None) -> Iterator[PostgreSQL]:
+    """A server that answers, or a copy of one; it ends with the block."""
     # A path to a socket has at most a hundred bytes, fewer than the folders of tests.
     with tempfile.TemporaryDirectory(prefix="pg-", ignore_cleanup_errors=True) as home:
-        server = PostgreSQL(Path(home), settings or FAST)
+        server = PostgreSQL(Path(home), settings or FAST, copied)
         server.start()
         try:
             yield server

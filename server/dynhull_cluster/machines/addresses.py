@@ -6,7 +6,7 @@ import socket
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, NamedTuple, Protocol, cast
 
 import grpc
 
@@ -16,7 +16,7 @@ from dynhull_server.state.errors import words
 
 from ..callers import PROOF, Metadata
 from ..ways import OPTIONS, PATIENCE, F
-from .board import Tables
+from .board import Owner, Tables
 from .entrance import proof_of
 
 # Seconds to connect to an owner.
@@ -49,6 +49,16 @@ class _Failed:
     reason: str = ""
 
 
+class _Place(NamedTuple):
+    """Where the owner of an epoch is reached: at a host, with a port for gRPC and one for frames."""
+
+    epoch: int
+    worker: str
+    host: str
+    port: int
+    frames_port: int
+
+
 class _Greets(Protocol):
     async def greet(self, greeting: bytes) -> None: ...
 
@@ -67,25 +77,28 @@ class Addresses:
         self._secret = secret
         self._tls = None if ca is None else peer_context(ca)
         self._credentials = None if ca is None else grpc.ssl_channel_credentials(ca.read_bytes())
-        self._known: dict[int, tuple[int, str]] = {}
+        self._known: dict[int, _Place] = {}
         self._moved: dict[int, Callable[[], None]] = {}
         self._failed: dict[int, _Failed] = {}
 
     def learn(self, tables: Tables) -> None:
-        """Follow the owners; one that is away for the moment keeps its address, until another one has the partition."""
+        """Follow the owners; one that is away for the moment keeps its address, until another one has the partition.
+
+        One that is not connected to the database is not called: it may be the owner in the one that this is a copy of.
+        """
         for partition, owner in tables.owners.items():
-            now = owner.epoch, owner.address
-            if owner.free or not owner.address or self._known.get(partition) == now:
+            place = _place_of(owner)
+            if place is None or not owner.connected or self._known.get(partition) == place:
                 continue
-            self._known[partition] = now
+            self._known[partition] = place
             if partition in self._moved:
                 self._moved[partition]()
 
     async def connect(self, worker: int, make: Callable[[], F]) -> F:
         """Connect to the owner of a partition, and prove to be of the cluster. Raises OSError."""
-        at = self._at(worker)
+        place = self._at(worker)
         try:
-            frames = await self._connect(worker, make, *at)
+            frames = await self._connect(worker, make, place)
         except OSError as error:
             self._note_failure(worker, error)
             raise
@@ -93,21 +106,21 @@ class Addresses:
             log.info("the owner of a partition can be reached again", extra={"partition": worker})
         return frames
 
-    async def _connect(self, worker: int, make: Callable[[], F], host: str, port: int, frames_port: int) -> F:
-        name = host if self._tls is not None else None
+    async def _connect(self, worker: int, make: Callable[[], F], place: _Place) -> F:
+        name = place.host if self._tls is not None else None
         async with asyncio.timeout(CONNECT_SECONDS):
             transport, frames = await asyncio.get_running_loop().create_connection(
-                make, host, frames_port, ssl=self._tls, server_hostname=name
+                make, place.host, place.frames_port, ssl=self._tls, server_hostname=name
             )
             _keep_alive(transport.get_extra_info("socket"))
             try:
-                await cast("_Greets", frames).greet(proof_of(worker, self._secret).encode())
+                await cast("_Greets", frames).greet(proof_of(worker, place.worker, self._secret).encode())
             except BaseException as error:
                 transport.abort()
                 if isinstance(error, RelayedError):
-                    raise OSError("another partition listens there now") from None
+                    raise OSError("another one listens there now") from None
                 raise
-        if self._at(worker) != (host, port, frames_port):
+        if self._at(worker) != place:
             transport.abort()
             raise OSError(f"partition {worker} has moved meanwhile")
         return frames
@@ -118,31 +131,40 @@ class Addresses:
         failed = self._failed.setdefault(partition, _Failed(now))
         if now > failed.since + NOTE_SECONDS and words(error) != failed.reason:
             failed.reason = words(error)
-            extra = {"partition": partition, "address": self._known[partition][1], "reason": failed.reason}
+            place = self._known[partition]
+            address = f"{bracketed(place.host)}:{place.frames_port}"
+            extra = {"partition": partition, "address": address, "reason": failed.reason}
             log.warning("the owner of a partition cannot be reached", extra=extra)
 
     def channel(self, worker: int) -> Any:
         """A new channel to the owner of a partition."""
-        host, port, _ = self._at(worker)
-        address = f"{bracketed(host)}:{port}"
+        place = self._at(worker)
+        address = f"{bracketed(place.host)}:{place.port}"
         if self._credentials is None:
             return grpc.aio.insecure_channel(address, options=OPTIONS)
         return grpc.aio.secure_channel(address, self._credentials, options=OPTIONS)
 
     def proof(self, worker: int) -> Metadata:
         """What proves to the owner of a partition that this is a gateway."""
-        return ((PROOF, proof_of(worker, self._secret)),)
+        return ((PROOF, proof_of(worker, self._at(worker).worker, self._secret)),)
 
     def when_moved(self, worker: int, moved: Callable[[], None]) -> None:
         """Have a function called when a partition has another owner, or its owner another address."""
         self._moved[worker] = moved
 
-    def _at(self, partition: int) -> tuple[str, int, int]:
-        """The host, the port for gRPC and that for frames. Raises OSError."""
+    def _at(self, partition: int) -> _Place:
+        """Where the owner of a partition is reached. Raises OSError."""
         if partition not in self._known:
             raise OSError(f"nobody serves partition {partition}")
-        host, port, frames_port = self._known[partition][1].rsplit(" ", 2)
-        return host, int(port), int(frames_port)
+        return self._known[partition]
+
+
+def _place_of(owner: Owner) -> _Place | None:
+    """Where an owner is reached; None of one that has gone, does not listen yet, or is none of a cluster."""
+    if owner.free or len(parts := owner.address.rsplit(" ", 2)) < 3:
+        return None
+    host, port, frames_port = parts
+    return _Place(owner.epoch, owner.worker, host, int(port), int(frames_port))
 
 
 def _keep_alive(connected: socket.socket) -> None:

@@ -18,7 +18,7 @@ from dynhull_server.state.errors import words
 from dynhull_server.storage.port import StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors, storage_error
-from ..postgres.ownership import CHANNEL, LEASE
+from ..postgres.ownership import CHANNEL, IS_CONNECTED, LEASE
 from ..postgres.processes import is_known_dead, this_process
 from ..postgres.schema import hold, partitions_of, prepare
 from .joining import PRESENT, RENEW, clock_difference
@@ -45,7 +45,9 @@ TABLES = (
 IDENTITY = (
     b"SELECT system_identifier || '/' || oid FROM pg_control_system(), pg_database WHERE datname = current_database()"
 )
-OWNERS = b"SELECT partition, epoch, worker, process, address, until::text, until = '-infinity' FROM owners"
+OWNERS = (
+    f"SELECT partition, epoch, worker, process, address, until::text, until = '-infinity', {IS_CONNECTED} FROM owners"  # noqa: S608  (ours)
+).encode()
 WORKERS = (
     f"SELECT worker, draining, process FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
     "ORDER BY worker"
@@ -64,7 +66,10 @@ GONE = (
 
 
 class Owner(NamedTuple):
-    """The row of an owner: of which `until` changes with each renewal, and says nothing else to other machines."""
+    """The row of an owner: of which `until` changes with each renewal, and says nothing else to other machines.
+
+    A copy of the database has the same rows, but none of the owners is `connected` to it.
+    """
 
     epoch: int
     worker: str
@@ -72,6 +77,7 @@ class Owner(NamedTuple):
     address: str
     until: str
     free: bool
+    connected: bool
 
 
 class Worker(NamedTuple):
@@ -217,6 +223,13 @@ class Board:
             "" if (owner := owners.get(each)) is None or owner.free or self.lapsed(each) else owner.worker
             for each in range(partitions)
         ]
+
+    def apart(self) -> list[str]:
+        """The workers that have not given up their partitions, and are not connected to the database."""
+        owners = self.tables.owners.values()
+        here = {each.worker for each in owners if each.connected}
+        left = {each.worker for each in owners if not (each.free or is_known_dead(each.process))}
+        return sorted(left - here)
 
     async def run(self) -> None:
         """Read the tables until cancelled. An error of the database is logged once, until it answers again."""

@@ -21,9 +21,12 @@ from ..callers import PROOF, authenticator
 from ..frame_server import FrameContext, FrameServer
 
 
-def proof_of(partition: int, secret: str) -> str:
-    """What a connection begins with: who knows the secret, and means this partition, as ports are used again."""
-    return f"{partition}/{secret}"
+def proof_of(partition: int, worker: str, secret: str) -> str:
+    """What a connection begins with: who knows the secret, and means this partition of this worker.
+
+    Ports are used again, also by a worker of the database of which this is a copy, with the same secret.
+    """
+    return f"{partition}/{worker}/{secret}"
 
 
 def checked_certificate(settings: Settings) -> tuple[Path, Path] | None:
@@ -65,6 +68,7 @@ class PartitionEntrance:
     Args:
         settings: the settings.
         partition: the partition.
+        worker: the worker.
         secret: what processes of the cluster know each other by.
         letters: the handler of what other partitions send.
 
@@ -72,10 +76,12 @@ class PartitionEntrance:
         address: the host, the port for gRPC and that for frames, once it listens.
     """
 
-    def __init__(self, settings: Settings, partition: int, secret: str, letters: grpc.GenericRpcHandler) -> None:
+    def __init__(
+        self, settings: Settings, partition: int, worker: str, secret: str, letters: grpc.GenericRpcHandler
+    ) -> None:
         self._settings = settings
         self._letters = letters
-        self._proof = proof_of(partition, secret)
+        self._proof = proof_of(partition, worker, secret)
         self._frames: FrameServer | None = None
         self.address = ""
 

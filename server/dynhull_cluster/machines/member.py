@@ -46,6 +46,11 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
 # What may fail.
 READ_AHEAD, TAKE = "a partition cannot be read ahead", "a partition cannot be served"
 CLOCK = "clock of the machine"
+# What a copy of a database says that was made while it was served.
+APART = (
+    "owners of partitions are not connected to this database: they have died, or it is a copy of theirs. They are not "
+    "called, and are replaced here. To join them, give --journal the database that they serve"
+)
 # Seconds that gateways get to receive what their calls have ended with, before another worker may have the partition.
 LAST_STATUSES = 0.03
 
@@ -98,6 +103,8 @@ class Member:
         self._peers = Peers(self._addresses)
         self._supervisor.every(0.0, "board", self._board.run)
         await self._looked.wait()
+        if apart := self._board.apart():
+            log.warning(APART, extra={"owners": ", ".join(apart)})
         while self._busy:  # what was free
             await asyncio.wait(self._busy.values())
         log.info("serving", extra={"worker": self._worker, "partitions": len(self._served)})
@@ -226,7 +233,9 @@ class Member:
         """A server for a partition. It goes on with the clock of this machine, which has to be right."""
         self._require_right_clock()
         divisions = ServedDivisions(self._settings, number, self._cluster.partitions, self._peers)
-        entrance = PartitionEntrance(self._settings, number, self._cluster.secret, peer_handler(divisions.receive))
+        entrance = PartitionEntrance(
+            self._settings, number, self._worker, self._cluster.secret, peer_handler(divisions.receive)
+        )
         storage = PostgresStorage(
             self._database,
             end_process,

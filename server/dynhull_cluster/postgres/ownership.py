@@ -4,6 +4,9 @@ Taking a partition raises its epoch. Each commit first locks the row of the owne
 a new owner waits for it, and so that nothing is committed under an old epoch. Renewing the lease does not wait for
 commits, nor they for it: the lock is the one of a foreign key.
 
+An owner shows that it is connected to the database by an advisory lock, which its session holds. All else that is known
+of an owner is in tables, and so in every copy of the database, whose servers must not take it for theirs.
+
 Reads are answered from memory, and so only within the lease. No wall clock decides when it ends, and clocks of
 different machines are never compared. The owner counts from before it asked for the lease, and a margin less. A
 successor counts from when it first saw the newest renewal. So the lease has ended for the owner first, if their clocks
@@ -37,6 +40,15 @@ LOCK_SECONDS = 1
 
 log = logging.getLogger(__name__)
 
+# The two numbers of the lock of an owner: the partition, from here on ("dyn"), and the epoch, up to a multiple.
+HELD, EPOCHS = 0x64796E00, 2**31
+HOLD = b"SELECT pg_advisory_lock_shared(%s, %s)"
+# Whether the owner of a row is connected to this database, and not only to the one that this is a copy of.
+IS_CONNECTED = (
+    f"({HELD} + partition, mod(epoch, {EPOCHS})) IN (SELECT classid::bigint, objid::bigint FROM pg_locks "  # noqa: S608  (ours)
+    "WHERE locktype = 'advisory' AND objsubid = 2 AND granted "
+    "AND database = (SELECT oid FROM pg_database WHERE datname = current_database()))"
+)
 # Locks the row of an owner against the next one, but not against renewals.
 REQUIRE = b"SELECT epoch FROM owners WHERE partition = %s AND epoch = %s FOR KEY SHARE"
 
@@ -203,6 +215,7 @@ class Ownership:
             if epoch is None:
                 return self._owner(connection)
             self.epoch, self._until = epoch, before + LEASE - MARGIN
+            self._show(connection)
             return None
 
     def _owner(self, connection: Connection) -> _Owner | None:
@@ -258,10 +271,16 @@ class Ownership:
             with as_storage_errors():
                 if self._connection is None:
                     self._connection = self._database.connect(f"dynhull lease {self._partition}")
+                    self._show(self._connection)
                 yield self._connection
         except BaseException:
             self._disconnect()
             raise
+
+    def _show(self, connection: Connection) -> None:
+        """Show that the owner is connected, to those who are connected to the same database."""
+        if self.epoch:
+            connection.execute(HOLD, [HELD + self._partition, self.epoch % EPOCHS])
 
     def _disconnect(self) -> None:
         if self._connection is not None:
