@@ -98,7 +98,7 @@ class Server:
         self._settings = settings
         self._entrance = PublicEntrance(settings) if entrance is None else entrance
         self._machine = machine = Machine()
-        self._supervisor = Supervisor(machine.clock, self._set_health, end_process)
+        self._supervisor = Supervisor(machine.clock, lambda _: self._update_health(), end_process)
         limits = Limits(
             max_hulls=settings.max_hulls,
             max_points=settings.max_points,
@@ -127,6 +127,7 @@ class Server:
         self._server = grpc_server(settings)
         self._stop_metrics: Callable[[], None] = lambda: None
         self._serving = False
+        self._machine_well = True
         self.address = ""
         self.metrics_url = ""
 
@@ -160,7 +161,7 @@ class Server:
         self._calls.ready()
         self._health.set(SERVING, SCRUB)
         self._serving = True
-        self._set_health(self._supervisor.reason)
+        self._update_health()
         if self._tokens is not None:
             self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
             self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
@@ -232,10 +233,15 @@ class Server:
         await scrub.round()
         self._metrics.scrub_round()
 
-    def _set_health(self, reason: str | None) -> None:
-        """Update the health status."""
+    def set_machine_well(self, well: bool) -> None:
+        """Say whether what this server has in common with others of its process is well; else it is NOT_SERVING."""
+        self._machine_well = well
+        self._update_health()
+
+    def _update_health(self) -> None:
         if self._serving:
-            self._health.set(SERVING if reason is None else NOT_SERVING, "", *SERVICES)
+            well = self._machine_well and self._supervisor.reason is None
+            self._health.set(SERVING if well else NOT_SERVING, "", *SERVICES)
 
     def _serve_metrics(self) -> None:
         registry = self.registry

@@ -2,13 +2,19 @@
 
 import subprocess
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from subprocess import CompletedProcess
 
+import grpc
 import pytest
 from cases import with_all_cases
+from cluster import processes
 from command_line import dynhull
 from forked import COMMAND
+from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
+from logged_process import logged_process
 from metrics import scrape
 from patience import wait_until
 from peers import missing, program
@@ -18,6 +24,7 @@ from wall_clock import at
 
 from dynhull_client import HullClient
 from dynhull_cluster.machines.joining import clock_difference
+from dynhull_cluster.placement import worker_of
 
 pytestmark = pytest.mark.one_process("a cluster has a shape of its own")
 
@@ -66,24 +73,51 @@ def test_a_machine_that_others_cannot_reach_or_whose_clock_is_wrong_does_not_joi
 
 
 @with_all_cases
-def test_a_clock_that_becomes_wrong_is_said(postgres: PostgreSQL, tmp_path: Path) -> None:
+def test_a_clock_that_becomes_wrong_turns_health_and_its_machine_gets_no_more_partitions(
+    postgres: PostgreSQL, tmp_path: Path
+) -> None:
     url = postgres.new_database()
     clock = tmp_path / "clock"
     clock.write_text("+0")
     follows = [*at("+0"), f"FAKETIME_TIMESTAMP_FILE={clock}", "FAKETIME_NO_CACHE=1"]
     follows.remove("FAKETIME=+0")
-    options = ("--metrics-port", "0", *machine(url), "--log-level", "warning")
-    said = "set it, or raise --max-clock-difference' work='clock of the machine'"
-    with (
-        server_process(*options, wrap=follows, complaints=said) as server,
-        HullClient(server.address) as client,
-    ):
-        page = server.process.stdout.readline().split("//")[1].removesuffix("/metrics\n")
-        client.apply("a/hull", insert=[[1, 2]])
+    options = ("--port", "0", "--metrics-port", "0", *machine(url), "--log-level", "warning", "--log-format", "json")
+    names = {worker_of(f"{first}/hull", 2): f"{first}/hull" for first in "abcdefgh"}
+    owners = "SELECT partition FROM owners WHERE process LIKE %s AND until > '-infinity' AND address <> ''"
+    with ExitStack() as stack:
+        wrong = stack.enter_context(logged_process([*follows, COMMAND, "serve", *options]))
+        address = wrong.process.stdout.readline().split()[-1]
+        page = wrong.process.stdout.readline().split("//")[1].removesuffix("/metrics\n")
+        health = HealthStub(stack.enter_context(grpc.insecure_channel(address)))
+        client = stack.enter_context(HullClient(address, retries=1000))
+
+        def has() -> list[int]:
+            worker = processes(wrong.process.pid)["worker-0"]
+            return [number for (number,) in query(url, owners, f"% {worker} %")]
+
+        def is_well(partition: int) -> bool:
+            request = HealthCheckRequest(service=f"dynhull.v1.worker/{partition}")
+            return health.Check(request).status == HealthCheckResponse.SERVING
+
+        right = stack.enter_context(server_process(*machine(url), killed=True))
+        wait_until(lambda: len(has()) == 1)
+        (own,) = has()
+        revisions = {name: client.apply(name, insert=[[1, 2]]).revision for name in names.values()}
         assert scrape(page)["dynhull_clock_difference_seconds"] == 0
         clock.write_text("-1h")
         wait_until(lambda: scrape(page)["dynhull_clock_difference_seconds"] < -3000)
-        assert client.apply("a/hull", insert=[[1, 3]]).revision == 2
+        right.process.kill()
+        said = "set it, or raise --max-clock-difference"
+        assert said in wrong.wait_for("a partition cannot be served")["reason"]
+        assert client.apply(names[own], insert=[[1, 3]]).revision == 2
+        assert said in wrong.wait_for("unhealthy: health is NOT_SERVING")["reason"]
+        wait_until(lambda: not is_well(own))
+        assert has() == [own]
+        stack.enter_context(server_process(*machine(url)))
+        assert {name: client.get_hull(name).revision for name in names.values()} == revisions | {names[own]: 2}
+        assert has() == [own]
+        clock.write_text("+0")
+        wait_until(lambda: is_well(own))
 
 
 @with_all_cases

@@ -74,7 +74,7 @@ class Member:
         self._worker = worker
         self._database = database_of(settings)
         self._board = Board(self._database, self._decide, worker, settings.cluster_host)
-        self._supervisor = Supervisor(Clock(), lambda _: None, end_process)
+        self._supervisor = Supervisor(Clock(), self._turn_health, end_process)
         self._cluster = Cluster(0, "")
         self._addresses = Addresses("", None)
         self._peers = Peers(self._addresses)
@@ -169,13 +169,17 @@ class Member:
         self._settled.set()
 
     def _watch_clock(self) -> None:
-        """Say it when the clock of this machine has become wrong, or right again; what it serves is not affected."""
+        """Say it when the clock of this machine has become wrong, or right again; what it serves keeps its time."""
         try:
             self._require_right_clock()
         except StorageError as error:
             self._supervisor.failed(CLOCK, error)
         else:
             self._supervisor.succeeded(CLOCK)
+
+    def _turn_health(self, reason: str | None) -> None:
+        for server in self._served.values():
+            server.set_machine_well(reason is None)
 
     def _require_right_clock(self) -> None:
         require_right_clock(self._board.clock_difference, self._settings.max_clock_difference)
@@ -264,6 +268,7 @@ class Member:
         for what in (READ_AHEAD, TAKE):
             self._failed.pop((what, number), None)
         self._served[number] = served.server
+        served.server.set_machine_well(self._supervisor.reason is None)
         seconds = round(time.monotonic() - begun, 3)
         log.info("a partition is served", extra={"partition": number, "seconds": seconds})
 
