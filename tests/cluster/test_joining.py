@@ -1,5 +1,6 @@
 """Which machines may join a cluster: those with a right clock that the others can reach."""
 
+import re
 import subprocess
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -63,7 +64,8 @@ def test_a_machine_that_others_cannot_reach_or_whose_clock_is_wrong_does_not_joi
         assert "is on another machine and listens on 127.0.0.1, which this one cannot reach" in refused.stderr
         refused = joined(at("+1h"), url)
         assert refused.returncode != 0
-        assert "the clock of this machine is 3600.0 s ahead of that of the database" in refused.stderr
+        # Less than an hour by what the database took to answer.
+        assert re.search(r"the clock of this machine is 3\d{3}\.\d s ahead of that of the database", refused.stderr)
         refused = joined((), url, "--cluster-host", "192.0.2.7", "--insecure")
         assert refused.returncode != 0
         assert "cannot listen on --cluster-host 192.0.2.7: Cannot assign requested address" in refused.stderr
