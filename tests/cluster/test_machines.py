@@ -210,6 +210,30 @@ def test_a_worker_that_is_slower_than_another_one_has_not_failed(url: str) -> No
         assert not server.said("a partition cannot be served")
 
 
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_cluster_beside_a_server_of_before_says_that_it_waits_for_its_end(url: str) -> None:
+    options = ("--journal", url, *QUIET)
+    beside = ("--cluster", *options, "--log-level", "warning", "--log-format", "json")
+    with server_process(*options) as first, HullClient(first.address) as client:
+        assert client.apply("hull", insert=[[1, 1]]).points == 1
+        with logged_process([COMMAND, "serve", "--port", "0", *beside]) as second:
+            said = second.wait_for("nothing to serve: a server without --cluster has it, until that is stopped")
+            assert said["served_by"] == f"process {first.process.pid} on {socket.gethostname()}"
+            shown = dynhull("cluster", "status", "--journal", url).stdout
+            assert f"{said['served_by']}  serves, without --cluster  1: 0\n" in shown
+            first.process.terminate()
+            with HullClient(second.process.stdout.readline().split()[-1], retries=100) as other:
+                assert other.apply("hull", insert=[[2, 2]]).points == 2
+            assert second.log() == [said]
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_worker_for_which_no_partition_is_left_says_so(url: str) -> None:
+    options = ("--cluster", "--partitions", "1", "--workers", "2", "--journal", url, "--scrub-cpu", "0")
+    with server_process(*options, complaints="nothing to serve: each partition has another worker"):
+        assert sorted(served(url).values()) == [1]
+
+
 @pytest.fixture(scope="module")
 def alone(postgres: PostgreSQL) -> Iterator[tuple[str, str]]:
     """The address of a cluster of one machine, and its database."""

@@ -161,9 +161,9 @@ class Addresses:
 
 def _place_of(owner: Owner) -> _Place | None:
     """Where an owner is reached; None of one that has gone, does not listen yet, or is none of a cluster."""
-    if owner.free or len(parts := owner.address.rsplit(" ", 2)) < 3:
+    if owner.free or owner.alone or not owner.address:
         return None
-    host, port, frames_port = parts
+    host, port, frames_port = owner.address.rsplit(" ", 2)
     return _Place(owner.epoch, owner.worker, host, int(port), int(frames_port))
 
 

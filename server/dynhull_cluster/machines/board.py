@@ -79,6 +79,11 @@ class Owner(NamedTuple):
     free: bool
     connected: bool
 
+    @property
+    def alone(self) -> bool:
+        """Whether it is a server without --cluster: it has one address, which is for callers, and keeps what it has."""
+        return not self.free and self.address != "" and " " not in self.address
+
 
 class Worker(NamedTuple):
     """A worker that is present, and whether it is to give up its partitions."""

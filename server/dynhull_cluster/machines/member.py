@@ -51,6 +51,9 @@ APART = (
     "owners of partitions are not connected to this database: they have died, or it is a copy of theirs. They are not "
     "called, and are replaced here. To join them, give --journal the database that they serve"
 )
+# What a worker says that has nothing to do.
+ALONE = "nothing to serve: a server without --cluster has it, until that is stopped"
+LEFT_OUT = "nothing to serve: each partition has another worker"
 # Seconds that gateways get to receive what their calls have ended with, before another worker may have the partition.
 LAST_STATUSES = 0.03
 
@@ -82,6 +85,7 @@ class Member:
         self._busy: dict[int, asyncio.Task[None]] = {}
         self._ahead: dict[int, Ahead] = {}
         self._failed: dict[tuple[str, int], tuple[float, float]] = {}
+        self._idle = ""
         self._looked = asyncio.Event()
         self._settled = asyncio.Event()
         self.address = settings.cluster_host
@@ -149,6 +153,8 @@ class Member:
             if self._board.forsaken(number, wanted[number]) and len(workers) > 1:
                 left = [each for each in workers if each != wanted[number]]
                 wanted[number] = shares(expected, left, tables.wishes)[number]
+        if not leaving:
+            self._notice_idle(wanted)
         for number, ahead in self._ahead.items():
             if wanted[number] != self._worker:
                 ahead.give_up()
@@ -167,6 +173,19 @@ class Member:
                 self._begin(gone, self._let_go(gone, wanted[gone]))
         self._looked.set()
         self._settled.set()
+
+    def _notice_idle(self, wanted: list[str]) -> None:
+        """Say it once when there is nothing to serve, which looks as if the server were broken."""
+        owners = self._board.tables.owners
+        alone = {
+            owner.worker if (owner := owners.get(number)) is not None and owner.alone and owner.connected else ""
+            for number, worker in enumerate(wanted)
+            if worker == self._worker
+        }
+        idle = LEFT_OUT if not alone else "" if "" in alone else ALONE
+        if idle and idle != self._idle:
+            log.warning(idle, extra={"served_by": ", ".join(sorted(alone or set(wanted)))})
+        self._idle = idle
 
     def _watch_clock(self) -> None:
         """Say it when the clock of this machine has become wrong, or right again; what it serves keeps its time."""
