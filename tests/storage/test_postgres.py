@@ -144,6 +144,17 @@ def test_who_is_replaced_commits_nothing_and_hears_of_it(url):
     second.close()
 
 
+def test_a_server_whose_database_is_a_copy_now_that_another_one_serves_in_the_same_epoch_is_replaced(url):
+    heard = []
+    first, _ = opened(url, heard.append, worker="north-1/0")
+    query(url, "UPDATE owners SET worker = 'south-1/0', process = ''")
+    with pytest.raises(TakenOverError, match="taken over partition 0"):
+        append(first, LAST + 1, LAST + 1)
+    wait_until(lambda: heard)
+    assert not first.entitled()
+    first.close()
+
+
 @pytest.mark.parametrize("until", ["1970-01-01", "2970-01-01"])
 def test_clocks_of_the_database_do_not_end_a_lease(url, until, monkeypatch):
     monkeypatch.setattr(ownership, "LEASE", 1.0)

@@ -49,8 +49,10 @@ IS_CONNECTED = (
     "WHERE locktype = 'advisory' AND objsubid = 2 AND granted "
     "AND database = (SELECT oid FROM pg_database WHERE datname = current_database()))"
 )
+# The row of an owner. In a copy of the database, another one may have the same epoch.
+OWN = "partition = %s AND epoch = %s AND worker = %s"
 # Locks the row of an owner against the next one, but not against renewals.
-REQUIRE = b"SELECT epoch FROM owners WHERE partition = %s AND epoch = %s FOR KEY SHARE"
+REQUIRE = f"SELECT epoch FROM owners WHERE {OWN} FOR KEY SHARE".encode()  # noqa: S608  (ours)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,11 @@ class Ownership:
         self._thread: threading.Thread | None = None
         self.epoch = 0
 
+    @property
+    def own(self) -> list[object]:
+        """The values of OWN."""
+        return [self._partition, self.epoch, self._worker]
+
     def holds(self) -> bool:
         """Whether the lease has not ended."""
         return _now() < self._until
@@ -142,8 +149,8 @@ class Ownership:
         """
         with self._turn, self._working() as connection:
             said = connection.execute(
-                "UPDATE owners SET address = %s WHERE partition = %s AND epoch = %s",
-                [address, self._partition, self.epoch],
+                f"UPDATE owners SET address = %s WHERE {OWN}".encode(),  # noqa: S608  (ours)
+                [address, *self.own],
             )
             if said.rowcount != 1:
                 raise taken_over(self._database, self._partition)
@@ -159,9 +166,8 @@ class Ownership:
         with self._turn, self._working() as connection:
             before = _now()
             renewed = connection.execute(
-                "UPDATE owners SET until = clock_timestamp() + make_interval(secs => %s) "
-                "WHERE partition = %s AND epoch = %s",
-                [LEASE, self._partition, self.epoch],
+                f"UPDATE owners SET until = clock_timestamp() + make_interval(secs => %s) WHERE {OWN}".encode(),  # noqa: S608
+                [LEASE, *self.own],
             )
             if renewed.rowcount != 1:
                 self._until = 0.0
@@ -180,8 +186,8 @@ class Ownership:
             if self.epoch:
                 with self._working() as connection:
                     connection.execute(
-                        "UPDATE owners SET until = '-infinity', process = '' WHERE partition = %s AND epoch = %s",
-                        [self._partition, self.epoch],
+                        f"UPDATE owners SET until = '-infinity', process = '' WHERE {OWN}".encode(),  # noqa: S608
+                        self.own,
                     )
                     connection.execute(f"NOTIFY {CHANNEL}".encode())
         except StorageError as error:

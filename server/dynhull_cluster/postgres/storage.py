@@ -218,7 +218,7 @@ class PostgresStorage(RowStorage):
         with as_storage_errors():
             self._owner.end_writers(connection, self._owner.epoch)
             connection.execute("BEGIN")
-            self._require_ownership(connection.execute(REQUIRE, [self._partition, self._owner.epoch]).rowcount)
+            self._require_ownership(connection.execute(REQUIRE, self._owner.own).rowcount)
             findings = examined(connection, self._partition, lambda *_: None, contents=False)
             connection.execute("COMMIT")
         if findings.fatal:
@@ -265,7 +265,7 @@ class PostgresStorage(RowStorage):
         """Send all of a transaction but its COMMIT."""
         with connection.pipeline():
             connection.execute("BEGIN")
-            owned = connection.execute(REQUIRE, [self._partition, self._owner.epoch])
+            owned = connection.execute(REQUIRE, self._owner.own)
             for sql, values in queries_of(self._partition, group.statements):
                 connection.execute(sql, values)
             *_, last = group.before.row
@@ -285,7 +285,7 @@ class PostgresStorage(RowStorage):
         """Renew both copies of the totals, one of which is damaged."""
         connection = self._writer = self._connect_writer(writer_name(self._partition, self._owner.epoch))
         with as_storage_errors(), connection.transaction():
-            self._require_ownership(connection.execute(REQUIRE, [self._partition, self._owner.epoch]).rowcount)
+            self._require_ownership(connection.execute(REQUIRE, self._owner.own).rowcount)
             put_totals(connection, self._partition, self._ledger.totals)
 
     def _connect_writer(self, name: str) -> Connection:
