@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 
 import pytest
+from command_line import dynhull
 from postgresql import PostgreSQL, postgresql
 from psycopg.conninfo import conninfo_to_dict
 from server_process import server_process
@@ -34,6 +35,8 @@ def test_nothing_of_a_copy_arrives_at_the_owners_of_the_original(original: Postg
         client = stack.enter_context(HullClient(serving.address, retries=0))
         assert [client.apply(name, insert=[[1, 1]]).points for name in NAMES] == [1] * len(NAMES)
         copied = stack.enter_context(postgresql(copied=original)).url(conninfo_to_dict(url)["dbname"])
+        shown = dynhull("cluster", "status", "--journal", copied).stdout
+        assert "/0  not connected to this database  4: 0, 1, 2, 3\n" in shown
         said = "To join them, give --journal the database that they serve"
         beside = stack.enter_context(server_process(*machine(copied), complaints=said))
         other = stack.enter_context(HullClient(beside.address, retries=0))

@@ -115,6 +115,12 @@ class Tables(NamedTuple):
     wishes: dict[int, str]
     heirs: dict[int, Heir]
 
+    def apart(self) -> dict[str, str]:
+        """The workers that have partitions and are not connected to the database, each with its process."""
+        owners = self.owners.values()
+        here = {each.worker for each in owners if each.connected}
+        return {each.worker: each.process for each in owners if not each.free and each.worker not in here}
+
 
 class Cluster(NamedTuple):
     """What does not change while a cluster runs.
@@ -228,13 +234,6 @@ class Board:
             "" if (owner := owners.get(each)) is None or owner.free or self.lapsed(each) else owner.worker
             for each in range(partitions)
         ]
-
-    def apart(self) -> list[str]:
-        """The workers that have not given up their partitions, and are not connected to the database."""
-        owners = self.tables.owners.values()
-        here = {each.worker for each in owners if each.connected}
-        left = {each.worker for each in owners if not (each.free or is_known_dead(each.process))}
-        return sorted(left - here)
 
     async def run(self) -> None:
         """Read the tables until cancelled. An error of the database is logged once, until it answers again."""

@@ -33,9 +33,14 @@ def status(journal: JOURNAL) -> None:
     alone = {owner.worker for owner in tables.owners.values() if owner.alone and owner.connected}
     for worker in sorted({*tables.workers, *served}):
         present = tables.workers.get(worker)
-        state = "away" if present is None else "gives up its partitions" if present.draining else "serves"
         if worker in alone:
             state = "serves, without --cluster"
+        elif worker in tables.apart():
+            state = "not connected to this database"
+        elif present is None:
+            state = "away"
+        else:
+            state = "gives up its partitions" if present.draining else "serves"
         own = [str(each) for each, owner in sorted(tables.owners.items()) if owner.worker == worker and not owner.free]
         typer.echo(f"{worker}  {state}  {len(own)}: {', '.join(own) or '-'}")
     free = [str(each) for each in range(count) if (owner := tables.owners.get(each)) is None or owner.free]

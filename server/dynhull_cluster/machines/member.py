@@ -107,8 +107,9 @@ class Member:
         self._peers = Peers(self._addresses)
         self._supervisor.every(0.0, "board", self._board.run)
         await self._looked.wait()
-        if apart := self._board.apart():
-            log.warning(APART, extra={"owners": ", ".join(apart)})
+        apart = self._board.tables.apart().items()
+        if owners := sorted(worker for worker, process in apart if not is_known_dead(process)):
+            log.warning(APART, extra={"owners": ", ".join(owners)})
         while self._busy:  # what was free
             await asyncio.wait(self._busy.values())
         log.info("serving", extra={"worker": self._worker, "partitions": len(self._served)})
