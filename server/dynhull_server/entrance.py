@@ -17,8 +17,6 @@ from .settings import Settings
 
 # Milliseconds between pings on an idle connection, and until a connection that does not answer them is closed.
 KEEPALIVE, KEEPALIVE_TIMEOUT = 60_000, 20_000
-# Milliseconds between the pings of a client, with calls or without, that are no flood: clients ping every ten seconds.
-LEAST_PING_INTERVAL = 5_000
 # Bytes of each call that a client may send before the server reads them.
 LOOKAHEAD = 2**20
 # Milliseconds that a new connection has for the HTTP/2 handshake.
@@ -111,7 +109,7 @@ def grpc_server(settings: Settings, *, shared_port: bool = False) -> grpc.aio.Se
             ("grpc.keepalive_time_ms", KEEPALIVE),
             ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT),
             ("grpc.keepalive_permit_without_calls", 1),
-            ("grpc.http2.min_ping_interval_without_data_ms", LEAST_PING_INTERVAL),
+            ("grpc.http2.min_ping_interval_without_data_ms", math.ceil(settings.min_ping_interval * 1000)),
             ("grpc.http2.bdp_probe", 0),
             ("grpc.http2.lookahead_bytes", LOOKAHEAD),
             ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),

@@ -107,6 +107,9 @@ class Settings(BaseModel):
     max_connection_idle: float = Field(
         600.0, gt=0, description="Seconds until a connection without calls is closed; clients reconnect when needed."
     )
+    min_ping_interval: float = Field(
+        5.0, gt=0, description="Seconds that a client waits between two pings; one that floods pings is cut off."
+    )
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds that a watcher may take to receive one event.")
     history_bytes: int = Field(4 * 2**20, ge=0, description="Memory per hull for the history that watches resume from.")
 

@@ -9,7 +9,8 @@ from contextlib import contextmanager, suppress
 class Proxy:
     """Forwards connections on `address` to a server, which may change; `cut` severs all of them at once.
 
-    While `flowing` is not set, it takes data and passes none on. The next connections are ended at once, `refusals` of
+    While `flowing` is not set, it takes data and passes none on. After `silence`, its connections do so for ever, and new
+    ones work. The next connections are ended at once, `refusals` of
     them.
 
     Args:
@@ -22,6 +23,7 @@ class Proxy:
         self.flowing = threading.Event()
         self.flowing.set()
         self._listener = socket.create_server(("127.0.0.1", 0))
+        self._silent: list[threading.Event] = []
         self._open: set[socket.socket] = set()
         self._closed = False
         self._threads: list[threading.Thread] = []
@@ -32,16 +34,23 @@ class Proxy:
         for each in list(self._open):
             shut(each)
 
+    def silence(self) -> None:
+        silent, self.flowing = self.flowing, threading.Event()
+        self.flowing.set()
+        silent.clear()
+        self._silent.append(silent)
+
     def close(self) -> None:
         self._closed = True
         shut(self._listener)
         self.cut()
-        self.flowing.set()
+        for each in (self.flowing, *self._silent):
+            each.set()
         for thread in self._threads:
             thread.join()
         self._listener.close()
 
-    def _start(self, target: Callable[..., None], *arguments: socket.socket) -> threading.Thread:
+    def _start(self, target: Callable[..., None], *arguments: object) -> threading.Thread:
         thread = threading.Thread(target=target, args=arguments)
         self._threads.append(thread)
         thread.start()
@@ -58,21 +67,23 @@ class Proxy:
                 self._start(self._connect, client)
 
     def _connect(self, client: socket.socket) -> None:
+        flowing = self.flowing
         with client, suppress(OSError), connected(self.server) as server:
             self._open |= {client, server}
             if self._closed:  # too late to be cut
                 shut(client)
                 shut(server)
-            back = self._start(self._forward, server, client)
-            self._forward(client, server)
+            back = self._start(self._forward, server, client, flowing)
+            self._forward(client, server, flowing)
             back.join()
             self._open -= {client, server}
 
-    def _forward(self, source: socket.socket, sink: socket.socket) -> None:
+    def _forward(self, source: socket.socket, sink: socket.socket, flowing: threading.Event) -> None:
         with suppress(OSError):
             while data := source.recv(65536):
-                self.flowing.wait()
+                flowing.wait()
                 sink.sendall(data)
+        flowing.wait()  # such a network does not say either that the other end has gone
         shut(source)
         shut(sink)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from dynhull_cli.connected import AsJson, Connect, connecting, fail
-from dynhull_cli.durations import duration
+from dynhull_cli.durations import more_than_0
 from dynhull_cli.exits import Exit
 from dynhull_cli.groups import beside, group
 from dynhull_cli.json_lines import json_line
@@ -110,7 +110,7 @@ def send(
             keys=[read_secret(each) for each in secret or ()],
             unsigned=unsigned,
             batch=1,
-            timeout=_seconds(timeout, "--timeout"),
+            timeout=more_than_0(timeout, "--timeout"),
             allow_private=allow_private,
         )
         return await send_again([each for each in found if not ids or each.letter.id in ids], target)
@@ -183,7 +183,7 @@ def relay(
     from .urls import without_secrets
 
     keys = [read_secret(each) for each in secret or ()]
-    patience = Patience(attempts, _seconds(first_pause, "--first-pause"), _seconds(longest_pause, "--longest-pause"))
+    patience = Patience(attempts, more_than_0(first_pause, "--first-pause"), more_than_0(longest_pause, "--longest-pause"))
     folder = StateFolder(state)
     logs.configure(log_format.value)
 
@@ -193,7 +193,7 @@ def relay(
             keys=keys,
             unsigned=unsigned,
             batch=batch,
-            timeout=_seconds(timeout, "--timeout"),
+            timeout=more_than_0(timeout, "--timeout"),
             allow_private=allow_private,
         )
         page = None if metrics_port is None else (metrics_host, metrics_port)
@@ -210,17 +210,10 @@ def relay(
                     folder,
                     enable=enable,
                     metrics=page,
-                    grace=_seconds(grace, "--grace"),
+                    grace=more_than_0(grace, "--grace"),
                 )
         finally:
             await target.close()
 
     if not asyncio.run(serve()):
         fail(Exit.FAILED, "a receiver wants no more events: the server keeps them for the consumer")
-
-
-def _seconds(text: str, option: str) -> float:
-    span = duration(text, option)
-    if span is None or span.total_seconds() <= 0:
-        raise ValueError(f"{option} {text!r} must be more than 0")
-    return span.total_seconds()

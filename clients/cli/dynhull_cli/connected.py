@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
 
+from .durations import more_than_0
 from .exits import Exit
 
 if TYPE_CHECKING:
@@ -29,15 +30,19 @@ class Connect:
         address: the server, as the user writes it.
         token: the bearer token, or None.
         encryption: the credentials of TLS, or None.
+        ping_interval: seconds between questions whether the server is still there.
     """
 
     address: str
     token: str | None
     encryption: "ChannelCredentials | None"
+    ping_interval: float
 
     def __call__(self, kind: type[Client], /, **more: Any) -> Client:
         """A client of the given class; `more` are further arguments of `Connection`."""
-        return kind(self.address, token=self.token, tls=self.encryption, **more)
+        return kind(
+            self.address, token=self.token, tls=self.encryption, ping_interval=self.ping_interval, **more
+        )
 
 
 def _option(variable: str, text: str, **more: Any) -> Any:
@@ -56,6 +61,14 @@ Tls = Annotated[bool, _option("TLS", "Encrypt, and trust the certificates that t
 TlsCa = Annotated[Path | None, _pem("TLS_CA", "encrypt, and trust these certificates.")]
 ClientCert = Annotated[Path | None, _pem("CLIENT_CERT", "certificate of this client.")]
 ClientKey = Annotated[Path | None, _pem("CLIENT_KEY", "private key of that certificate.")]
+PingInterval = Annotated[
+    str,
+    _option(
+        "PING_INTERVAL",
+        "Pause between questions whether the server is still there. A connection without an answer for as long again is "
+        "lost. Servers permit 5s or more (--min-ping-interval).",
+    ),
+]
 
 HullName = Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")]
@@ -89,6 +102,7 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
         tls_ca: TlsCa = None,
         client_cert: ClientCert = None,
         client_key: ClientKey = None,
+        ping_interval: PingInterval = "10s",
         **given: Any,
     ) -> None:
         os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # what gRPC would log, the message of the error says
@@ -99,7 +113,8 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
 
         try:
             encryption = credentials(tls, tls_ca, client_cert, client_key)
-            command(Connect(address, token, encryption), **given)
+            seconds = more_than_0(ping_interval, "--ping-interval")
+            command(Connect(address, token, encryption, seconds), **given)
         except (sdk.UnavailableError, sdk.DeadlineError) as error:
             if error.reason:  # which only our server gives
                 fail(Exit.UNAVAILABLE, f"the server at {address} answers, but cannot do this now: {error}")

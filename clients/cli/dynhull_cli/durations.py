@@ -29,6 +29,14 @@ def duration(text: str | None, option: str) -> timedelta | None:
     )
 
 
+def more_than_0(text: str, option: str) -> float:
+    """The seconds of a time span that must not be 0. ValueError names the option."""
+    span = duration(text, option)
+    if span is None or span.total_seconds() <= 0:
+        raise ValueError(f"{option} {text!r} must be more than 0")
+    return span.total_seconds()
+
+
 def shown(span: timedelta) -> str:
     """A time span in the largest unit that needs no fraction."""
     for unit in ("d", "h", "m", "s"):

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from dynhull_cli.connected import Connect, connecting
-from dynhull_cli.durations import duration
+from dynhull_cli.durations import more_than_0
 
 MIB = 2**20
 
@@ -83,15 +83,15 @@ def gateway(
         hosts=hosts_of(allow_host, host),
         max_body=max_body * MIB,
         max_upload=max_upload * MIB,
-        body_seconds=_seconds(body_timeout, "--body-timeout"),
-        keepalive_seconds=_seconds(keepalive, "--keepalive"),
+        body_seconds=more_than_0(body_timeout, "--body-timeout"),
+        keepalive_seconds=more_than_0(keepalive, "--keepalive"),
         max_streams=max_streams,
-        grace_seconds=_seconds(grace, "--grace"),
+        grace_seconds=more_than_0(grace, "--grace"),
         root_path=root_path.rstrip("/"),
         forwarded_from=forwarded_from,
         metrics=None if metrics_port is None else (metrics_host, metrics_port),
     )
-    limit = _seconds(timeout, "--timeout")
+    limit = more_than_0(timeout, "--timeout")
     run(lambda: connect(AsyncHullClient, timeout=limit), host, port, settings)
 
 
@@ -104,10 +104,3 @@ def _origin(text: str) -> str:
         f"--origin {text!r} must be * or an origin as browsers send it: scheme, host and port without a path, such as "
         "https://pages.example or http://127.0.0.1:8000"
     )
-
-
-def _seconds(text: str, option: str) -> float:
-    span = duration(text, option)
-    if span is None or span.total_seconds() <= 0:
-        raise ValueError(f"{option} {text!r} must be more than 0")
-    return span.total_seconds()

@@ -52,6 +52,9 @@ class HullClient(Client[BlockingConnection]):
         retries: how often a call that reached no server is repeated, after a growing pause. Only calls that are safe to
             repeat are: reads, batches with a producer and a sequence number, and calls that have certainly not begun,
             as a server says that starts or stops.
+        ping_interval: seconds between questions whether the server is still there, on connections without calls, too.
+            One without an answer for as long again is lost, though nobody has closed it: calls on it end, and watches
+            go on by a new one. Servers permit one each five seconds by default (`--min-ping-interval`).
     """
 
     _connect = BlockingConnection

@@ -20,6 +20,7 @@ from ._retry import Attempts
 DEFAULT_ADDRESS = "127.0.0.1:50051"
 DEFAULT_TIMEOUT = 30.0
 DEFAULT_RETRIES = 3
+DEFAULT_PING_INTERVAL = 10.0
 MAX_MESSAGE_BYTES = 2**31 - 1
 
 OPTIONS = [
@@ -29,10 +30,6 @@ OPTIONS = [
     # Finds a restarted server within a second; by default gRPC may take two minutes.
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 1000),
-    # Notices within twenty seconds that a connection is dead, though nobody has closed it.
-    ("grpc.keepalive_time_ms", 10_000),
-    ("grpc.keepalive_timeout_ms", 10_000),
-    ("grpc.http2.ping_timeout_ms", 10_000),  # of other pings, which a ping of keepalive would wait for
     ("grpc.keepalive_permit_without_calls", 1),
     ("grpc.http2.max_pings_without_data", 0),
     # A connection of its own: one that is dead would be shared with all new clients of the process.
@@ -63,8 +60,10 @@ class Connection:
         token: str | None,
         tls: grpc.ChannelCredentials | None,
         retries: int,
+        ping_interval: float,
     ) -> None:
         require_not_negative(timeout=timeout, retries=retries)
+        options = [*OPTIONS, *_pings(ping_interval)]
         self.address, encrypted = target(address)
         if tls is None and encrypted:
             tls = grpc.ssl_channel_credentials()
@@ -76,6 +75,7 @@ class Connection:
             token=token,
             tls=tls,
             retries=retries,
+            ping_interval=ping_interval,
         )
         self._timeout = timeout
         self.retries = retries
@@ -83,9 +83,9 @@ class Connection:
         self._closed = self._event()  # shared with those of other tokens
         self._metadata = _authorization(token)
         if tls is None:
-            self._channel = self._grpc.insecure_channel(self.address, OPTIONS)
+            self._channel = self._grpc.insecure_channel(self.address, options)
         else:
-            self._channel = self._grpc.secure_channel(self.address, tls, OPTIONS)
+            self._channel = self._grpc.secure_channel(self.address, tls, options)
         stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel)
         self.stub = SimpleNamespace(**{name: method for stub in stubs for name, method in vars(stub).items()})
 
@@ -104,6 +104,18 @@ class Connection:
 
     def _attempts(self, call: Call[Any]) -> Attempts:
         return Attempts(call, self._timeout if call.timeout is None else call.timeout, self.retries)
+
+
+def _pings(seconds: float) -> list[tuple[str, int]]:
+    """The options of a connection that is lost when a ping has no answer for as long as is between two of them."""
+    if not seconds > 0:
+        raise ValueError(f"ping_interval must be more than 0, got {seconds}")
+    milliseconds = max(1, round(seconds * 1000))
+    return [
+        ("grpc.keepalive_time_ms", milliseconds),
+        ("grpc.keepalive_timeout_ms", milliseconds),
+        ("grpc.http2.ping_timeout_ms", milliseconds),  # of other pings, which a ping of keepalive would wait for
+    ]
 
 
 def _authorization(token: str | None) -> tuple[tuple[str, str], ...]:

@@ -8,7 +8,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 import grpc
 
 from ._calls import require_not_negative
-from ._connection import DEFAULT_ADDRESS, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
+from ._connection import DEFAULT_ADDRESS, DEFAULT_PING_INTERVAL, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
 
 P = ParamSpec("P")
 Description = TypeVar("Description")
@@ -42,9 +42,16 @@ class Client(Generic[AnyConnection]):
         token: str | None = None,
         tls: grpc.ChannelCredentials | None = None,
         retries: int = DEFAULT_RETRIES,
+        ping_interval: float = DEFAULT_PING_INTERVAL,
     ) -> None:
         self._connection = self._connect(
-            address, timeout=timeout, wait_for_ready=wait_for_ready, token=token, tls=tls, retries=retries
+            address,
+            timeout=timeout,
+            wait_for_ready=wait_for_ready,
+            token=token,
+            tls=tls,
+            retries=retries,
+            ping_interval=ping_interval,
         )
 
     @property
