@@ -816,3 +816,6 @@ class Health(Response):
     """Whether the gateway, and the server behind it, can answer."""
 
     status: Literal["ok", "draining", "unavailable"]
+    seconds_without_server: float | None = Field(
+        description="How long the gateway has had no connection to its server; null while it has one."
+    )

@@ -83,7 +83,11 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
         host, port = listening.getsockname()[:2]
         place = f"[{host}]" if ":" in host else host
         typer.echo(f"dynhull gateway on http://{place}:{port}{settings.root_path}")
-        await serving
+        following = asyncio.create_task(app.state.health.follow(client.presence()))
+        try:
+            await serving
+        finally:
+            following.cancel()
 
 
 def listener(host: str, port: int) -> socket.socket:

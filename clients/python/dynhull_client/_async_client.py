@@ -120,6 +120,14 @@ class AsyncHullClient(Client[AsyncConnection]):
                 yield each
             following = token or None
 
+    def presence(self) -> AsyncIterator[bool]:
+        """Whether the server is connected, now and whenever that changes, until the client is closed.
+
+        It connects again by itself, also where nothing is called, and notices a server that is silent, see
+        `ping_interval`.
+        """
+        return self._connection.presence()
+
     async def close(self) -> None:
         """Close the connection and end the calls on it."""
         await self._connection.close()

@@ -86,6 +86,17 @@ class AsyncConnection(Connection):
             async with asyncio.timeout(seconds):
                 await self._closed.wait()
 
+    async def presence(self) -> AsyncIterator[bool]:
+        """Whether the server is connected, now and whenever that changes, until this is closed."""
+        state, before = self._channel.get_state(try_to_connect=True), None
+        while not self._closed.is_set():
+            if (connected := state is grpc.ChannelConnectivity.READY) is not before:
+                yield connected
+            before = connected
+            with suppress(grpc.aio.UsageError):  # closed meanwhile
+                await self._channel.wait_for_state_change(state)
+                state = self._channel.get_state(try_to_connect=True)
+
     async def converse(
         self, method: Any, requests: AsyncIterator[Any], hear: Callable[[Any], Awaitable[bool]]
     ) -> DynhullError:

@@ -15,6 +15,11 @@ def message(kind: str, ident: str, data: Any) -> bytes:
     return lines.encode() + to_json(data, inf_nan_mode="null") + b"\n\n"
 
 
+# A browser passes on only events with data.
+UNAVAILABLE = message("unavailable", "", {"detail": "the gateway has lost its server: nothing is known until it is back"})
+AVAILABLE = message("available", "", {})
+
+
 def place(ident: str) -> bytes:
     """An id alone, which a browser notes without an event."""
     return f"id: {ident}\n\n".encode()

@@ -8,7 +8,7 @@ from starlette.types import Receive, Scope, Send
 
 from ..figures import Figures
 from ..health import State
-from .messages import FIRST
+from .messages import AVAILABLE, FIRST, UNAVAILABLE
 
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}  # nginx passes on what it does not buffer
 
@@ -52,9 +52,25 @@ class EventStream(Response):
     async def _send(self, send: Send) -> None:
         await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
         await send({"type": "http.response.body", "body": FIRST, "more_body": True})
-        async for text in self._texts:
-            await send({"type": "http.response.body", "body": text, "more_body": True})
-            self._figures.events.inc()
+        reporting = asyncio.create_task(self._report_presence(send))
+        try:
+            async for text in self._texts:
+                await send({"type": "http.response.body", "body": text, "more_body": True})
+                self._figures.events.inc()
+        finally:
+            reporting.cancel()
+            await asyncio.gather(reporting, return_exceptions=True)
+
+    async def _report_presence(self, send: Send) -> None:
+        """Tell the reader when the gateway has lost its server, and when it has it again."""
+        reported = True
+        while True:
+            changed = self._health.changed
+            if self._health.connected is not reported:
+                reported = self._health.connected
+                text = AVAILABLE if reported else UNAVAILABLE
+                await send({"type": "http.response.body", "body": text, "more_body": True})
+            await changed.wait()
 
 
 async def _left(receive: Receive) -> None:
