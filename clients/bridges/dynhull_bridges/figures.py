@@ -23,12 +23,29 @@ class Figures:
         self.failed = counter("failed", "Deliveries that failed and are repeated.")
         self.dead = counter("dead", "Events that became dead letters.")
         self.lost = counter("lost", "Events that the server dropped before they could be delivered.")
+        self._lost: float | None = None
+        without = Gauge(
+            "dynhull_relay_seconds_without_server",
+            "How long there has been no connection to the server; 0 with one.",
+            registry=self._registry,
+        )
+        without.set_function(lambda: self.seconds_without_server)
         self._backlog = Gauge(
             "dynhull_relay_backlog", "Events that are not acknowledged.", names, registry=self._registry
         )
         self._oldest = Gauge(
             "dynhull_relay_oldest_seconds", "Age of the oldest of them; 0 without any.", names, registry=self._registry
         )
+
+    @property
+    def seconds_without_server(self) -> float:
+        """How long there has been no connection to the server; 0 with one."""
+        lost = self._lost
+        return 0.0 if lost is None else time.monotonic() - lost
+
+    def note_presence(self, connected: bool) -> None:
+        """Note whether there is a connection to the server."""
+        self._lost = None if connected else time.monotonic()
 
     def add(self, fence: str) -> None:
         """Show a fence from the start, not only after its first event."""

@@ -118,6 +118,7 @@ async def run(
         folder.enable()
     running = [asyncio.create_task(lane.run()) for lane in lanes]
     ending = asyncio.create_task(_end(stop, running, grace))
+    reporting = asyncio.create_task(_report_presence(client, server, figures))
     try:
         await asyncio.gather(*running)
     except ExceptionGroup as group:
@@ -128,6 +129,7 @@ async def run(
         log.warning("a delivery took longer than --grace: it will be repeated")
     finally:
         ending.cancel()
+        reporting.cancel()
         for each in running:
             each.cancel()
         await asyncio.gather(*running, return_exceptions=True)
@@ -179,6 +181,17 @@ async def _require_fences(client: AsyncHullClient, server: str, fences: Sequence
             first = missing[0]
             raise FenceNotFoundError("\n".join(map(str, missing)), first.code, first.reason, first.metadata)
         return
+
+
+async def _report_presence(client: AsyncHullClient, server: str, figures: Figures) -> None:
+    """Log when the server is lost, as by a network that is silent, and when it is back."""
+    async for connected in client.presence():
+        seconds = figures.seconds_without_server
+        figures.note_presence(connected)
+        if not connected:
+            log.warning("the server is lost: no events until it is back", server=server)
+        elif seconds:
+            log.info("the server is back", server=server, seconds=round(seconds, 3))
 
 
 async def _end(stop: asyncio.Event, running: Sequence[asyncio.Task[None]], grace: float) -> None:
