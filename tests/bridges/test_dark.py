@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from patience import wait_until
 from proxy import proxy
 from relay_process import fence, pass_through, relay_process
 from server_process import server_process
-from patience import wait_until
 
 from dynhull_client import HullClient
 

@@ -37,7 +37,9 @@ def test_watches_notice_say_so_and_go_on(
     with proxy(server.address) as way, connect(way.address, ping_interval=PING) as far:
         watches = [far.watch(name), far.watch_fence(name, after=0)]
         arrived: list[list[Any]] = [[], []]
-        following = [threading.Thread(target=each.extend, args=(watch,)) for each, watch in zip(arrived, watches)]
+        following = [
+            threading.Thread(target=each.extend, args=(watch,)) for each, watch in zip(arrived, watches, strict=True)
+        ]
         for each in following:
             each.start()
         wait_until(lambda: [len(each) for each in arrived] == [1, 1])
@@ -73,15 +75,27 @@ def test_a_writer_sends_again_what_was_swallowed(
     assert hull.last_sequence(name, "ship") == 2
 
 
-def test_a_call_ends_and_the_next_one_works(
-    server: Server, hull: HullClient, connect: type[HullClient], name: str
-) -> None:
+@pytest.mark.usefixtures("hull")
+def test_a_call_ends_and_the_next_one_works(server: Server, connect: type[HullClient], name: str) -> None:
     with proxy(server.address) as way, connect(way.address, ping_interval=PING) as far:
         far.get_hull(name)
         way.silence()
         with pytest.raises(UnavailableError):  # it may have been applied
             far.put(name, ["second"], [[2, 3]])
         assert far.get_hull(name).revision == 1
+
+
+def test_presence_is_reported_without_any_call(server: Server, connect: type[HullClient]) -> None:
+    with proxy(server.address) as way, connect(way.address, ping_interval=PING) as far:
+        presence = iter(far.presence())
+        assert [next(presence) for _ in range(2)] == [False, True]
+        way.server = ""
+        way.silence()
+        assert not next(presence)
+        way.server = server.address
+        assert next(presence)
+        far.close()
+        assert list(presence) == []
 
 
 @pytest.mark.parametrize("interval", [0, -1, float("nan")])

@@ -9,9 +9,8 @@ from contextlib import contextmanager, suppress
 class Proxy:
     """Forwards connections on `address` to a server, which may change; `cut` severs all of them at once.
 
-    While `flowing` is not set, it takes data and passes none on. After `silence`, its connections do so for ever, and new
-    ones work. The next connections are ended at once, `refusals` of
-    them.
+    While `flowing` is not set, it takes data and passes none on. After `silence`, its connections do so for ever, and
+    new ones work. The next connections are ended at once, `refusals` of them.
 
     Args:
         server: host and port, or the path of a Unix socket; "" to end new connections at once.

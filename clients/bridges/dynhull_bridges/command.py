@@ -183,7 +183,9 @@ def relay(
     from .urls import without_secrets
 
     keys = [read_secret(each) for each in secret or ()]
-    patience = Patience(attempts, more_than_0(first_pause, "--first-pause"), more_than_0(longest_pause, "--longest-pause"))
+    patience = Patience(
+        attempts, more_than_0(first_pause, "--first-pause"), more_than_0(longest_pause, "--longest-pause")
+    )
     folder = StateFolder(state)
     logs.configure(log_format.value)
 

@@ -40,9 +40,7 @@ class Connect:
 
     def __call__(self, kind: type[Client], /, **more: Any) -> Client:
         """A client of the given class; `more` are further arguments of `Connection`."""
-        return kind(
-            self.address, token=self.token, tls=self.encryption, ping_interval=self.ping_interval, **more
-        )
+        return kind(self.address, token=self.token, tls=self.encryption, ping_interval=self.ping_interval, **more)
 
 
 def _option(variable: str, text: str, **more: Any) -> Any:
@@ -65,8 +63,8 @@ PingInterval = Annotated[
     str,
     _option(
         "PING_INTERVAL",
-        "Pause between questions whether the server is still there. A connection without an answer for as long again is "
-        "lost. Servers permit 5s or more (--min-ping-interval).",
+        "Pause between questions whether the server is still there. A connection without an answer for as long "
+        "again is lost. Servers permit 5s or more (--min-ping-interval).",
     ),
 ]
 

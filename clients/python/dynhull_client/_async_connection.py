@@ -11,7 +11,7 @@ import grpc
 
 from ._calls import Call
 from ._connection import BlockingConnection, Connection, client_is_closed
-from ._errors import DynhullError, error_of
+from ._errors import DynhullError
 
 Result = TypeVar("Result")
 
@@ -24,11 +24,11 @@ class CallErrors:
     and it raises CancelledError where nobody cancelled the task, but the channel was closed.
 
     Args:
-        closed: set when the channel is closed.
+        connection: the connection of the call.
     """
 
-    def __init__(self, closed: asyncio.Event) -> None:
-        self._closed = closed
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
 
     def __enter__(self) -> Self:
         task = asyncio.current_task()
@@ -44,10 +44,10 @@ class CallErrors:
             if not isinstance(error, asyncio.CancelledError):
                 raise asyncio.CancelledError from error
         elif isinstance(error, asyncio.CancelledError):
-            if self._closed.is_set():  # else the task was cancelled before, while it ran
+            if self._connection.closed:  # else the task was cancelled before, while it ran
                 raise client_is_closed() from None
         elif isinstance(error, grpc.RpcError):
-            raise error_of(error) from None
+            raise self._connection.error_of(error) from None
 
 
 class AsyncConnection(Connection):
@@ -72,7 +72,7 @@ class AsyncConnection(Connection):
         while True:
             method = getattr(self.stub, call.method)
             try:
-                with CallErrors(self._closed):
+                with CallErrors(self):
                     begun = self.begin(method, call.request, attempts.timeout())
                     response = [part async for part in begun] if call.in_parts else await begun
                 return call.decode(response)
@@ -111,7 +111,7 @@ class AsyncConnection(Connection):
             What ended the call.
         """
         try:
-            with CallErrors(self._closed):
+            with CallErrors(self):
                 call = self.begin(method, None, None)
                 sending = asyncio.create_task(_send(call, requests))
                 try:

@@ -12,7 +12,7 @@ import grpc
 from ._async_connection import AsyncConnection, note, unless
 from ._calls import Watching
 from ._connection import client_is_closed
-from ._errors import DynhullError, error_of
+from ._errors import DynhullError
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
@@ -62,7 +62,7 @@ class AsyncFollower(AsyncIterator[Happening]):
                 self._arrived.extend(self._place.take(reading.result()))
             except grpc.RpcError as failure:
                 self._call = None
-                self._arrived.extend(self._place.end(error_of(failure)))
+                self._arrived.extend(self._place.end(self._connection.error_of(failure)))
             except asyncio.CancelledError:
                 if not self._closed.is_set():
                     self._call = None

@@ -1,6 +1,7 @@
 """A channel to a server, and calls on it."""
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from copy import copy
 from functools import partial
 from threading import Condition, Event
@@ -12,7 +13,7 @@ import grpc
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-from ._address import target
+from ._address import is_local, proxy_of, target
 from ._calls import Call, require_not_negative
 from ._errors import DynhullError, error_of
 from ._retry import Attempts
@@ -27,9 +28,9 @@ OPTIONS = [
     # Only the server's limits apply.
     ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
     ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
-    # Finds a restarted server within a second; by default gRPC may take two minutes.
+    # Finds a server that begins to listen before the last of the default retries; gRPC may take two minutes otherwise.
     ("grpc.initial_reconnect_backoff_ms", 100),
-    ("grpc.max_reconnect_backoff_ms", 1000),
+    ("grpc.max_reconnect_backoff_ms", 250),
     ("grpc.keepalive_permit_without_calls", 1),
     ("grpc.http2.max_pings_without_data", 0),
     # A connection of its own: one that is dead would be shared with all new clients of the process.
@@ -65,6 +66,9 @@ class Connection:
         require_not_negative(timeout=timeout, retries=retries)
         options = [*OPTIONS, *_pings(ping_interval)]
         self.address, encrypted = target(address)
+        if is_local(self.address):
+            options.append(("grpc.enable_http_proxy", 0))
+        self._proxy = proxy_of(self.address)
         if tls is None and encrypted:
             tls = grpc.ssl_channel_credentials()
         self._blocking = partial(
@@ -101,6 +105,15 @@ class Connection:
         if self._closed.is_set():
             raise client_is_closed()
         return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is closed."""
+        return bool(self._closed.is_set())
+
+    def error_of(self, call: grpc.Call | grpc.RpcError) -> DynhullError:
+        """The error that a finished call ended with."""
+        return error_of(call, self._proxy)
 
     def _attempts(self, call: Call[Any]) -> Attempts:
         return Attempts(call, self._timeout if call.timeout is None else call.timeout, self.retries)
@@ -177,10 +190,36 @@ class BlockingConnection(Connection):
                 hold(begun := self.begin(method.future, call.request, attempts.timeout()))
                 return call.decode(begun.result())
             except grpc.FutureCancelledError:
-                raise error_of(begun) from None
+                raise self.error_of(begun) from None
             except grpc.RpcError as failure:
-                call, pause = attempts.after(call, error_of(failure))
+                call, pause = attempts.after(call, self.error_of(failure))
             self.pause(pause, ended)
+
+    def presence(self) -> Iterator[bool]:
+        """Whether the server is connected, now and whenever that changes, until this is closed."""
+        states: deque[grpc.ChannelConnectivity] = deque()
+
+        def note(state: grpc.ChannelConnectivity) -> None:
+            states.append(state)
+            self.wake()
+
+        before = None
+        self._channel.subscribe(note, try_to_connect=True)
+        try:
+            while True:
+                with self._news:
+                    self._news.wait_for(lambda: self._closed.is_set() or states)
+                if self._closed.is_set():
+                    return
+                state = states.popleft()
+                if (connected := state is grpc.ChannelConnectivity.READY) is not before:
+                    yield connected
+                before = connected
+                if state is grpc.ChannelConnectivity.IDLE:  # the connection is lost, and nothing has asked for another
+                    self._channel.unsubscribe(note)
+                    self._channel.subscribe(note, try_to_connect=True)
+        finally:
+            self._channel.unsubscribe(note)
 
     def pause(self, seconds: float, ended: Callable[[], bool]) -> None:
         """Wait before a new attempt, while the connection is open and `ended` returns False."""

@@ -233,10 +233,12 @@ CANCELLED_HERE = "Locally cancelled by application!", "Channel closed!"
 # What servers that stop say of calls that they have not begun (github.com/grpc/grpc/issues/41785). Of those that they
 # have begun, and do not complete in time, they say that all calls are cancelled, with the code UNAVAILABLE.
 CANCELLED_UNBEGUN = "CANCELLED"
+# What gRPC says of calls for which there is no connection.
+NOT_CONNECTED = "failed to connect to all addresses", "DNS resolution failed"
 
 
-def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
-    """The error that a finished call ended with."""
+def error_of(call: grpc.Call | grpc.RpcError, proxy: str | None = None) -> DynhullError:
+    """The error that a finished call ended with; it names the proxy, if gRPC asks one for connections."""
     if call.code() == grpc.StatusCode.INTERNAL and call.details() == ENDED_IN_A_WRITE:
         # The code stays: to those who send again, it means that the message itself may be the cause.
         return UnavailableError("the connection was lost while a message was sent", grpc.StatusCode.INTERNAL, "", {})
@@ -244,7 +246,15 @@ def error_of(call: grpc.Call | grpc.RpcError) -> DynhullError:
     if status is None and call.code() == grpc.StatusCode.CANCELLED and call.details() not in CANCELLED_HERE:
         reason = "DRAINING" if call.details() == CANCELLED_UNBEGUN else ""
         return UnavailableError("the server ended the call, as one that stops", grpc.StatusCode.UNAVAILABLE, reason, {})
-    return _error(call.code(), call.details(), () if status is None else status.details)
+    message = call.details()
+    if proxy is not None and message is not None and message.startswith(NOT_CONNECTED):
+        message += f" (through the proxy {proxy})"
+    return _error(call.code(), message, () if status is None else status.details)
+
+
+def not_sent(error: DynhullError) -> bool:
+    """Whether nothing of the call was sent, because there was no connection."""
+    return error.code == grpc.StatusCode.UNAVAILABLE and not error.reason and str(error).startswith(NOT_CONNECTED)
 
 
 def error_of_read(error: ReadError) -> DynhullError:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 import grpc
 
-from ._errors import error_of
 from ._messages import Ingested, decode_ingested
 
 if TYPE_CHECKING:
@@ -65,7 +64,7 @@ class Ingest:
             self._call.cancel()
             return
         self._close()
-        self.summary = decode_ingested(_result(self._call))
+        self.summary = decode_ingested(self._result())
 
     def apply(
         self,
@@ -96,7 +95,7 @@ class Ingest:
                 self._queue.append(request)
                 self._turn.notify_all()
                 return
-        _result(self._call)
+        self._result()
         raise RuntimeError("the context of this Ingest was left: open a new one")
 
     def __repr__(self) -> str:
@@ -118,9 +117,8 @@ class Ingest:
             self._closed = True
             self._turn.notify_all()
 
-
-def _result(call: Any) -> Any:
-    try:
-        return call.result()
-    except (grpc.RpcError, grpc.FutureCancelledError):
-        raise error_of(call) from None
+    def _result(self) -> Any:
+        try:
+            return self._call.result()
+        except (grpc.RpcError, grpc.FutureCancelledError):
+            raise self._connection.error_of(self._call) from None

@@ -10,7 +10,7 @@ import grpc
 from . import _calls as calls
 from . import _layers as peeling
 from . import _uses as uses
-from ._errors import DynhullError, error_of
+from ._errors import DynhullError
 from ._methods import answer_of, described, documented
 from ._outcomes import Outcome, settle
 from ._questions import Questions
@@ -166,7 +166,7 @@ class Pipeline:
         except DynhullError as error:
             return error
         except grpc.RpcError as failure:
-            return error_of(failure)
+            return self._connection.error_of(failure)
         return DynhullError("the server ended the call", call.code(), "", {})
 
     def _settle(self, answered: Answered) -> None:

@@ -8,7 +8,7 @@ from typing import TypeVar
 import grpc
 
 from ._calls import Call
-from ._errors import DeadlineError, DynhullError, HullNotFoundError, OutcomeUnknownError
+from ._errors import DeadlineError, DynhullError, HullNotFoundError, OutcomeUnknownError, not_sent
 
 FIRST_PAUSE = 0.1
 LONGEST_PAUSE = 5.0
@@ -72,7 +72,7 @@ class Attempts:
                 raise DeadlineError(message, grpc.StatusCode.DEADLINE_EXCEEDED, "", {}) from error
             return call, pause
         self._left -= 1
-        safe = self._repeatable or error.reason in NOT_BEGUN
+        safe = self._repeatable or error.reason in NOT_BEGUN or not_sent(error)
         if self._left < 0 or late or not passes(error) or not safe:
             raise self._explained(call, error) from None
         return call, pause

@@ -10,7 +10,7 @@ import grpc
 
 from ._calls import Watching
 from ._connection import BlockingConnection
-from ._errors import DynhullError, error_of
+from ._errors import DynhullError
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
@@ -51,7 +51,7 @@ class Follower(Iterator[Happening]):
                 if self._closed.is_set():
                     raise StopIteration from None
                 self._call = None
-                self._arrived.extend(self._place.end(error_of(failure)))
+                self._arrived.extend(self._place.end(self._connection.error_of(failure)))
         return self._arrived.popleft()
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import grpc
 
 from ._calls import Known, Writing, known
-from ._errors import DynhullError, error_of
+from ._errors import DynhullError
 from ._gathering import put_parts, remove_parts
 from ._outcomes import Outcome, settle
 from ._window import Window
@@ -244,7 +244,7 @@ class Writer:
         except DynhullError as error:
             return error
         except grpc.RpcError as failure:
-            return error_of(failure)
+            return self._connection.error_of(failure)
         return DynhullError("the server ended the stream", call.code(), "", {})
 
     def _requests(self, window: Window[Future[Applied]], connection: int) -> Iterator[pb.StreamRequest]:

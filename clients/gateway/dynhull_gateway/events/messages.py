@@ -16,7 +16,7 @@ def message(kind: str, ident: str, data: Any) -> bytes:
 
 
 # A browser passes on only events with data.
-UNAVAILABLE = message("unavailable", "", {"detail": "the gateway has lost its server: nothing is known until it is back"})
+UNAVAILABLE = message("unavailable", "", {"detail": "the gateway has lost its server"})
 AVAILABLE = message("available", "", {})
 
 
