@@ -1,15 +1,16 @@
 """A network that stops carrying bytes without a word: who listens or writes notices, says so, and goes on."""
 
+import asyncio
 import threading
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from patience import wait_until
-from proxy import proxy
+from proxy import Proxy, proxy
 from server_process import Server, server_process
 
-from dynhull_client import HullClient, UnavailableError
+from dynhull_client import AsyncHullClient, HullClient, UnavailableError
 
 PING = 0.4  # seconds
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
@@ -85,17 +86,21 @@ def test_a_call_ends_and_the_next_one_works(server: Server, connect: type[HullCl
         assert far.get_hull(name).revision == 1
 
 
-def test_presence_is_reported_without_any_call(server: Server, connect: type[HullClient]) -> None:
-    with proxy(server.address) as way, connect(way.address, ping_interval=PING) as far:
-        presence = iter(far.presence())
-        assert [next(presence) for _ in range(2)] == [False, True]
-        way.server = ""
-        way.silence()
-        assert not next(presence)
-        way.server = server.address
-        assert next(presence)
-        far.close()
-        assert list(presence) == []
+def test_presence_is_reported_without_any_call(server: Server) -> None:
+    async def follow(way: Proxy) -> None:
+        async with AsyncHullClient(way.address, ping_interval=PING) as far:
+            presence = far.presence()
+            assert [await anext(presence) for _ in range(2)] == [False, True]
+            way.server = ""
+            way.silence()
+            assert not await anext(presence)
+            way.server = server.address
+            assert await anext(presence)
+            await far.close()
+            assert [each async for each in presence] == []
+
+    with proxy(server.address) as way:
+        asyncio.run(follow(way))
 
 
 @pytest.mark.parametrize("interval", [0, -1, float("nan")])

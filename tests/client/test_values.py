@@ -119,7 +119,9 @@ def test_completion_offers_what_is_documented() -> None:
     classes = [value for value in vars(dynhull_client).values() if isinstance(value, type)]
     assert {kind.__module__ for kind in classes} == {"dynhull_client"}
     assert {name for name in dir(HullClient("127.0.0.1:1")) if not name.startswith("_")} == {*METHODS, "address"}
-    assert set(METHODS) == {name for name in dir(AsyncHullClient) if not name.startswith("_")} - {"address"}
+    # gRPC's channels for threads fail when they are closed while one follows their state.
+    only_async = {"address", "presence"}
+    assert set(METHODS) == {name for name in dir(AsyncHullClient) if not name.startswith("_")} - only_async
     assert all(inspect.getdoc(getattr(HullClient, name)) for name in METHODS)
     assert dynhull_client.__version__ == dynhull.__version__ == version("dynhull")
 

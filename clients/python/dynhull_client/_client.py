@@ -128,14 +128,6 @@ class HullClient(Client[BlockingConnection]):
             yield from found
             following = token or None
 
-    def presence(self) -> Iterator[bool]:
-        """Whether the server is connected, now and whenever that changes, until the client is closed.
-
-        It connects again by itself, also where nothing is called, and notices a server that is silent, see
-        `ping_interval`.
-        """
-        return self._connection.presence()
-
     def close(self) -> None:
         """Close the connection and end the calls on it."""
         self._connection.close()

@@ -1,7 +1,6 @@
 """A channel to a server, and calls on it."""
 
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import copy
 from functools import partial
 from threading import Condition, Event
@@ -194,32 +193,6 @@ class BlockingConnection(Connection):
             except grpc.RpcError as failure:
                 call, pause = attempts.after(call, self.error_of(failure))
             self.pause(pause, ended)
-
-    def presence(self) -> Iterator[bool]:
-        """Whether the server is connected, now and whenever that changes, until this is closed."""
-        states: deque[grpc.ChannelConnectivity] = deque()
-
-        def note(state: grpc.ChannelConnectivity) -> None:
-            states.append(state)
-            self.wake()
-
-        before = None
-        self._channel.subscribe(note, try_to_connect=True)
-        try:
-            while True:
-                with self._news:
-                    self._news.wait_for(lambda: self._closed.is_set() or states)
-                if self._closed.is_set():
-                    return
-                state = states.popleft()
-                if (connected := state is grpc.ChannelConnectivity.READY) is not before:
-                    yield connected
-                before = connected
-                if state is grpc.ChannelConnectivity.IDLE:  # the connection is lost, and nothing has asked for another
-                    self._channel.unsubscribe(note)
-                    self._channel.subscribe(note, try_to_connect=True)
-        finally:
-            self._channel.unsubscribe(note)
 
     def pause(self, seconds: float, ended: Callable[[], bool]) -> None:
         """Wait before a new attempt, while the connection is open and `ended` returns False."""
