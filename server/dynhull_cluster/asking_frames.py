@@ -6,7 +6,7 @@ from google.rpc.status_pb2 import Status
 
 from dynhull_server.rpc.status import DrainingError, RelayedError, error_status
 
-from .frames import VERSION, Frames, Kind, pack_request
+from .frames import ANSWERS_PINGS, VERSION, Frames, Kind, pack_request
 from .upstream import lost_status
 
 NUMBERS = 2**32
@@ -28,6 +28,8 @@ class AskingFrames(Frames):
         self.writable = asyncio.Event()
         self.writable.set()
         self._leaving = False
+        self._heard = True
+        self._answers_pings = False
         self._last = 0
         self._waiting: dict[int, asyncio.Future[bytes]] = {}
 
@@ -41,9 +43,23 @@ class AskingFrames(Frames):
         answer = self._waiting[VERSION] = self._loop.create_future()
         self.send(VERSION, Kind.GREETING, greeting)
         try:
-            await answer
+            self._answers_pings = await answer == ANSWERS_PINGS
         finally:
             del self._waiting[VERSION]
+
+    def ping(self, seconds: float) -> None:
+        """Ask the worker now and every so many seconds whether it is there; if it is not, the connection is lost."""
+        if not self._heard:
+            self.abort()
+        elif self._transport is not None and self._answers_pings:
+            self._heard = False
+            self.send(0, Kind.PING)
+            self._loop.call_later(seconds, self.ping, seconds)
+
+    def data_received(self, data: bytes) -> None:
+        """Whatever arrives shows that the worker is there."""
+        self._heard = True
+        super().data_received(data)
 
     async def ask(self, method: str, caller: bytes, message: bytes) -> bytes:
         """The answer to a request. Raises RelayedError if it is refused or not taken, or the connection is lost."""
@@ -77,6 +93,8 @@ class AskingFrames(Frames):
         if kind is Kind.GOODBYE:
             self._stop_asking()
             self._refuse_after(number)
+            return
+        if kind is Kind.PONG:
             return
         answer = self._waiting.get(number)
         if answer is None or answer.done():

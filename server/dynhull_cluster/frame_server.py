@@ -23,7 +23,7 @@ from dynhull_server.rpc.methods import RunHandler
 from dynhull_server.rpc.runs import Run, run_of_requests
 
 from .callers import KEY, OWNER
-from .frames import VERSION, Frames, Kind, unpack_request
+from .frames import ANSWERS_PINGS, VERSION, Frames, Kind, unpack_request
 
 DETAILS = "grpc-status-details-bin"
 # Seconds that the others get to receive their last answers and to close their connections.
@@ -163,11 +163,13 @@ class _Connection(Frames):
                 return
             self._greeting = b""
             self._version = number
-            self.send(number, Kind.ANSWER)
+            self.send(number, Kind.ANSWER, ANSWERS_PINGS)
         elif kind is Kind.REQUEST:
             if not self.leaving:
                 self._last = number
                 self._arrived.append(_Request(number, *unpack_request(rest)))
+        elif kind is Kind.PING:
+            self.send(number, Kind.PONG)
         elif number in self._running:
             self._running[number].cancel()
         else:  # it has been answered, or has just arrived

@@ -16,6 +16,9 @@ the way.
 Servers of two versions understand each other, while one after the other is replaced. The number of a greeting is the
 version of its sender's frames, and a worker has that for the number of its answer. One that does not know this sends 0,
 gets no goodbye, and takes the end of the connection for that of the worker. Frames of an unknown kind are passed over.
+
+Between machines, who asks also pings, and takes a connection for lost on which nothing arrives until the next ping. The
+answer to a greeting says that a worker answers pings; one of an earlier version does not, and is not pinged.
 """
 
 import asyncio
@@ -30,6 +33,7 @@ LENGTHS = Struct("<HH")
 MOST_BYTES = 2**18
 # The version of the frames: of those with a goodbye.
 VERSION = 1
+ANSWERS_PINGS = b"pings"
 
 
 class Kind(IntEnum):
@@ -41,6 +45,8 @@ class Kind(IntEnum):
     REFUSAL = 3
     GREETING = 4
     GOODBYE = 5
+    PING = 6
+    PONG = 7
 
 
 KINDS = {each.value: each for each in Kind}

@@ -61,6 +61,12 @@ class Settings(BaseModel):
         gt=0,
         description="Seconds by which the clock of this machine may differ from that of the database of the cluster.",
     )
+    peer_ping_interval: float = Field(
+        10.0,
+        gt=0,
+        description="Seconds between questions of a server of a cluster to another whether it is still there; without "
+        "an answer for as long, it connects anew.",
+    )
     cluster_ca: Path | None = Field(
         None,
         description="PEM file: servers of the cluster connect with TLS, to workers whose --tls-cert is signed by this "
@@ -157,6 +163,8 @@ class Settings(BaseModel):
             raise ValueError("--gateways needs --workers or --cluster")
         if self.cluster and self.journal is None:
             raise ValueError("--cluster needs --journal: the servers share a database")
+        if self.cluster and self.peer_ping_interval < self.min_ping_interval:
+            raise ValueError("--peer-ping-interval must not be less than --min-ping-interval")
         if self.cluster_ca and not self.tls_cert:
             raise ValueError("--cluster-ca needs --tls-cert and --tls-key")
         if self.cluster_host.strip("[]") in EVERY_ADDRESS:

@@ -18,13 +18,16 @@ class Greeted(Frames):
     async def greet(self, greeting: bytes) -> None:
         assert greeting == b"3/north-1/0/secret"
 
+    def ping(self, seconds: float) -> None:
+        assert seconds == 10.0
+
 
 def owned(port: int) -> Tables:
     return Tables({PARTITION: Owner(1, "north-1/0", "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {})
 
 
 async def reach(port: int) -> None:
-    ways = Addresses("secret", None)
+    ways = Addresses("secret", None, 10.0)
     with pytest.raises(OSError, match="nobody serves partition 3"):
         await ways.connect(PARTITION, Greeted)
     ways.learn(owned(port))

@@ -15,7 +15,16 @@ from patience import PATIENCE
 from dynhull_cluster import worker_link
 from dynhull_cluster.divisions.peers import PeerAwayError, Peers, peer_handler
 from dynhull_cluster.frame_server import FrameServer
-from dynhull_cluster.frames import HEADER, MOST_BYTES, VERSION, Frames, Kind, pack_request, unpack_request
+from dynhull_cluster.frames import (
+    ANSWERS_PINGS,
+    HEADER,
+    MOST_BYTES,
+    VERSION,
+    Frames,
+    Kind,
+    pack_request,
+    unpack_request,
+)
 from dynhull_cluster.sockets import Sockets
 from dynhull_cluster.worker_link import WorkerLink
 from dynhull_server.rpc.status import WorkerAwayError
@@ -209,7 +218,7 @@ class Letters:
         await self.server.listen_on(bound, None)
         asker = Asker(*await asyncio.open_connection("127.0.0.1", port))
         asker.send(version, Kind.GREETING, b"secret")
-        assert await asker.read() == (version, Kind.ANSWER, b"")
+        assert await asker.read() == (version, Kind.ANSWER, ANSWERS_PINGS)
         asker.send(7, UNKNOWN_KIND, b"of a later version")
         asker.ask(1, b"first")
         assert await self.taken.get() == b"first"

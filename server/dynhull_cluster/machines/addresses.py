@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import socket
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import words
 
 from ..callers import PROOF, Metadata
-from ..ways import OPTIONS, PATIENCE, F
+from ..ways import OPTIONS, PATIENCE, F, keep_alive, pings
 from .board import Owner, Tables
 from .entrance import proof_of
 
@@ -25,20 +24,6 @@ CONNECT_SECONDS = 2.0
 NOTE_SECONDS = 8.0
 
 log = logging.getLogger(__name__)
-
-SOCKET_OPTIONS = [
-    (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
-    *(
-        (socket.IPPROTO_TCP, getattr(socket, name), value)
-        for name, value in {
-            "TCP_KEEPIDLE": 5,
-            "TCP_KEEPINTVL": 2,
-            "TCP_KEEPCNT": 3,
-            "TCP_USER_TIMEOUT": 10_000,
-        }.items()
-        if hasattr(socket, name)
-    ),
-]
 
 
 @dataclass(slots=True)
@@ -62,6 +47,8 @@ class _Place(NamedTuple):
 class _Greets(Protocol):
     async def greet(self, greeting: bytes) -> None: ...
 
+    def ping(self, seconds: float) -> None: ...
+
 
 class Addresses:
     """The ways to all partitions.
@@ -69,12 +56,15 @@ class Addresses:
     Args:
         secret: what processes of the cluster know each other by.
         ca: the certificate that has signed those of the workers; None where they have none.
+        ping_interval: seconds between questions whether an owner is still there.
     """
 
     takeover = PATIENCE
 
-    def __init__(self, secret: str, ca: Path | None) -> None:
+    def __init__(self, secret: str, ca: Path | None, ping_interval: float) -> None:
         self._secret = secret
+        self._ping_interval = ping_interval
+        self._options = [*OPTIONS, *pings(ping_interval)]
         self._tls = None if ca is None else peer_context(ca)
         self._credentials = None if ca is None else grpc.ssl_channel_credentials(ca.read_bytes())
         self._known: dict[int, _Place] = {}
@@ -112,7 +102,7 @@ class Addresses:
             transport, frames = await asyncio.get_running_loop().create_connection(
                 make, place.host, place.frames_port, ssl=self._tls, server_hostname=name
             )
-            _keep_alive(transport.get_extra_info("socket"))
+            keep_alive(transport.get_extra_info("socket"))
             try:
                 await cast("_Greets", frames).greet(proof_of(worker, place.worker, self._secret).encode())
             except BaseException as error:
@@ -123,6 +113,7 @@ class Addresses:
         if self._at(worker) != place:
             transport.abort()
             raise OSError(f"partition {worker} has moved meanwhile")
+        cast("_Greets", frames).ping(self._ping_interval)
         return frames
 
     def _note_failure(self, partition: int, error: OSError) -> None:
@@ -141,8 +132,8 @@ class Addresses:
         place = self._at(worker)
         address = f"{bracketed(place.host)}:{place.port}"
         if self._credentials is None:
-            return grpc.aio.insecure_channel(address, options=OPTIONS)
-        return grpc.aio.secure_channel(address, self._credentials, options=OPTIONS)
+            return grpc.aio.insecure_channel(address, options=self._options)
+        return grpc.aio.secure_channel(address, self._credentials, options=self._options)
 
     def proof(self, worker: int) -> Metadata:
         """What proves to the owner of a partition that this is a gateway."""
@@ -165,12 +156,6 @@ def _place_of(owner: Owner) -> _Place | None:
         return None
     host, port, frames_port = owner.address.rsplit(" ", 2)
     return _Place(owner.epoch, owner.worker, host, int(port), int(frames_port))
-
-
-def _keep_alive(connected: socket.socket) -> None:
-    """Notice a machine that does not answer any more within some seconds."""
-    for level, option, value in SOCKET_OPTIONS:
-        connected.setsockopt(level, option, value)
 
 
 def bracketed(host: str) -> str:

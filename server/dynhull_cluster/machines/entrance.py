@@ -19,6 +19,7 @@ from dynhull_server.settings import Settings
 
 from ..callers import PROOF, authenticator
 from ..frame_server import FrameContext, FrameServer
+from ..ways import keep_alive
 
 
 def proof_of(partition: int, worker: str, secret: str) -> str:
@@ -113,6 +114,7 @@ class PartitionEntrance:
         family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
         bound = socket.socket(family, kind, protocol)
         bound.bind(address)
+        keep_alive(bound)  # connections inherit it
         self._frames = FrameServer((self._letters, *handlers), runs, self._proof.encode())
         await self._frames.listen_on(bound, tls)
         self.address = f"{host} {port} {bound.getsockname()[1]}"

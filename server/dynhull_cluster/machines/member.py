@@ -79,7 +79,7 @@ class Member:
         self._board = Board(self._database, self._decide, worker, settings.cluster_host)
         self._supervisor = Supervisor(Clock(), self._turn_health, end_process)
         self._cluster = Cluster(0, "")
-        self._addresses = Addresses("", None)
+        self._addresses = Addresses("", None, settings.peer_ping_interval)
         self._peers = Peers(self._addresses)
         self._served: dict[int, Server] = {}
         self._busy: dict[int, asyncio.Task[None]] = {}
@@ -103,7 +103,7 @@ class Member:
         await asyncio.to_thread(
             admit, self._database, self._worker, settings.cluster_host, settings.max_clock_difference
         )
-        self._addresses = Addresses(self._cluster.secret, self._settings.cluster_ca)
+        self._addresses = Addresses(self._cluster.secret, settings.cluster_ca, settings.peer_ping_interval)
         self._peers = Peers(self._addresses)
         self._supervisor.every(0.0, "board", self._board.run)
         await self._looked.wait()

@@ -18,7 +18,7 @@ class ClusterGateway(Gateway):
     """
 
     def __init__(self, settings: Settings, database: Database, cluster: Cluster) -> None:
-        addresses = Addresses(cluster.secret, settings.cluster_ca)
+        addresses = Addresses(cluster.secret, settings.cluster_ca, settings.peer_ping_interval)
         self._board = Board(database, addresses.learn)
         super().__init__(settings, cluster.partitions, addresses)
 
