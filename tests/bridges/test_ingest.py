@@ -5,6 +5,7 @@ import json
 import random
 import signal
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 from patience import PATIENCE, wait_until
 from ports import free_port
+from proxy import proxy
 from server_process import server_process
 
 from dynhull_bridges.ingest import jetstream
@@ -388,6 +390,36 @@ def send(port: int, moves: Sequence[tuple[str, Sequence[float]]]) -> None:
     assert sent.is_published()
     publisher.disconnect()
     publisher.loop_stop()
+
+
+@pytest.mark.parametrize("scheme", ["mqtt", "nats"])
+def test_a_network_to_the_broker_that_swallows_bytes(
+    client: HullClient, address: str, name: str, tmp_path: Path, nats_port: int, scheme: str
+) -> None:
+    port = free_port() if scheme == "mqtt" else nats_port
+    with ExitStack() as stack:
+        if scheme == "mqtt":
+            stack.enter_context(broker(mosquitto(tmp_path, port), port))
+
+        def report(place: list[int]) -> None:
+            if scheme == "mqtt":
+                send(port, [("a", place)])
+            else:
+                publish(port, name, [("a", place)])
+
+        report([0, 0])
+        way = stack.enter_context(proxy(f"127.0.0.1:{port}"))
+        url = f"{scheme}://{way.address}/{name if scheme == 'nats' else 'fleet/+/position'}"
+        options = (url, "--hull", name, "--key", "k", "--x", "$[0]", "--y", "$[1]", "--ping-interval", "1s")
+        client.create_hull(name, keyed="str")
+        ingest = stack.enter_context(ingest_process(address, *options))
+        ingest.wait_for("reading")
+        report([1, 1])
+        wait_until(lambda: client.get_hull(name).vertices.tolist() == [[1, 1]])
+        way.silence()
+        report([2, 2])
+        wait_until(lambda: client.get_hull(name).vertices.tolist() == [[2, 2]])
+        assert ingest.said("no messages from the broker, trying again")
 
 
 @pytest.mark.parametrize("scheme", ["mqtt", "nats", "kafka"])

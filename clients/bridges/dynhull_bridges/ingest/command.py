@@ -156,7 +156,7 @@ def ingest(
         )
 
     async def serve() -> bool:
-        find = feeds_of(source, hull, producer, mapping, to_end=to_end)
+        find = feeds_of(source, hull, producer, mapping, to_end=to_end, ping_interval=connect.ping_interval)
         async with connect(AsyncHullClient) as client:
             return await run(
                 client,

@@ -10,6 +10,7 @@ from ..refusals.table import Meaning
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._/-]")
 LONGEST_PRODUCER = 200
+PING_INTERVAL = 10.0  # seconds between questions whether the broker is still there
 
 
 class FeedError(Exception):

@@ -26,8 +26,12 @@ class IngestError(Exception):
     """The ingest cannot go on; the message says why."""
 
 
-def feeds_of(url: str, hull: str, producer: str | None, mapping: Mapping, *, to_end: bool) -> Find:
+def feeds_of(
+    url: str, hull: str, producer: str | None, mapping: Mapping, *, to_end: bool, ping_interval: float
+) -> Find:
     """Finds the feeds that a URL stands for; it raises FeedError if the broker, which has to be asked, does not answer.
+
+    `ping_interval` is the number of seconds between questions whether the broker is still there.
 
     Raises:
         ValueError: there are none, or an option does not suit them.
@@ -47,15 +51,15 @@ def feeds_of(url: str, hull: str, producer: str | None, mapping: Mapping, *, to_
                 raise ValueError("--producer is for NATS and Kafka, which number their messages")
             if to_end:
                 raise ValueError("--to-end is for NATS and Kafka: a subscription of MQTT has no end")
-            return _known([Mqtt(url, hull)])
+            return _known([Mqtt(url, hull, ping_interval)])
         case "nats" | "tls":
             from .jetstream import JetStream
 
-            return _known([JetStream(url, producer, mapping.digest)])
+            return _known([JetStream(url, producer, mapping.digest, ping_interval)])
         case "kafka":
             from .kafka import Topic
 
-            return Topic(url, producer, mapping.digest).partitions
+            return Topic(url, producer, mapping.digest, ping_interval).partitions
         case scheme:
             raise ValueError(
                 f"the URL begins with {f'{scheme}:' if scheme else 'no scheme'}; there are mqtt(s)://HOST/FILTER, "

@@ -22,7 +22,7 @@ from ..nats_connection import closed, connected
 from ..refusals.nats import NATS, code_of
 from ..refusals.table import Meaning
 from ..urls import check_subject, options_of, without_secrets
-from .feed import Beginning, FeedError, Message, feed_error, producer_name, refusal
+from .feed import PING_INTERVAL, Beginning, FeedError, Message, feed_error, producer_name, refusal
 from .identity import adopted, made_again
 from .topics import captures_of
 
@@ -35,8 +35,6 @@ TIMEOUT = 10.0  # seconds for an answer
 PULLED = 8192  # messages asked for at a time
 MOST = 4096  # messages of one read
 WAIT = 1.0  # seconds that a read waits for messages
-EXPIRES = 5.0  # seconds after which the server ends a request, and says so
-SILENCE = 15.0  # seconds without a word, after which the connection is lost
 NO_MESSAGES, REQUEST_EXPIRED = "404", "408"
 NOT_IN_STREAM, NO_STREAM = 10093, 10059  # codes of errors
 # The reply subject of a message: $JS.ACK.STREAM.CONSUMER.attempts.sequence.delivered.time.pending
@@ -50,9 +48,12 @@ class JetStream:
         url: the URL.
         producer: the name under which hulls count the numbers of messages; None for one of stream and subject.
         mapping: the digest of the mapping. Each has its own place in the stream.
+        ping_interval: seconds. The server ends a request after half of it, and says so; the connection is lost when it
+            has said nothing for half as long again.
     """
 
-    def __init__(self, url: str, producer: str | None, mapping: str) -> None:
+    def __init__(self, url: str, producer: str | None, mapping: str, ping_interval: float = PING_INTERVAL) -> None:
+        self._expires, self._silence = 0.5 * ping_interval, 1.5 * ping_interval
         parts = urlsplit(url, allow_fragments=False)
         stream, _, subject = unquote(parts.path).strip("/").partition("/")
         if not parts.hostname or not stream:
@@ -161,8 +162,8 @@ class JetStream:
             self._take(self._arrived.popleft(), messages)
         if self._client is None or self._client.is_closed:
             raise FeedError("NATS: the connection is lost")
-        if monotonic() - self._heard > SILENCE:
-            raise FeedError(f"NATS: the server has said nothing for {SILENCE:.0f} s")
+        if monotonic() - self._heard > self._silence:
+            raise FeedError(f"NATS: the server has said nothing for {self._silence:g} s")
         if self._asked <= PULLED // 2:
             await self._ask()
         if messages:
@@ -202,7 +203,7 @@ class JetStream:
     async def _ask(self) -> None:
         """Ask for more messages, so that some are always under way."""
         assert self._client is not None
-        request = {"batch": PULLED, "expires": int(EXPIRES * 1e9)}
+        request = {"batch": PULLED, "expires": int(self._expires * 1e9)}
         try:
             await self._client.publish(self._pull, json.dumps(request).encode(), reply=self._inbox)
         except (Error, OSError) as error:

@@ -10,7 +10,7 @@ from aiokafka.errors import KafkaConnectionError, KafkaError, UnknownTopicOrPart
 
 from ..refusals.kafka import KAFKA
 from ..urls import options_of, without_secrets
-from .feed import Beginning, FeedError, Message, feed_error, producer_name, refusal
+from .feed import PING_INTERVAL, Beginning, FeedError, Message, feed_error, producer_name, refusal
 from .identity import made_again
 from .topic_id import topic_id
 
@@ -29,9 +29,19 @@ class Kafka:
         partition: the number of the partition.
         producer: the name under which hulls count the offsets; None for one of topic and partition.
         group: the group that keeps the offset.
+        ping_interval: seconds; a request, of which one is always under way, may take twice as long.
     """
 
-    def __init__(self, servers: str, topic: str, partition: int, producer: str | None, group: str) -> None:
+    def __init__(
+        self,
+        servers: str,
+        topic: str,
+        partition: int,
+        producer: str | None,
+        group: str,
+        ping_interval: float = PING_INTERVAL,
+    ) -> None:
+        self._timeout = round(2000 * ping_interval)  # milliseconds
         self.name = f"kafka/{topic}/{partition}"
         self.producer: str | None = producer or producer_name("kafka", topic, str(partition))
         self._group = group
@@ -51,6 +61,7 @@ class Kafka:
             enable_auto_commit=False,
             auto_offset_reset="none",
             isolation_level="read_committed",
+            request_timeout_ms=self._timeout,
         )
         self._consumer = consumer
         partition = self._partition
@@ -135,12 +146,14 @@ class Topic:
         url: the URL; without partitions it is about all of them.
         producer: the name under which hulls count the offsets, followed by the partition; None for one of the topic.
         mapping: the digest of the mapping. Each has its own place in the topic.
+        ping_interval: as for `Kafka`.
 
     Raises:
         ValueError: the URL names no topic, or a partition that is no number.
     """
 
-    def __init__(self, url: str, producer: str | None, mapping: str) -> None:
+    def __init__(self, url: str, producer: str | None, mapping: str, ping_interval: float = PING_INTERVAL) -> None:
+        self._ping_interval = ping_interval
         parts = urlsplit(url)
         self._servers = parts.netloc
         self._name = unquote(parts.path).strip("/")
@@ -183,7 +196,7 @@ class Topic:
 
     def _partition(self, number: int) -> Kafka:
         producer = f"{self._producer}/{number}" if self._producer else None
-        return Kafka(self._servers, self._name, number, producer, self._group)
+        return Kafka(self._servers, self._name, number, producer, self._group, self._ping_interval)
 
 
 def _failure(error: KafkaError | OSError) -> Exception:

@@ -19,7 +19,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 from ..refusals.mqtt import MQTT
 from ..refusals.table import Meaning
 from ..urls import options_of, without_secrets
-from .feed import Beginning, FeedError, Message, feed_error, refusal
+from .feed import PING_INTERVAL, Beginning, FeedError, Message, feed_error, refusal
 from .topics import captures_of
 
 PORT, TLS_PORT = 1883, 8883
@@ -42,7 +42,8 @@ class Mqtt:
     keeps the session of the client id while nobody is connected.
     """
 
-    def __init__(self, url: str, hull: str) -> None:
+    def __init__(self, url: str, hull: str, ping_interval: float = PING_INTERVAL) -> None:
+        self._keepalive = max(1, round(ping_interval))  # MQTT counts seconds
         parts = urlsplit(url, allow_fragments=False)
         # A filter may have +, # and $, which need no escapes here.
         query = options_of(url, ("version", "client_id"))
@@ -99,7 +100,7 @@ class Mqtt:
             properties.ReceiveMaximum = 65_535
             options = {"clean_start": False, "properties": properties}
         try:
-            await asyncio.to_thread(self._client.connect, self._host, self._port, **options)
+            await asyncio.to_thread(self._client.connect, self._host, self._port, self._keepalive, **options)
             self._client.loop_start()
             async with asyncio.timeout(TIMEOUT):
                 await self._ready
