@@ -15,6 +15,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from ._address import is_local, proxy_of, target
 from ._calls import Call, require_not_negative
 from ._errors import DynhullError, error_of
+from ._home import Home, require_grpc
 from ._retry import Attempts
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
@@ -44,7 +45,6 @@ class Connection:
 
     Attributes:
         address: host:port.
-        stub: the methods of both services, whose names differ.
         retries: how often a call that reached no server is repeated.
     """
 
@@ -63,10 +63,10 @@ class Connection:
         ping_interval: float,
     ) -> None:
         require_not_negative(timeout=timeout, retries=retries)
-        options = [*OPTIONS, *_pings(ping_interval)]
+        self._options = [*OPTIONS, *_pings(ping_interval)]
         self.address, encrypted = target(address)
         if is_local(self.address):
-            options.append(("grpc.enable_http_proxy", 0))
+            self._options.append(("grpc.enable_http_proxy", 0))
         self._proxy = proxy_of(self.address)
         if tls is None and encrypted:
             tls = grpc.ssl_channel_credentials()
@@ -81,16 +81,17 @@ class Connection:
             ping_interval=ping_interval,
         )
         self._timeout = timeout
+        self._tls = tls
         self.retries = retries
         self._wait_for_ready = wait_for_ready
         self._closed = self._event()  # shared with those of other tokens
         self._metadata = _authorization(token)
-        if tls is None:
-            self._channel = self._grpc.insecure_channel(self.address, options)
-        else:
-            self._channel = self._grpc.secure_channel(self.address, tls, options)
-        stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel)
-        self.stub = SimpleNamespace(**{name: method for stub in stubs for name, method in vars(stub).items()})
+        self._open()
+
+    @property
+    def stub(self) -> SimpleNamespace:
+        """The methods of both services, whose names differ."""
+        return self._stub
 
     def with_token(self, token: str | None) -> Self:
         """The same connection for a caller with another token; None for none."""
@@ -113,6 +114,15 @@ class Connection:
     def error_of(self, call: grpc.Call | grpc.RpcError) -> DynhullError:
         """The error that a finished call ended with."""
         return error_of(call, self._proxy)
+
+    def _open(self) -> None:
+        require_grpc()
+        if self._tls is None:
+            self._channel = self._grpc.insecure_channel(self.address, self._options)
+        else:
+            self._channel = self._grpc.secure_channel(self.address, self._tls, self._options)
+        stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel)
+        self._stub = SimpleNamespace(**{name: method for stub in stubs for name, method in vars(stub).items()})
 
     def _attempts(self, call: Call[Any]) -> Attempts:
         return Attempts(call, self._timeout if call.timeout is None else call.timeout, self.retries)
@@ -148,7 +158,7 @@ def client_is_closed() -> DynhullError:
 
 
 class BlockingConnection(Connection):
-    """A connection whose calls block the thread. Threads may share it."""
+    """A connection whose calls block the thread. Threads may share it. In a forked process it is opened anew."""
 
     _grpc: ClassVar[Any] = grpc
     _event = Event
@@ -156,6 +166,17 @@ class BlockingConnection(Connection):
     def __init__(self, address: str, **options: Any) -> None:
         super().__init__(address, **options)
         self._news = Condition()
+        self._home = Home("client")
+
+    @property
+    def stub(self) -> SimpleNamespace:
+        """The methods of both services, on the channel of this process."""
+        if self._home.left():
+            self._inherited = self._channel  # to close it would wait for threads that are not here
+            self._news = Condition()
+            self._open()
+            self._home = Home("client")
+        return self._stub
 
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
         """Begin a call; an error of ours, too, if another thread closes the connection meanwhile."""
@@ -207,5 +228,7 @@ class BlockingConnection(Connection):
     def close(self) -> None:
         """End the connection and the calls on it."""
         self._closed.set()
+        if self._home.left():
+            return
         self.wake()
         self._channel.close()

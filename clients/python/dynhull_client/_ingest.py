@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import grpc
 
+from ._home import Home
 from ._messages import Ingested, decode_ingested
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ class Ingest:
     def __init__(self, connection: BlockingConnection, ingesting: Ingesting) -> None:
         self.summary: Ingested | None = None
         self._connection = connection
+        self._home = Home("ingest")
         self._ingesting = ingesting
         self._queue = deque([ingesting.first()])
         self._turn = threading.Condition()
@@ -49,9 +51,11 @@ class Ingest:
     def __enter__(self) -> Self:
         if self._call is not None:
             raise RuntimeError("an Ingest can be used once: open a new one")
+        self._home.require()
         self._call = self._connection.begin(
             self._connection.stub.Ingest.future, self._requests(), self._ingesting.timeout
         )
+        self._home.begin()
         self._call.add_done_callback(lambda _: self._close())
         return self
 
@@ -61,8 +65,10 @@ class Ingest:
         if self._call is None:
             raise RuntimeError("this Ingest was not entered: use it in a with statement")
         if error is not None:
-            self._call.cancel()
+            if not self._home.left():
+                self._call.cancel()
             return
+        self._home.require()
         self._close()
         self.summary = decode_ingested(self._result())
 
@@ -82,8 +88,9 @@ class Ingest:
         Raises:
             ValueError, TypeError: an argument has a bad value; nothing was sent.
             DynhullError: the server refused an earlier batch.
-            RuntimeError: the context was not entered, or was left.
+            RuntimeError: the context was not entered, or was left; or this process was forked in it.
         """
+        self._home.require()
         request = self._ingesting.batch(
             insert=insert, delete=delete, move=move, keys=keys, points=points, times=times, remove=remove
         )
@@ -116,6 +123,7 @@ class Ingest:
         with self._turn:
             self._closed = True
             self._turn.notify_all()
+        self._home.end()
 
     def _result(self) -> Any:
         try:

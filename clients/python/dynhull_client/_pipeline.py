@@ -11,6 +11,7 @@ from . import _calls as calls
 from . import _layers as peeling
 from . import _uses as uses
 from ._errors import DynhullError
+from ._home import Home
 from ._methods import answer_of, described, documented
 from ._outcomes import Outcome, settle
 from ._questions import Questions
@@ -51,11 +52,13 @@ class Pipeline:
 
     A context manager for one use: leaving it waits for all answers; leaving it with an exception cancels the reads that
     are not answered. After a lost connection, the reads that are not answered are sent again, as often as the client
-    repeats calls; so are a read whose hull is away for the moment, and those after it. Threads may share a pipeline.
+    repeats calls; so are a read whose hull is away for the moment, and those after it. Threads may share a pipeline. A
+    process that is forked later cannot use it: its methods raise RuntimeError there.
     """
 
     def __init__(self, connection: BlockingConnection, piping: Piping) -> None:
         self._connection = connection
+        self._home = Home("pipeline")
         self._questions: Questions[Future[Any]] = Questions(piping, connection.retries, Outcome)
         self._turn = threading.Condition()
         self._connections = 0
@@ -83,6 +86,7 @@ class Pipeline:
 
     def flush(self) -> None:
         """Wait until every read so far is answered. Errors stay with the futures of their reads."""
+        self._home.require()
         with self._turn:
             added = self._questions.added
             self._turn.wait_for(lambda: self._questions.settled >= added or self._closed)
@@ -107,6 +111,7 @@ class Pipeline:
         return f"<Pipeline to {self._connection.address}>"
 
     def _add(self, call: Call[Answer]) -> Future[Answer]:
+        self._home.require()
         with self._turn:
             if self._questions.full:
                 self._turn.wait_for(lambda: self._closed or not self._questions.full)
@@ -116,11 +121,14 @@ class Pipeline:
             if self._thread is None:
                 name = f"pipeline to {self._connection.address}"
                 self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+                self._home.begin()
                 self._thread.start()
             self._turn.notify_all()
         return outcome
 
     def _end(self) -> None:
+        if self._home.left():
+            return
         with self._turn:
             self._closed = True
             left = self._questions.give_up(DynhullError(CLOSED, grpc.StatusCode.CANCELLED, "", {}))
@@ -132,6 +140,7 @@ class Pipeline:
             outcome.cancel()
         if self._thread is not None:
             self._thread.join()
+        self._home.end()
 
     def _run(self) -> None:
         """One connection after another, each begun when there is something to ask."""

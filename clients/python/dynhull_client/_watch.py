@@ -14,6 +14,7 @@ from ._errors import DynhullError
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
+from ._home import Home
 from ._hull_place import HullPlace
 from ._messages import Event
 from ._place import Happening, Place
@@ -25,6 +26,7 @@ class Follower(Iterator[Happening]):
     def __init__(self, connection: BlockingConnection, place: Place[Happening]) -> None:
         self._connection = connection
         self._place = place
+        self._home = Home("watch")
         self._closed = threading.Event()
         self._arrived: deque[Happening] = deque()
         self._call: Any = None
@@ -39,6 +41,7 @@ class Follower(Iterator[Happening]):
         return self._place.lost
 
     def __next__(self) -> Happening:
+        self._home.require()
         while not self._arrived:
             if self._place.ended:
                 raise StopIteration
@@ -51,16 +54,20 @@ class Follower(Iterator[Happening]):
                 if self._closed.is_set():
                     raise StopIteration from None
                 self._call = None
+                self._home.end()
                 self._arrived.extend(self._place.end(self._connection.error_of(failure)))
         return self._arrived.popleft()
 
     def close(self) -> None:
-        """End the watch."""
+        """End the watch. In a process that was forked later it does nothing."""
+        if self._home.left():
+            return
         self._closed.set()
         self._connection.wake()
         call = self._call
         if call is not None:
             call.cancel()
+        self._home.end()
 
     def __enter__(self) -> Self:
         return self
@@ -75,6 +82,7 @@ class Follower(Iterator[Happening]):
 
     def _begin(self) -> None:
         method = getattr(self._connection.stub, self._place.method)
+        self._home.begin()
         self._call = self._connection.begin(method, self._place.request, self._place.timeout())
         if self._closed.is_set():
             self._call.cancel()

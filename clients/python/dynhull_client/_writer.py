@@ -12,6 +12,7 @@ import grpc
 from ._calls import Known, Writing, known
 from ._errors import DynhullError
 from ._gathering import put_parts, remove_parts
+from ._home import Home
 from ._outcomes import Outcome, settle
 from ._window import Window
 
@@ -40,12 +41,14 @@ class Writer:
     the producer's last batch.
 
     The futures of all points of a refused batch carry its error. The next `flush` or `close` also raises the first such
-    error. Threads may share a writer.
+    error. Threads may share a writer. A process that is forked later cannot use it: its methods raise
+    RuntimeError there.
     """
 
     def __init__(self, connection: BlockingConnection, writing: Writing) -> None:
         self._connection = connection
         self._writing = writing
+        self._home = Home("writer")
         self._opening = threading.Lock()
         self._turn = threading.Condition()
         self._connections = 0
@@ -104,7 +107,7 @@ class Writer:
         Raises:
             ValueError, TypeError: an argument has a bad value; nothing was added.
             DynhullError: the writer has ended: nothing after its error was applied.
-            RuntimeError: the writer is closed.
+            RuntimeError: the writer is closed, or belongs to the process that this one was forked from.
         """
         writing = self._writing
         coalesce = writing.coalesce == "last"
@@ -117,6 +120,7 @@ class Writer:
 
     def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
+        self._home.require()
         window = self._window
         if window is None:
             return
@@ -139,6 +143,7 @@ class Writer:
             self._end()
 
     def __enter__(self) -> Self:
+        self._home.require()
         self._open()
         return self
 
@@ -154,6 +159,7 @@ class Writer:
         return f"<Writer to {self._writing.name!r} as producer {self._writing.producer!r}>"
 
     def _add(self, parts: list[Part], sequence: int | None) -> Future[Applied]:
+        self._home.require()
         window = self._window
         if window is None or self._closed:
             window = self._open()
@@ -192,6 +198,7 @@ class Writer:
         self._window = Window(self._writing, begin, Outcome)
         name = f"writer to {self._writing.name}"
         self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
+        self._home.begin()
         self._thread.start()
 
     def _hold(self, call: Any) -> None:
@@ -202,6 +209,8 @@ class Writer:
                 call.cancel()
 
     def _end(self) -> None:
+        if self._home.left():
+            return
         with self._turn:
             self._closed = True
             left = [] if self._window is None else self._window.abandon()
@@ -213,6 +222,7 @@ class Writer:
             outcome.cancel()
         if self._thread is not None:
             self._thread.join()
+        self._home.end()
 
     def _run(self, window: Window[Future[Applied]]) -> None:
         """One connection after another, until the writer is closed or has failed."""
