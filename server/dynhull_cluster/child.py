@@ -5,6 +5,7 @@ import gc
 import os
 import socket
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from prometheus_client import generate_latest
@@ -14,6 +15,7 @@ from dynhull_server.failure import code_of, fail, text_of
 from dynhull_server.malloc import return_large_blocks
 from dynhull_server.process import allow_connections, share_processors, stop_signal
 from dynhull_server.settings import Settings
+from dynhull_server.starting import started
 from dynhull_server.storage.port import StorageError
 
 from .line import Line
@@ -40,16 +42,22 @@ async def _run(end: socket.socket) -> None:
     return_large_blocks()
     share_processors(settings)
     allow_connections(settings.max_connections)
-    server = await serving(settings, begin)
     with stop_signal() as stop:
-        listening = asyncio.create_task(_listen(line, server))
+        served: asyncio.Future[Serving] = asyncio.get_running_loop().create_future()
+        listening = asyncio.create_task(_listen(line, served))
         try:
-            await server.start()
-            gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
-            line.send({"serving": server.address})
-            await stop.wait()
+            make = partial(serving, settings, begin)
+            server = await started(make, lambda made: made.start(), stop, settings.start_patience)
+            if server is None:
+                return
+            served.set_result(server)
+            try:
+                gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
+                line.send({"serving": server.address})
+                await stop.wait()
+            finally:
+                await server.drain()
         finally:
-            await server.drain()
             listening.cancel()
     gc.unfreeze()
 
@@ -60,9 +68,9 @@ def _name_process(name: str) -> None:
         Path("/proc/self/comm").write_text(name, "utf-8")
 
 
-async def _listen(line: Line, server: Serving) -> None:
+async def _listen(line: Line, served: "asyncio.Future[Serving]") -> None:
     """Answer the supervisor, and end with it: all acknowledged batches are stored."""
     while (asked := await line.receive()) is not None:
-        page = await asyncio.to_thread(generate_latest, server.registry)
+        page = await asyncio.to_thread(generate_latest, (await served).registry)
         line.send({"metrics": asked["metrics"], "page": page.decode()})
     os._exit(os.EX_UNAVAILABLE)

@@ -20,6 +20,7 @@ from .malloc import return_large_blocks
 from .progress import progress_bar
 from .setting_sources import warn_of_service_links
 from .settings import Settings
+from .starting import started
 from .storage.port import Storage, StorageError
 
 log = logging.getLogger(__name__)
@@ -68,11 +69,15 @@ def allow_connections(most: int) -> None:
 async def _serve(
     settings: Settings, storage: Callable[[], Storage | None], divisions: Callable[[], Divisions | None]
 ) -> None:
+    async def make() -> Server:
+        return Server(settings, storage=storage(), divisions=divisions())
+
     with stop_signal() as stop:
-        server = Server(settings, storage=storage(), divisions=divisions())
+        with progress_bar("hulls read") as progress:
+            server = await started(make, lambda made: made.start(progress), stop, settings.start_patience)
+        if server is None:
+            return
         try:
-            with progress_bar("hulls read") as progress:
-                await server.start(progress)
             gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
             print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # output of the command
             if server.metrics_url:

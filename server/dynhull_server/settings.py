@@ -25,6 +25,12 @@ class Settings(BaseModel):
         None,
         description="Address of a PostgreSQL database for the data, in place of a folder: postgresql://user@host/database.",
     )
+    start_patience: float = Field(
+        30.0,
+        ge=0,
+        description="Seconds at the start for which a database or a disk is tried that does not answer, or fails. One "
+        "that is starting, full, locked or has too many connections is waited for as long as it takes.",
+    )
     in_memory: bool = Field(False, description="Store nothing: all hulls are lost when the server stops.")
     durability: Durability = Field(
         Durability.SYNC,

@@ -174,7 +174,8 @@ REFUSED = {
 
 @pytest.mark.parametrize(("address", "words"), REFUSED.values(), ids=REFUSED)
 def test_what_cannot_be_served_is_said_in_a_line(guarded: str, address: str, words: str) -> None:
-    refused = run("serve", "--port", "0", "--journal", address.format(url=guarded), *QUIET)
+    journal = ("--journal", address.format(url=guarded))
+    refused = run("serve", "--port", "0", *journal, "--start-patience", "0", "--scrub-cpu", "0")
     assert refused.returncode == 2
     (line,) = refused.stderr.splitlines()
     assert line.startswith("error: cannot serve: ")

@@ -58,7 +58,25 @@ class PostgreSQL:
 
     def start(self) -> None:
         """Start it, and wait until it answers."""
-        options = [each for setting in self._settings for each in ("-c", setting)]
+        self._launch(*self._settings)
+        wait_until(self._answers)
+
+    @contextmanager
+    def recovering(self) -> Iterator[None]:
+        """Start it after a kill, with a recovery that lasts until the end of the block."""
+        signal_file, go_on = self._data / "recovery.signal", self._home / "go-on"
+        go_on.unlink(missing_ok=True)
+        signal_file.touch()
+        signal_file.chmod(0o666)
+        waiting = f"until test -e {go_on} || ! test -e {self._data}; do sleep 0.05; done; false"
+        self._launch(*self._settings, f"restore_command={waiting}")
+        try:
+            yield
+        finally:
+            go_on.touch()
+
+    def _launch(self, *settings: str) -> None:
+        options = [each for setting in settings for each in ("-c", setting)]
         with (self._home / "log").open("ab") as log:
             self.process = subprocess.Popen(
                 self._command("postgres", "-D", self._data, "-k", self._home, "-h", "", *options),
@@ -66,7 +84,6 @@ class PostgreSQL:
                 stderr=log,
                 cwd=self._home,
             )
-        wait_until(self._answers)
 
     def _answers(self) -> bool:
         assert self.process.poll() is None, (self._home / "log").read_text()

@@ -11,6 +11,8 @@ from psycopg.conninfo import conninfo_to_dict, make_conninfo
 from dynhull_server.storage.port import FormatError, StorageError
 from dynhull_server.storage.rows.tables import UnreadableError
 
+from .refusals import meaning_of
+
 Connection = psycopg.Connection[tuple[Any, ...]]
 
 SCHEMA = "dynhull"
@@ -83,7 +85,7 @@ class Database:
         try:
             connection = psycopg.connect(self._address, autocommit=True, application_name=name, client_encoding="utf8")
         except psycopg.Error as error:
-            raise StorageError(f"cannot connect to {self}: {_words(error)}", for_callers=FOR_CALLERS) from error
+            raise self._refused(error) from error
         try:
             if connection.info.server_version < OLDEST_VERSION * 10_000:
                 version = connection.info.parameter_status("server_version")
@@ -100,6 +102,10 @@ class Database:
             raise
         return connection
 
+    def _refused(self, error: psycopg.Error) -> StorageError:
+        message = f"cannot connect to {self}: {_words(error)}"
+        return StorageError(message, for_callers=FOR_CALLERS, meaning=meaning_of(error))
+
     def _require_own_session(self, connection: Connection) -> None:
         """Refuse a pooler, which gives the connection a process of PostgreSQL for a while, with settings of its own."""
         with as_storage_errors():
@@ -114,7 +120,7 @@ class Database:
                 self._address, autocommit=True, application_name=name, client_encoding="utf8"
             )
         except psycopg.Error as error:
-            raise StorageError(f"cannot connect to {self}: {_words(error)}", for_callers=FOR_CALLERS) from error
+            raise self._refused(error) from error
         try:
             with as_storage_errors():
                 for statement in _newer_settings(connection):
@@ -138,7 +144,7 @@ def as_storage_errors() -> Iterator[None]:
 
 def storage_error(error: psycopg.Error) -> StorageError:
     """An error of PostgreSQL as one of the storage."""
-    return StorageError(f"PostgreSQL: {_words(error)}", for_callers=FOR_CALLERS)
+    return StorageError(f"PostgreSQL: {_words(error)}", for_callers=FOR_CALLERS, meaning=meaning_of(error))
 
 
 def _newer_settings(connection: psycopg.BaseConnection[Any]) -> Iterator[LiteralString]:

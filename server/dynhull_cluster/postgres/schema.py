@@ -12,6 +12,7 @@ from psycopg.errors import InsufficientPrivilege, LockNotAvailable
 from psycopg.sql import Identifier
 
 from dynhull_server.storage.port import FormatError, LockedError, StorageError
+from dynhull_server.storage.refusals import Meaning
 from dynhull_server.storage.rows.tables import (
     COLUMNS,
     FORMAT,
@@ -143,7 +144,9 @@ def hold(connection: Connection, database: Database) -> None:
     try:
         connection.execute("SELECT pg_advisory_xact_lock(%s)", [PREPARING])
     except LockNotAvailable:
-        raise StorageError(f"{database} is being prepared by another server, or filled by `dynhull move`") from None
+        raise StorageError(
+            f"{database} is being prepared by another server, or filled by `dynhull move`", meaning=Meaning.PASSES
+        ) from None
 
 
 def partitions_of(connection: Connection, database: Database) -> int | None:

@@ -29,6 +29,7 @@ from dynhull_server.storage.port import (
     StorageError,
     TakenOverError,
 )
+from dynhull_server.storage.refusals import Meaning
 from dynhull_server.storage.rows.examine import Findings, examine
 from dynhull_server.storage.rows.ledger import Group
 from dynhull_server.storage.rows.storage import RowStorage
@@ -358,9 +359,15 @@ def examined(connection: Connection, partition: int, progress: Progress, *, cont
 def _not_committed(error: BaseException) -> NotCommittedError:
     if isinstance(error, DiskFull):
         return NotCommittedError(
-            "the disk of PostgreSQL is full: free some space, and writes are accepted again", full=True
+            "the disk of PostgreSQL is full: free some space, and writes are accepted again",
+            full=True,
+            meaning=Meaning.PASSES,
         )
     if isinstance(error, psycopg.Error):
         error = storage_error(error)
     nothing = "nothing was written"
-    return NotCommittedError(f"{nothing}: {words(error)}", for_callers=f"{nothing}: {words_for_callers(error)}")
+    return NotCommittedError(
+        f"{nothing}: {words(error)}",
+        for_callers=f"{nothing}: {words_for_callers(error)}",
+        meaning=error.meaning if isinstance(error, StorageError) else Meaning.FINAL,
+    )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from ..state.fences.records import FenceEvent, FenceRow, Inside, KeptFence
 from ..state.records import HullRow, Kept, Record
+from .refusals import Meaning
 
 if TYPE_CHECKING:
     from ..state.changes import Change
@@ -24,11 +25,13 @@ class StorageError(Exception):
 
     Attributes:
         for_callers: what callers get instead of the message, if it is only for the log of the server; else empty.
+        meaning: whether a server that starts may try again.
     """
 
-    def __init__(self, message: str = "", *, for_callers: str = "") -> None:
+    def __init__(self, message: str = "", *, for_callers: str = "", meaning: Meaning = Meaning.FINAL) -> None:
         super().__init__(message)
         self.for_callers = for_callers
+        self.meaning = meaning
 
 
 class NotCommittedError(StorageError):
@@ -38,8 +41,10 @@ class NotCommittedError(StorageError):
         full: whether the disk is full.
     """
 
-    def __init__(self, message: str, *, full: bool = False, for_callers: str = "") -> None:
-        super().__init__(message, for_callers=for_callers)
+    def __init__(
+        self, message: str, *, full: bool = False, for_callers: str = "", meaning: Meaning = Meaning.FINAL
+    ) -> None:
+        super().__init__(message, for_callers=for_callers, meaning=meaning)
         self.full = full
 
 

@@ -7,6 +7,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO
 
+# Seconds that a statement waits for locks of other connections, unless the connection says otherwise.
+LOCK_SECONDS = 30
+
 
 class Access(StrEnum):
     """The mode in which a database is opened.
@@ -63,7 +66,7 @@ class Disk:
     def connect(self, database: Path, access: Access) -> sqlite3.Connection:
         """A connection to a database, usable from any thread, by one at a time."""
         address = f"{database.absolute().as_uri()}?{access.value}"
-        return sqlite3.connect(address, uri=True, isolation_level=None, check_same_thread=False, timeout=30)
+        return sqlite3.connect(address, uri=True, isolation_level=None, check_same_thread=False, timeout=LOCK_SECONDS)
 
 
 def make_durable(path: Path) -> None:

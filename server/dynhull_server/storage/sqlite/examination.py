@@ -3,13 +3,15 @@
 import sqlite3
 from pathlib import Path
 
-from ..port import DamagedError, FormatError, Progress
+from ..port import DamagedError, FormatError, Progress, StorageError
+from ..refusals import Meaning
 from ..rows.examine import Findings
 from ..rows.examine import examine as examine_rows
 from ..rows.ledger import Ledger
 from ..rows.tables import FORMAT, UnreadableError
 from ..rows.totals import Totals
 from .readers import SQLiteReader
+from .refusals import meaning_of
 from .schema import APPLICATION_ID, PAGE_BYTES, SCHEMAS, found
 
 MOST_MESSAGES = 5  # of SQLite's checks
@@ -42,6 +44,9 @@ def examine(connection: sqlite3.Connection, version: int, own: Totals | None, pr
         version: the format.
         own: the totals in the database file, without its log; None if unknown.
         progress: called with the rows examined so far and the total.
+
+    Raises:
+        StorageError: it is in use, or there is no memory.
     """
     findings = Findings()
     try:
@@ -54,6 +59,10 @@ def examine(connection: sqlite3.Connection, version: int, own: Totals | None, pr
                 "log and database do not belong together: the database has later commits than its log"
             )
     except (sqlite3.Error, UnreadableError) as error:
+        if meaning_of(error) is Meaning.PASSES:
+            raise StorageError(
+                f"the database cannot be examined at present: {error}", meaning=Meaning.PASSES
+            ) from error
         findings.fatal.append(f"a part of the database cannot be read ({error})")
     return findings
 

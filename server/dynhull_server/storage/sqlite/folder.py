@@ -74,10 +74,15 @@ class Folder:
         with lock or nullcontext():
             yield lock is not None
 
-    def connect(self, access: Access) -> sqlite3.Connection:
-        """A connection. The size of its cache is set here, because that in the header could be damaged."""
+    def connect(self, access: Access, lock_ms: int | None = None) -> sqlite3.Connection:
+        """A connection, which waits that long for locks; by default as the disk says.
+
+        The size of its cache is set here, because that in the header could be damaged.
+        """
         connection = self.disk.connect(self.database, access)
         try:
+            if lock_ms is not None:
+                connection.execute(f"PRAGMA busy_timeout = {lock_ms}")
             connection.execute(f"PRAGMA cache_size = -{CACHE_KILOBYTES}")
             connection.execute("PRAGMA cell_size_check = ON")
             connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()

@@ -19,21 +19,23 @@ from ...state.changes import Change
 from ...state.errors import words
 from ..durability import Durability
 from ..port import Contents, DamagedError, LockedError, NotCommittedError, Progress, Step, StorageError
+from ..refusals import Meaning
 from ..rows.examine import Findings
 from ..rows.ledger import Group, Ledger
 from ..rows.storage import RowStorage
 from ..rows.tables import FORMAT
 from ..rows.totals import MODES, STOPPED, Totals, totals_from
-from .disk import Access, Disk
+from .disk import LOCK_SECONDS, Access, Disk
 from .examination import examine, format_of, load
 from .folder import Folder
 from .migration import make_tables, migrate
 from .readers import Readers, SQLiteReader
+from .refusals import meaning_of
 from .schema import PAGE_BYTES, UPDATE_TOTALS, renew_totals, sql_of
 
 CHECKPOINT_BYTES = 16 * 2**20  # the size of the log that starts a checkpoint
 LONGEST_LOG_BYTES = 64 * 2**20  # a longer log is truncated when it restarts
-START_PATIENCE_MS = 1000  # waiting for readers at the start
+START_PATIENCE_MS = 1000  # waiting for others at the start, before it is tried anew
 PATIENCE_MS = 10  # waiting for writers and readers before the log restarts; meanwhile no commit begins
 
 SYNCHRONOUS = {Durability.SYNC: "FULL", Durability.INTERVAL: "NORMAL", Durability.NONE: "OFF"}
@@ -48,7 +50,7 @@ def _as_storage_errors() -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
-        raise StorageError(str(error)) from error
+        raise StorageError(str(error), meaning=meaning_of(error)) from error
 
 
 class SQLiteStorage(RowStorage):
@@ -74,10 +76,10 @@ class SQLiteStorage(RowStorage):
 
     def open(self, progress: Progress) -> Contents:
         """Examine the folder, repair what can be repaired, and load it."""
-        self._folder.disk.make(self._folder.path)
         with ExitStack() as stack:
-            stack.enter_context(self._folder.held())
             try:
+                self._folder.disk.make(self._folder.path)
+                stack.enter_context(self._folder.held())
                 notes, own = self._folder.check_log()
                 findings, version = self._examined(stack, own, progress)
                 if findings.fatal:
@@ -92,11 +94,16 @@ class SQLiteStorage(RowStorage):
                     file: self._folder.disk.identity(file) for file in (self._folder.database, self._folder.log)
                 }
             except sqlite3.OperationalError as error:
-                raise StorageError(f"{self._folder.database} cannot be opened: {error}") from error
+                message = f"{self._folder.database} cannot be opened: {error}"
+                raise StorageError(message, meaning=meaning_of(error)) from error
             except sqlite3.Error as error:
                 raise DamagedError(
                     f"{self._folder.database} cannot be read as a database ({error}): restore a backup"
                 ) from error
+            except OSError as error:
+                if meaning_of(error) is Meaning.FINAL:
+                    raise
+                raise StorageError(f"{self._folder.path}: {words(error)}", meaning=meaning_of(error)) from error
             self._open = stack.pop_all()
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
@@ -252,7 +259,7 @@ class SQLiteStorage(RowStorage):
         """
         if not self._folder.disk.size(self._folder.database):
             self._make_database()
-        connection = self._guard = stack.enter_context(closing(self._folder.connect(Access.READ)))
+        connection = self._guard = stack.enter_context(closing(self._folder.connect(Access.READ, START_PATIENCE_MS)))
         version = format_of(connection, self._folder.database)
         if version == 0:  # a server was killed before it created the tables
             self._make_database()
@@ -271,6 +278,7 @@ class SQLiteStorage(RowStorage):
     def _load(self, findings: Findings, version: int) -> None:
         """Migrate and repair the database, and mark it as in use."""
         connection = self._writer = self._connect_writer()
+        connection.execute(f"PRAGMA busy_timeout = {START_PATIENCE_MS}")
         connection.execute("PRAGMA synchronous = FULL")
         self._ledger = findings.ledger
         connection.execute("BEGIN IMMEDIATE")
@@ -280,6 +288,7 @@ class SQLiteStorage(RowStorage):
             renew_totals(connection, findings.ledger.totals)
         connection.execute("COMMIT")
         self._write(Group(self._in_mode(MODES[self._durability]), findings.repairs))
+        connection.execute(f"PRAGMA busy_timeout = {1000 * LOCK_SECONDS}")
         self._set_synchronous(connection)
 
     def _in_mode(self, mode: int) -> Ledger:
@@ -292,7 +301,8 @@ class SQLiteStorage(RowStorage):
         busy, _ = self._copy_log("RESTART")
         # A backup may have begun while the previous server ran: then the file already has the mark.
         if busy and (own is None or own.mode == STOPPED):
-            raise LockedError(f"another process reads {self._folder.database}: wait until it has finished")
+            message = f"another process reads {self._folder.database}: wait until it has finished"
+            raise LockedError(message, meaning=Meaning.PASSES)
         self._checkpointer.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
 
     def _connect_writer(self) -> sqlite3.Connection:
@@ -334,8 +344,9 @@ class SQLiteStorage(RowStorage):
 
 def _not_committed(error: BaseException) -> NotCommittedError:
     if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
-        return NotCommittedError("the disk is full: free some space, and writes are accepted again", full=True)
-    return NotCommittedError(f"nothing was written: {words(error)}")
+        message = "the disk is full: free some space, and writes are accepted again"
+        return NotCommittedError(message, full=True, meaning=meaning_of(error))
+    return NotCommittedError(f"nothing was written: {words(error)}", meaning=meaning_of(error))
 
 
 def _gone(file: Path) -> str:

@@ -1,0 +1,68 @@
+"""The start of what serves, which waits for a storage that is not ready."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from typing import Protocol, TypeVar
+
+from .state.errors import words
+from .storage.port import StorageError
+from .storage.refusals import Meaning
+
+# Seconds before the next attempt: at first, and at most.
+FIRST_PAUSE, LONGEST_PAUSE = 0.25, 10.0
+
+log = logging.getLogger(__name__)
+
+
+class Drained(Protocol):
+    """Serves until `drain` has returned."""
+
+    async def drain(self) -> None:
+        """End the calls in progress, and stop; also after a start that has failed."""
+
+
+Served = TypeVar("Served", bound=Drained)
+
+
+async def started(
+    make: Callable[[], Awaitable[Served]],
+    start: Callable[[Served], Awaitable[None]],
+    stop: asyncio.Event,
+    patience: float,
+) -> Served | None:
+    """What `make` returns, once it has started; None if `stop` is set before.
+
+    While the storage refuses in a way that passes, another one is made and started, after growing pauses.
+
+    Args:
+        make: makes what is to serve.
+        start: starts it.
+        stop: ends the wait.
+        patience: the seconds for which a refusal is waited for that may be final.
+
+    Raises:
+        StorageError: the storage refuses for good.
+    """
+    begun, pause = time.monotonic(), FIRST_PAUSE
+    while not stop.is_set():
+        try:
+            made = await make()
+            try:
+                await start(made)
+            except BaseException:
+                await made.drain()
+                raise
+            return made
+        except StorageError as error:
+            left = begun + patience - time.monotonic() if error.meaning is Meaning.DOUBTFUL else pause
+            if error.meaning is Meaning.FINAL or left <= 0:
+                raise
+            log.warning("cannot serve yet", extra={"reason": words(error), "pause": round(min(pause, left), 3)})
+        with suppress(TimeoutError):
+            async with asyncio.timeout(min(pause, left)):
+                await stop.wait()
+        pause = min(2 * pause, LONGEST_PAUSE)
+    return None
