@@ -6,7 +6,7 @@ from concurrent import futures
 
 import numpy as np
 import pytest
-from patience import PATIENCE
+from patience import PATIENCE, wait_until, waits
 from proxy import proxy
 from server_process import server_process
 
@@ -134,7 +134,8 @@ def test_a_pipeline_waits_while_too_many_reads_are_not_answered(address: str, fi
 
         thread = threading.Thread(target=add)
         thread.start()
-        assert not added.wait(0.2)
+        wait_until(lambda: waits(thread))
+        assert not added.is_set()
         client.apply(filled, insert=[[5, 5]])
         assert waiting.result(PATIENCE).revision == 2
         thread.join()

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cluster import descendants
-from patience import wait_until
+from patience import wait_until, waits
 from proxy import proxy
 from server_process import server_process
 
@@ -100,10 +100,17 @@ def test_put_waits_while_too_much_is_under_way(connect: type[HullClient]) -> Non
             processes = (server.process.pid, *descendants(server.process.pid))
             for each in processes:
                 os.kill(each, signal.SIGSTOP)
-            putting = threading.Thread(target=lambda: [writer.put(insert=each) for each in POINTS[:9]])
+            taken = []
+
+            def put() -> None:
+                for number, points in enumerate(POINTS[:9]):
+                    writer.put(insert=points)
+                    taken.append(number)
+
+            putting = threading.Thread(target=put)
             putting.start()
-            putting.join(0.3)
-            assert putting.is_alive()
+            wait_until(lambda: len(taken) >= 4 and waits(putting))
+            assert len(taken) < 9
             for each in processes:
                 os.kill(each, signal.SIGCONT)
             putting.join()

@@ -8,7 +8,7 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
-from patience import PATIENCE, until
+from patience import PATIENCE, turns, until
 
 from dynhull_client import Batch, HullClient
 from dynhull_cluster.frames import MOST_BYTES, Frames, Kind, unpack_request
@@ -39,6 +39,14 @@ class Ends(Frames):
 
     def received(self, *_: object) -> None:
         self.close()
+
+
+class Answers(Frames):
+    """A worker that answers."""
+
+    def received(self, number: int, kind: Kind, _: bytes) -> None:
+        if kind is Kind.REQUEST:
+            self.send(number, Kind.ANSWER, b"answer")
 
 
 class Stalls(Frames):
@@ -87,8 +95,10 @@ def test_who_asks_again_just_when_the_worker_has_ended_is_told(tmp_path: Path) -
         with pytest.raises(WorkerAwayError):
             link.stream(METHOD, ())
         asking = asyncio.create_task(link.ask(WRITE, CALL, b""))  # it has not begun
-        assert not (await asyncio.wait([asking], timeout=0.1))[0]
-        asking.cancel()
+        await turns()
+        next_one = await asyncio.get_running_loop().create_unix_server(Answers, Sockets(tmp_path).frames(0))
+        assert await asyncio.wait_for(asking, PATIENCE) == b"answer"
+        next_one.close()
         await ended(link, running)
 
     asyncio.run(run())
@@ -114,7 +124,8 @@ def test_calls_that_grpc_would_have_wait_end_with_their_worker(tmp_path: Path) -
         upstream = link.stream(METHOD, ())
         writing = asyncio.create_task(upstream.write(b""))
         reading = asyncio.create_task(upstream.read())
-        assert not (await asyncio.wait([large, writing, reading], timeout=0.1))[0]
+        await turns()
+        assert not any(each.done() for each in (large, writing, reading))
         leaving.pop().close()
         async with asyncio.timeout(PATIENCE):
             assert not await writing

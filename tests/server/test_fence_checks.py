@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from live_engine import engine_in_memory
+from patience import turns
 
 from dynhull import _rings
 from dynhull_server.engine.engine import Engine
@@ -75,7 +76,7 @@ def test_checks_whose_callers_have_left_leave_threads_to_others(monkeypatch: pyt
                 caller = asyncio.create_task(engine.fences.create(f"fence-{number}", config))
                 while len(begun) < min(number + 1, MOST_CHECKS):
                     await asyncio.sleep(0)
-                await asyncio.wait([caller], timeout=0.05)
+                await turns()
                 caller.cancel()
                 await asyncio.wait([caller])
             assert await engine.aside(lambda: "read") == "read"

@@ -333,7 +333,7 @@ class Leaver(Actor):
             hull = self._random.choice((*self.NAMES, self._hull))
             pause(4 * self.shared.breath)
             call = self._begin(stub, hull)
-            threading.Event().wait(self._random.random() ** 3 * 0.02)
+            pause(self._random.random() ** 3 * 0.02)
             self.left += call.cancel()
             if (code := call.code()) in PASSING - {grpc.StatusCode.CANCELLED}:
                 pause(0.02 if code else 0)
