@@ -334,15 +334,40 @@ def test_what_the_stream_removes_while_it_is_read(monkeypatch: pytest.MonkeyPatc
     async def read() -> list[tuple[int, int]]:
         feed = jetstream.JetStream(f"nats://127.0.0.1:{nats_port}/{name}", None, "mapping")
         await feed.begin(0)
-        (first,) = await feed.read()
+        found = [*await feed.read()]
+        while not found:
+            found += await feed.read()
         await asyncio.to_thread(publish, nats_port, name, [("p", {})] * 3, max_msgs=1)
-        found = [first]
         while found[-1].number < 4:
             found += await feed.read()
         await feed.close()
         return [(each.number, each.lost) for each in found]
 
-    assert asyncio.run(read()) == [(1, 0), (2, 0), (4, 1)]
+    first, *others, last = asyncio.run(read())
+    assert (first, others) in (((1, 0), [(2, 0)]), ((1, 0), [])), "the second one was asked for, if that was in time"
+    assert last == (4, 2 - len(others))
+
+
+def test_a_place_without_the_identity_of_its_stream_adopts_it(address: str, name: str, nats_port: int) -> None:
+    """As the broker kept it before an upgrade, for several hulls."""
+    url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*"
+    options = (url, "--hull", f"{name}/{{1}}", "--x", "$.x", "--y", "$.y")
+    publish(nats_port, name, [("a", {"x": 1, "y": 1})] * 3)
+    ingested(address, *options)
+
+    async def forget() -> None:
+        async with await nats.connect(f"nats://127.0.0.1:{nats_port}") as connection:
+            bucket = await connection.jetstream().key_value("dynhull-ingest")
+            (key,) = [each for each in await bucket.keys() if f"nats/{name}/" in each]
+            value = (await bucket.get(key)).value or b""
+            await bucket.put(key, value.split()[0])
+
+    asyncio.run(forget())
+    said = ingested(address, *options)
+    assert [line["after"] for line in said if line["event"] == "reading"] == [3]
+    assert [line["feed"] for line in said if "taken for this log" in line["event"]] == [url]
+    publish(nats_port, name, [("b", {"x": 1, "y": 1})] * 5, anew=True)
+    refused(address, *options)
 
 
 @pytest.mark.parametrize(("version", "share"), [("3.1.1", ""), ("5", "$share/g/")])

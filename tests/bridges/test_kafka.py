@@ -141,7 +141,9 @@ def test_a_topic_that_was_made_again_under_hulls_by_record(address: str, servers
     assert ingested(address, *given)[-1]["points"] == 5
     assert ingested(address, *given)[-1]["points"] == 0
     made(servers, topic)
-    send(servers, topic, [POINT] * 8)
+    send(servers, topic, [POINT.replace(b"1", b"2")] * 8)
+    assert ingested(address, *given)[-1]["points"] == 8, "the broker forgot the place with the topic"
+    send(servers, topic, [POINT])
     refused(address, *given)
 
 

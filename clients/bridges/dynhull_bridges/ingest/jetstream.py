@@ -214,12 +214,13 @@ class JetStream:
         """Keep the number of the last one, with the identity of the stream, in the bucket, unless the hull does."""
         if not self._keeps:
             return
-        number = messages[-1].number
         try:
-            bucket = await self._positions()
-            await bucket.put(self._key, f"{number} {self._identity}".encode())
+            await self._put(messages[-1].number)
         except (Error, OSError, TimeoutError) as error:
             raise feed_error("NATS", error) from None
+
+    async def _put(self, number: int) -> None:
+        await (await self._positions()).put(self._key, f"{number} {self._identity}".encode())
 
     async def _kept(self) -> int:
         try:
@@ -229,6 +230,7 @@ class JetStream:
         number, _, identity = (entry.value or b"0").decode().partition(" ")
         if not identity:
             adopted(self.name)
+            await self._put(int(number))
         elif int(identity) != self._identity:
             raise made_again(f"the stream {self._stream!r} is another one than that of which {number} have been taken")
         return int(number)
