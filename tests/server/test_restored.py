@@ -14,6 +14,7 @@ from mortal_server import MortalServer
 from refusal import refusal
 
 from dynhull_client import (
+    Circle,
     FenceReplacedError,
     HullClient,
     HullCopy,
@@ -26,7 +27,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 AREA = Polygon([[0, 0], [9, 0], [0, 9]])
-INSIDE, OUTSIDE = [1, 1], [20, 20]
+INSIDE, OUTSIDE, FAR = [1, 1], [20, 20], [40, 40]
 FENCES = {"dwell": {"dwell": 3600}, "delayed": {"min_dwell": 3600}, "silent": {"initial": "none"}}
 
 # Batches in the backup, and those that were acknowledged after it.
@@ -79,7 +80,9 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
         fence = client.create_fence("fence", AREA, "keyed")
         for name, more in FENCES.items():
             client.create_fence(name, AREA, "keyed", **more)
+        client.create_fence("left", Circle(*OUTSIDE, 1), "keyed")
         client.put("keyed", ["a", "b", "c"], [INSIDE, INSIDE, OUTSIDE])
+        client.put("keyed", ["c"], [FAR])
         client.ack_fence("fence", "behind", 1)
         client.ack_fence("fence", "uptodate", 3)
         writers = {}
@@ -183,7 +186,8 @@ def test_who_is_inside_of_a_restored_fence(before: Before, fence: str) -> None:
     assert keys & {"a", "b", "c"} == (set() if fence == "delayed" else {"a", "b"})
     verification = before.client.verify("keyed")
     assert verification.whole
-    assert verification.fences == 1 + len(FENCES)
+    assert verification.fences == 2 + len(FENCES)
+    assert before.client.fence_inside("left").subjects == ()
 
 
 def test_hulls_that_are_near_stay_near(before: Before) -> None:

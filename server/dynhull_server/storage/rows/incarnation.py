@@ -123,6 +123,8 @@ def _inside(fence: KeptFence, hulls: dict[str, HullRows]) -> Inside:
         dwelling.follow(fence.events)
     members = []
     for hull, found in members_after(fence).items():
+        if not found and row.config.kind != "other":
+            continue
         keys = _packed(found)
         since = None if dwelling is None else dwelling.times(hull, keys)
         members.append(Members(hull, keys, hulls[hull].last, since))
