@@ -12,6 +12,7 @@ from command_line import dynhull
 from gateway_process import gateway_process
 from mortal_server import MortalServer
 from refusal import refusal
+from server_process import shape_options
 
 from dynhull_client import (
     Circle,
@@ -28,7 +29,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 AREA = Polygon([[0, 0], [9, 0], [0, 9]])
 INSIDE, OUTSIDE, FAR = [1, 1], [20, 20], [40, 40]
-FENCES = {"dwell": {"dwell": 3600}, "delayed": {"min_dwell": 3600}, "silent": {"initial": "none"}}
+FENCES = {"r/dwell": {"dwell": 3600}, "r/delayed": {"min_dwell": 3600}, "r/silent": {"initial": "none"}}
 
 # Batches in the backup, and those that were acknowledged after it.
 BACKED_UP, GONE = 3, 2
@@ -40,10 +41,10 @@ class Before:
 
     Attributes:
         client: a client.
-        writers: writers by kind of client, each to the hull of that name.
-        copy: the hull "sync" at its last revision.
-        fence: the uid of the fence "fence".
-        taken: the uid of the hull "taken", to which nobody has written numbered batches.
+        writers: writers by kind of client, each to the hull of that name below "r/".
+        copy: the hull "r/sync" at its last revision.
+        fence: the uid of the fence "r/fence".
+        taken: the uid of the hull "r/taken", to which nobody has written numbered batches.
         address: the address of the server.
     """
 
@@ -71,35 +72,35 @@ def numbered(name: str, sequence: int, uid: str = "") -> pb.ApplyRequest:
 def before(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
     folder = tmp_path_factory.mktemp("restored")
     with ExitStack() as stack:
-        server = MortalServer(folder)
+        server = MortalServer(folder, *shape_options())
         stack.callback(server.kill)
         clients = {kind: stack.enter_context(connect(server.address)) for kind, connect in CLIENTS.items()}
         client, copy = clients["sync"], HullCopy()
-        client.create_hull("keyed", keyed="str")
-        taken = client.create_hull("taken").uid
-        fence = client.create_fence("fence", AREA, "keyed")
+        client.create_hull("r/keyed", keyed="str")
+        taken = client.create_hull("r/taken").uid
+        fence = client.create_fence("r/fence", AREA, "r/keyed")
         for name, more in FENCES.items():
-            client.create_fence(name, AREA, "keyed", **more)
-        client.create_fence("left", Circle(*OUTSIDE, 1), "keyed")
-        client.put("keyed", ["a", "b", "c"], [INSIDE, INSIDE, OUTSIDE])
-        client.put("keyed", ["c"], [FAR])
-        client.ack_fence("fence", "behind", 1)
-        client.ack_fence("fence", "uptodate", 3)
+            client.create_fence(name, AREA, "r/keyed", **more)
+        client.create_fence("r/left", Circle(*OUTSIDE, 1), "r/keyed")
+        client.put("r/keyed", ["a", "b", "c"], [INSIDE, INSIDE, OUTSIDE])
+        client.put("r/keyed", ["c"], [FAR])
+        client.ack_fence("r/fence", "behind", 1)
+        client.ack_fence("r/fence", "uptodate", 3)
         writers = {}
         for kind, each in clients.items():
-            each.create_hull(kind)
-            writers[kind] = each.writer(kind, producer="before")
+            each.create_hull(f"r/{kind}")
+            writers[kind] = each.writer(f"r/{kind}", producer="before")
             for number in range(BACKED_UP):
                 put(writers[kind], number)
-        client.apply("taken", insert=[[0, 0]])
-        client.create_fence("near", "taken", other_hull="sync", near=100)
+        client.apply("r/taken", insert=[[0, 0]])
+        client.create_fence("r/near", "r/taken", other_hull="r/sync", near=100)
         assert dynhull("backup", folder / "backup", "--data", folder / "data").exit_code == 0
         for writer in writers.values():
             for number in range(BACKED_UP, BACKED_UP + GONE):
                 put(writer, number)
-        client.put("keyed", ["a", "c"], [OUTSIDE, INSIDE])
-        client.ack_fence("fence", "uptodate", 5)
-        next(iter(client.watch("sync", copy=copy)))
+        client.put("r/keyed", ["a", "c"], [OUTSIDE, INSIDE])
+        client.ack_fence("r/fence", "uptodate", 5)
+        next(iter(client.watch("r/sync", copy=copy)))
         server.kill()
         (folder / "data").rename(folder / "lost")
         assert dynhull("restore", folder / "backup", "--data", folder / "data").exit_code == 0
@@ -117,82 +118,86 @@ def stub(before: Before) -> Iterator[HullServiceStub]:
 
 @pytest.mark.parametrize("kind", CLIENTS)
 def test_a_writer_ends(before: Before, kind: str) -> None:
-    writer, revision = before.writers[kind], before.client.get_hull(kind).info.revision
+    writer, revision = before.writers[kind], before.client.get_hull(f"r/{kind}").info.revision
     with pytest.raises(RestoredError) as caught:
         put(writer, 100)
     assert caught.value.last == BACKED_UP
-    with pytest.raises(RestoredError), before.client.writer(kind, producer="before", uid=writer.uid):
+    with pytest.raises(RestoredError), before.client.writer(f"r/{kind}", producer="before", uid=writer.uid):
         pass
-    assert before.client.get_hull(kind).info.revision == revision
+    assert before.client.get_hull(f"r/{kind}").info.revision == revision
 
 
 def test_numbers_that_another_writer_has_taken_since_are_no_duplicates(before: Before, stub: HullServiceStub) -> None:
-    with before.client.writer("taken", producer="before") as another:
+    with before.client.writer("r/taken", producer="before") as another:
         assert another.sequence == 0
         for number in range(GONE):
             put(another, -number)
-    code, info, _ = refusal(lambda: stub.Apply(numbered("taken", GONE, before.taken)))
+    code, info, _ = refusal(lambda: stub.Apply(numbered("r/taken", GONE, before.taken)))
     assert (code, info.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "RESTORED")
     assert (info.metadata["last"], info.metadata["uid"]) == (str(GONE), another.uid)
-    assert stub.Apply(numbered("taken", GONE, another.uid)).result.duplicate
+    assert stub.Apply(numbered("r/taken", GONE, another.uid)).result.duplicate
 
 
 def test_numbers_that_do_not_say_of_which_hull_they_are(before: Before, stub: HullServiceStub) -> None:
     """A gap may be one of the backup; numbers of the present hull leave gaps by themselves."""
-    before.client.create_hull("new")
-    uid = before.client.get_hull("keyed").info.uid
-    for name, of, reason in (("keyed", "", "RESTORED"), ("keyed", uid, "SEQUENCE_GAP"), ("new", "", "SEQUENCE_GAP")):
+    before.client.create_hull("r/new")
+    uid = before.client.get_hull("r/keyed").info.uid
+    for name, of, reason in (
+        ("r/keyed", "", "RESTORED"),
+        ("r/keyed", uid, "SEQUENCE_GAP"),
+        ("r/new", "", "SEQUENCE_GAP"),
+    ):
         _, info, _ = refusal(partial(stub.Apply, numbered(name, GONE, of)))
         assert info.reason == reason
 
 
 def test_rows_over_http_are_numbered_by_producers_too(before: Before) -> None:
-    before.client.create_hull("another")
+    before.client.create_hull("r/another")
     with gateway_process(before.address) as gateway:
         for hull, reason in (("taken", "RESTORED"), ("another", "SEQUENCE_GAP")):
             for call in (("points", {"insert": [[0, 0]]}), ("rows", b"[0, 0]\n", "application/x-ndjson")):
                 path, *body = call
-                answer = gateway.post(f"/hulls/{hull}/{path}", *body, Idempotency_Key="http:9")
+                answer = gateway.post(f"/hulls/r%2F{hull}/{path}", *body, Idempotency_Key="http:9")
                 assert (answer.status, answer.json["reason"], answer.json["expected"]) == (409, reason, 1)
 
 
 def test_readers_begin_anew(before: Before) -> None:
     held = before.copy.uid, before.copy.revision
     with pytest.raises(HullReplacedError):
-        next(iter(before.client.watch("sync", resume=before.copy, reconnect=False)))
-    event = next(iter(before.client.watch("sync", copy=before.copy)))
+        next(iter(before.client.watch("r/sync", resume=before.copy, reconnect=False)))
+    event = next(iter(before.client.watch("r/sync", copy=before.copy)))
     assert isinstance(event, Snapshot)
     assert event.uid != held[0]
     with pytest.raises(FenceReplacedError):
-        next(iter(before.client.watch_fence("fence", after=0, uid=before.fence)))
+        next(iter(before.client.watch_fence("r/fence", after=0, uid=before.fence)))
 
 
 @pytest.mark.parametrize(("consumer", "first"), [("behind", 2), ("uptodate", 4)])
 def test_streams_of_fences_begin_with_what_is_lost_and_who_is_inside(before: Before, consumer: str, first: int) -> None:
-    with before.client.watch_fence("fence", consumer) as watch:
+    with before.client.watch_fence("r/fence", consumer) as watch:
         lost, snapshot = next(watch), next(watch)
         assert (lost.type, lost.first, lost.last) == ("lost", first, 4)
         assert (snapshot.type, snapshot.sequence, snapshot.uid) == ("snapshot", 5, lost.uid)
         assert lost.uid != before.fence
-        assert [(each.hull, list(each.keys)) for each in snapshot.inside] == [("keyed", ["a", "b"])]
-        before.client.put("keyed", [consumer], [INSIDE])
+        assert [(each.hull, list(each.keys)) for each in snapshot.inside] == [("r/keyed", ["a", "b"])]
+        before.client.put("r/keyed", [consumer], [INSIDE])
         assert next(watch).key in ("behind", "uptodate")
 
 
-@pytest.mark.parametrize("fence", ["fence", *FENCES])
+@pytest.mark.parametrize("fence", ["r/fence", *FENCES])
 def test_who_is_inside_of_a_restored_fence(before: Before, fence: str) -> None:
     inside = before.client.fence_inside(fence)
     keys = {key for each in inside.subjects for key in each.keys}
-    assert keys & {"a", "b", "c"} == (set() if fence == "delayed" else {"a", "b"})
-    verification = before.client.verify("keyed")
+    assert keys & {"a", "b", "c"} == (set() if fence == "r/delayed" else {"a", "b"})
+    verification = before.client.verify("r/keyed")
     assert verification.whole
     assert verification.fences == 2 + len(FENCES)
-    assert before.client.fence_inside("left").subjects == ()
+    assert before.client.fence_inside("r/left").subjects == ()
 
 
 def test_hulls_that_are_near_stay_near(before: Before) -> None:
-    with before.client.watch_fence("near", after=0) as watch:
+    with before.client.watch_fence("r/near", after=0) as watch:
         lost, snapshot = next(watch), next(watch)
     assert (lost.type, snapshot.type) == ("lost", "snapshot")
-    assert [each.hull for each in snapshot.inside] == ["sync"]
-    assert before.client.verify("taken").whole
+    assert [each.hull for each in snapshot.inside] == ["r/sync"]
+    assert before.client.verify("r/taken").whole
