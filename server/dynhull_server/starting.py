@@ -41,12 +41,13 @@ async def started(
         make: makes what is to serve.
         start: starts it.
         stop: ends the wait.
-        patience: the seconds for which a refusal is waited for that may be final.
+        patience: the seconds for which it may refuse in a way that may be final.
 
     Raises:
         StorageError: the storage refuses for good.
     """
-    begun, pause = time.monotonic(), FIRST_PAUSE
+    pause = FIRST_PAUSE
+    doubted: float | None = None  # since when
     while not stop.is_set():
         try:
             made = await make()
@@ -57,12 +58,18 @@ async def started(
                 raise
             return made
         except StorageError as error:
-            left = begun + patience - time.monotonic() if error.meaning is Meaning.DOUBTFUL else pause
-            if error.meaning is Meaning.FINAL or left <= 0:
+            seconds = pause
+            if error.meaning is Meaning.DOUBTFUL:
+                now = time.monotonic()
+                doubted = doubted or now
+                seconds = min(pause, doubted + patience - now)
+            else:
+                doubted = None
+            if error.meaning is Meaning.FINAL or seconds <= 0:
                 raise
-            log.warning("cannot serve yet", extra={"reason": words(error), "pause": round(min(pause, left), 3)})
+            log.warning("cannot serve yet", extra={"reason": words(error), "pause": round(seconds, 3)})
         with suppress(TimeoutError):
-            async with asyncio.timeout(min(pause, left)):
+            async with asyncio.timeout(seconds):
                 await stop.wait()
         pause = min(2 * pause, LONGEST_PAUSE)
     return None

@@ -1,5 +1,6 @@
 """What the disk refuses at the start of a server is waited for if it passes."""
 
+import asyncio
 import errno
 import sqlite3
 from contextlib import closing
@@ -10,6 +11,8 @@ from forked import COMMAND
 from logged_process import Logged, logged_process
 
 from dynhull_client import HullClient
+from dynhull_server.starting import FIRST_PAUSE, started
+from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.refusals import Meaning
 from dynhull_server.storage.sqlite.refusals import meaning_of
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -73,3 +76,29 @@ def test_what_an_error_of_sqlite_means(code: int, meaning: Meaning) -> None:
 )
 def test_what_an_error_of_the_disk_means(code: int, meaning: Meaning) -> None:
     assert meaning_of(OSError(code, "injected")) is meaning
+
+
+class Made:
+    async def drain(self) -> None:
+        drained.append(self)
+
+
+drained: list[Made] = []
+
+
+def test_the_patience_with_what_is_doubtful_begins_with_the_doubt() -> None:
+    """As with a database that first shuts down, which takes longer, and then does not answer while it starts again."""
+    refusals = [StorageError("shuts down", meaning=PASSES), StorageError("no answer", meaning=DOUBTFUL)]
+
+    async def make() -> Made:
+        return Made()
+
+    async def start(_: Made) -> None:
+        if refusals:
+            raise refusals.pop(0)
+
+    async def run() -> Made | None:
+        return await started(make, start, asyncio.Event(), FIRST_PAUSE / 2)
+
+    assert asyncio.run(run()) not in (None, *drained)
+    assert len(drained) == 2
