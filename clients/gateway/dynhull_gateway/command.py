@@ -44,7 +44,14 @@ def gateway(
         int, typer.Option(min=1, help="Largest body of JSON or GeoJSON, in MiB. Bodies of rows are not held in memory.")
     ] = 16,
     max_upload: Annotated[int, typer.Option(min=1, help="Largest body of rows, in MiB.")] = 1024,
+    head_timeout: Annotated[
+        str, typer.Option(help="How long a request may take to arrive, without its body; 408 after that.")
+    ] = "10s",
     body_timeout: Annotated[str, typer.Option(help="How long a body may pause; 408 after that.")] = "30s",
+    reader_timeout: Annotated[
+        str,
+        typer.Option(help="How long a caller may read nothing of what waits for it; its connection ends after that."),
+    ] = "30s",
     keepalive: Annotated[
         str, typer.Option(help="Pause after which a stream of events sends a comment, for the sake of proxies.")
     ] = "15s",
@@ -83,7 +90,9 @@ def gateway(
         hosts=hosts_of(allow_host, host),
         max_body=max_body * MIB,
         max_upload=max_upload * MIB,
+        head_seconds=more_than_0(head_timeout, "--head-timeout"),
         body_seconds=more_than_0(body_timeout, "--body-timeout"),
+        reader_seconds=more_than_0(reader_timeout, "--reader-timeout"),
         keepalive_seconds=more_than_0(keepalive, "--keepalive"),
         max_streams=max_streams,
         grace_seconds=more_than_0(grace, "--grace"),

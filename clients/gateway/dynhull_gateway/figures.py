@@ -35,6 +35,16 @@ class Figures:
             "Snapshots sent in place of changes that a reader was too slow for.",
             registry=registry,
         )
+        self.late_heads = Counter(
+            "dynhull_gateway_late_requests",
+            "Connections that were closed because no complete request came in time.",
+            registry=registry,
+        )
+        self.deaf_readers = Counter(
+            "dynhull_gateway_deaf_readers",
+            "Connections that were closed because nothing was read of what waited for the caller.",
+            registry=registry,
+        )
 
     def serve(self, host: str, port: int) -> int:
         """Serve the page from another thread, and return its port."""

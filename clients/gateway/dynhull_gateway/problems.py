@@ -80,7 +80,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         (401, "The server requires another token."),
         (403, "The token does not allow the call."),
         (404, "There is no such hull, fence, key or point."),
-        (408, "The body did not arrive in time."),
+        (408, "The request did not arrive in time."),
         (409, "The hull or fence is in another state, of another kind, or exists already."),
         (410, "The revision is no longer known."),
         (413, "The body is too large."),

@@ -7,16 +7,14 @@ import signal
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from http import HTTPStatus
 
 import typer
 import uvicorn
-from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from dynhull_client import AsyncHullClient
 
 from .app import application
-from .problems import problem
+from .protocol import Protocol
 from .settings import Settings
 
 BACKLOG = 2048
@@ -30,18 +28,6 @@ class Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave the signals to the caller."""
         yield
-
-
-class Protocol(HttpToolsProtocol):
-    """uvicorn's protocol, with problem details for what is not HTTP, too."""
-
-    def send_400_response(self, msg: str) -> None:
-        """Answer, and close the connection."""
-        answer = problem(HTTPStatus.BAD_REQUEST, f"{msg} The connection is closed.", reason="MALFORMED_MESSAGE")
-        headers = [*answer.raw_headers, (b"connection", b"close")]
-        lines = [b"HTTP/1.1 400 Bad Request", *(b"%b: %b" % header for header in headers), b"", bytes(answer.body)]
-        self.transport.write(b"\r\n".join(lines))
-        self.transport.close()
 
 
 def run(connect: Callable[[], AsyncHullClient], host: str, port: int, settings: Settings) -> None:

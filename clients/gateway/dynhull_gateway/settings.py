@@ -12,8 +12,10 @@ class Settings:
         hosts: the names under which the gateway answers; none for any.
         max_body: bytes of a body that is read as a whole: JSON and GeoJSON.
         max_upload: bytes of a body of rows.
+        head_seconds: seconds within which a request must have arrived up to its body.
         body_seconds: seconds within which more of a body must arrive, and within which a body that is read as a whole
             must have arrived.
+        reader_seconds: seconds within which a caller must read some of what waits for it.
         keepalive_seconds: seconds without an event after which a comment is sent on a stream of events.
         max_streams: streams of events at a time.
         grace_seconds: seconds that requests may still take after SIGTERM.
@@ -26,7 +28,9 @@ class Settings:
     hosts: frozenset[str] = frozenset()
     max_body: int = 16 * 2**20
     max_upload: int = 2**30
+    head_seconds: float = 10.0
     body_seconds: float = 30.0
+    reader_seconds: float = 30.0
     keepalive_seconds: float = 15.0
     max_streams: int = 10_000
     grace_seconds: float = 10.0

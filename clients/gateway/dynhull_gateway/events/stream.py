@@ -10,11 +10,13 @@ from ..figures import Figures
 from ..health import State
 from .messages import AVAILABLE, FIRST, UNAVAILABLE
 
+# Bytes that are sent at a time: a reader that does not read has no more of an event in its buffer than this.
+PIECE = 2**16
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}  # nginx passes on what it does not buffer
 
 
 class EventStream(Response):
-    """Sends texts as they come. A reader that does not read holds back its own stream alone.
+    """Sends texts as they come. A reader that does not read holds back its own stream alone, and is closed at last.
 
     Args:
         texts: events as text; closed with the stream.
@@ -30,6 +32,7 @@ class EventStream(Response):
         self._texts = texts
         self._health = health
         self._figures = figures
+        self._turn = asyncio.Lock()
 
     async def __call__(self, _: Scope, receive: Receive, send: Send) -> None:
         """Send until the first of: no more events, the reader has left, the gateway ends."""
@@ -55,7 +58,7 @@ class EventStream(Response):
         reporting = asyncio.create_task(self._report_presence(send))
         try:
             async for text in self._texts:
-                await send({"type": "http.response.body", "body": text, "more_body": True})
+                await self._write(send, text)
                 self._figures.events.inc()
         finally:
             reporting.cancel()
@@ -68,9 +71,13 @@ class EventStream(Response):
             changed = self._health.changed
             if self._health.connected is not reported:
                 reported = self._health.connected
-                text = AVAILABLE if reported else UNAVAILABLE
-                await send({"type": "http.response.body", "body": text, "more_body": True})
+                await self._write(send, AVAILABLE if reported else UNAVAILABLE)
             await changed.wait()
+
+    async def _write(self, send: Send, text: bytes) -> None:
+        async with self._turn:  # no event within another one
+            for begin in range(0, len(text), PIECE):
+                await send({"type": "http.response.body", "body": text[begin : begin + PIECE], "more_body": True})
 
 
 async def _left(receive: Receive) -> None:

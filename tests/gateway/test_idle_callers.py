@@ -1,0 +1,80 @@
+"""Callers that do not go on: half requests, and readers that do not read, end and are counted; others do not notice."""
+
+import json
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from urllib.parse import urlsplit
+
+from gateway_process import Events, Gateway, gateway_process
+from metrics import scrape
+from patience import PATIENCE, wait_until
+from ports import free_port
+
+from dynhull_client import HullClient
+
+CALLERS = 30
+LATE, DEAF = "dynhull_gateway_late_requests_total", "dynhull_gateway_deaf_readers_total"
+
+
+@contextmanager
+def strict(address: str, *options: str) -> Iterator[tuple[Gateway, str]]:
+    """A gateway, and the address of its metrics."""
+    port = str(free_port())
+    with gateway_process(address, *options, "--metrics-port", port) as gateway:
+        yield gateway, f"127.0.0.1:{port}"
+
+
+def connect(gateway: Gateway) -> socket.socket:
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    connection.settimeout(PATIENCE)
+    place = urlsplit(gateway.url)
+    connection.connect((place.hostname, place.port))
+    return connection
+
+
+def rest(connection: socket.socket) -> bytes:
+    """What arrives until the connection ends."""
+    return b"".join(iter(lambda: connection.recv(65536), b""))
+
+
+def test_half_requests_end(address: str) -> None:
+    with strict(address, "--head-timeout", "500ms") as (gateway, metrics), ExitStack() as stack:
+        half, silent, second = ([stack.enter_context(closing(connect(gateway))) for _ in range(CALLERS)] for _ in "123")
+        for connection in half:
+            connection.sendall(b"GET / HTTP/1.1\r\nHost: local")
+        for connection in second:  # the first request of a connection is whole
+            connection.sendall(b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\nGET / HTTP/1.1\r\n")
+        for connection in half:
+            head, _, body = rest(connection).partition(b"\r\n\r\n")
+            assert head.startswith(b"HTTP/1.1 408 ")
+            assert b"connection: close" in head
+            assert json.loads(body)["reason"] == "HEAD_TOO_SLOW"
+        assert [rest(connection) for connection in silent] == [b""] * CALLERS
+        for connection in second:
+            assert rest(connection).startswith(b"HTTP/1.1 ")
+        assert scrape(metrics)[LATE] == 3 * CALLERS
+
+
+def test_readers_that_do_not_read_end(address: str, name: str) -> None:
+    """Those of events, and those of plain answers; another reader gets everything."""
+    stream = f"/hulls/{name}/events"
+    with (
+        HullClient(address) as client,
+        strict(address, "--reader-timeout", "2s") as (gateway, metrics),
+        ExitStack() as stack,
+    ):
+        client.create_hull(name)
+        client.apply(name, insert=[[i, i * i] for i in range(300_000)])  # 6 MB as JSON: more than sockets hold
+        deaf = [stream] * 5 + [f"/hulls/{name}"]
+        for path in deaf:
+            connection = stack.enter_context(closing(connect(gateway)))
+            connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        other = stack.enter_context(closing(Events(gateway, stream)))
+        assert len(other.next()[1]["vertices"]) == 300_000
+        wait_until(lambda: scrape(metrics)[DEAF] >= len(deaf))
+        client.apply(name, insert=[[0, 1]])
+        assert other.next()[1]["revision"] == 2
+        figures = scrape(metrics)
+        assert (figures[DEAF], figures["dynhull_gateway_streams"]) == (len(deaf), 1)
