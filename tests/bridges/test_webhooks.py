@@ -188,6 +188,40 @@ def test_an_endpoint_that_is_gone_is_left_alone(
     assert sequences(endpoint, name) == [1, 2]
 
 
+def test_a_server_at_a_limit_ends_no_relay(tmp_path: Path, endpoint: Receiver) -> None:
+    """As with a full disk, the server refuses at the start, and later it does not."""
+    with (
+        server_process("--max-streams", "1") as server,
+        HullClient(server.address) as client,
+        client.watch("other", follow=True) as other,
+    ):
+        fence(client, "yard")
+        client.create_hull("other")
+        next(other)
+        with relay_process(server.address, tmp_path, "yard", "--to", endpoint.url, *PLAIN) as relay:
+            assert "max_streams" in relay.wait_for("no events from the server, trying again")["error"]
+            other.close()
+            wait_until(lambda: client.get_fence("yard").consumers)
+            pass_through(client, "yard", ["truck"])
+            wait_until(lambda: acknowledged(client, "yard") == 2)
+
+
+def test_a_dead_letter_that_cannot_be_kept_ends_no_relay(
+    client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path
+) -> None:
+    """The event is tried again until the receiver wants it, or the relay's disk has room."""
+    endpoint.answer = lambda request: (422 if '"truck"' in request.body else 200, {})
+    letters = tmp_path / "relay" / "dead-letters"
+    letters.parent.mkdir()
+    letters.write_text("no folder")
+    with relay_process(address, tmp_path, name, "--to", endpoint.url, *PLAIN, "--attempts", 1) as relay:
+        pass_through(client, name, ["truck"])
+        relay.wait_for("no dead letter can be kept")
+        letters.unlink()
+        wait_until(lambda: acknowledged(client, name) == 2)
+    assert len(list(letters.glob("*.json"))) == 2
+
+
 def test_a_stalled_endpoint_of_one_fence_holds_up_no_other(
     client: HullClient, address: str, name: str, endpoint: Receiver, tmp_path: Path
 ) -> None:

@@ -12,6 +12,7 @@ from dynhull_client import (
     DynhullError,
     FenceEvent,
     InvalidRequestError,
+    LimitExceededError,
     OutcomeUnknownError,
     UnavailableError,
 )
@@ -19,13 +20,16 @@ from dynhull_client import (
 from .dead_letters import StateFolder
 from .figures import Figures
 from .letters import Letter, letter
-from .target import GoneError, NotDeliveredError, RefusedError, Target
+from .target import GoneError, NotDeliveredError, ReaderGoneError, RefusedError, Target
 from .waiting import growing_pauses, unless
 
 LONGEST_RETRY_AFTER = 86400.0  # seconds
 FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER = 0.1, 5.0
 SECONDS_BETWEEN_LOOKS = 5.0
 SECONDS_BETWEEN_ACKNOWLEDGEMENTS = 0.2
+
+# What the server answers at some moment, as while its disk is full: it answers otherwise later.
+PASSING = (UnavailableError, DeadlineError, LimitExceededError, OutcomeUnknownError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +130,7 @@ class Lane:
                 return
             except DynhullError as error:
                 refused = isinstance(error, InvalidRequestError)  # no consumer can have this name, for example
-                if refused or (not self._begun and not isinstance(error, UnavailableError)):
+                if refused or (not self._begun and not isinstance(error, PASSING)):
                     raise
                 self._log.warning("no events from the server, trying again", error=str(error))
             await asyncio.sleep(next(pauses))
@@ -159,19 +163,28 @@ class Lane:
             try:
                 await self._target.deliver(letters)
             except GoneError as error:
-                self._folder.disable(self._fence, self._to, str(error))
                 self._log.error("the receiver is gone: no more deliveries", to=self._to, answer=str(error))
+                try:
+                    self._folder.disable(self._fence, self._to, str(error))
+                except (OSError, ValueError) as failure:
+                    self._log.error("not remembered: the next relay asks the receiver again", error=str(failure))
                 self.disabled = True
                 return
-            except NotDeliveredError as error:
+            except ReaderGoneError:
+                raise
+            except Exception as error:
                 self._figures.failed.labels(self._fence).inc()
                 refusals += isinstance(error, RefusedError)
-                if refusals >= self._patience.attempts:
-                    self._bury(letters, str(error), refusals)
+                if refusals >= self._patience.attempts and self._bury(letters, str(error), refusals):
                     break
-                pause = max(next(pauses), min(error.retry_after or 0.0, LONGEST_RETRY_AFTER))
+                asked = error.retry_after or 0.0 if isinstance(error, NotDeliveredError) else 0.0
+                pause = max(next(pauses), min(asked, LONGEST_RETRY_AFTER))
                 self._log.warning(
-                    "not delivered, trying again", id=letters[0].id, error=str(error), pause=round(pause, 3)
+                    "not delivered, trying again",
+                    id=letters[0].id,
+                    error=str(error),
+                    pause=round(pause, 3),
+                    exc_info=not isinstance(error, NotDeliveredError),  # nobody has foreseen it
                 )
                 await unless(self._stop, asyncio.sleep(pause))
             else:
@@ -183,11 +196,17 @@ class Lane:
         self._done = events[-1]
         self._news.set()
 
-    def _bury(self, letters: list[Letter], reason: str, attempts: int) -> None:
-        for each in letters:
-            self._folder.bury(each, self._target.place(each), reason, attempts)
+    def _bury(self, letters: list[Letter], reason: str, attempts: int) -> bool:
+        """Keep what is refused; returns whether it could be."""
+        try:
+            for each in letters:
+                self._folder.bury(each, self._target.place(each), reason, attempts)
+        except OSError as failure:
+            self._log.error("no dead letter can be kept", error=str(failure))
+            return False
         self._figures.dead.labels(self._fence).inc(len(letters))
         self._log.error("refused: a dead letter now", id=letters[0].id, letters=len(letters), error=reason)
+        return True
 
     async def _acknowledge(self) -> None:
         """Acknowledge what is delivered, now and then: each acknowledgement is a commit of the server."""
@@ -199,7 +218,7 @@ class Lane:
                 await self._acknowledge_now()
                 pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
                 await asyncio.sleep(SECONDS_BETWEEN_ACKNOWLEDGEMENTS)
-            except (UnavailableError, DeadlineError, OutcomeUnknownError) as error:
+            except PASSING as error:
                 self._log.warning("not acknowledged, trying again", error=str(error))
                 self._news.set()
                 await asyncio.sleep(next(pauses))

@@ -12,11 +12,11 @@ from urllib.parse import urlsplit
 import structlog
 
 from dynhull_cli.closed_pipe import when_pipe_closes
-from dynhull_client import AsyncHullClient, DeadlineError, FenceNotFoundError, UnavailableError
+from dynhull_client import AsyncHullClient, FenceNotFoundError
 
 from .dead_letters import DeadLetter, StateFolder, gone_key
 from .figures import Figures
-from .lane import FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER, Lane, Patience
+from .lane import FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER, PASSING, Lane, Patience
 from .target import GoneError, NotDeliveredError, ReaderGoneError, Target, check_places
 from .waiting import SERVER_AWAY, Absence, growing_pauses, unless
 
@@ -173,7 +173,7 @@ async def _require_fences(client: AsyncHullClient, server: str, fences: Sequence
                     await client.get_fence(each)
                 except FenceNotFoundError as error:
                     missing.append(error)
-        except (UnavailableError, DeadlineError) as error:
+        except PASSING as error:
             away.lasts(error)
             await asyncio.sleep(next(pauses))
             continue
