@@ -230,8 +230,9 @@ CODES: Mapping[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.Sta
 ENDED_IN_A_WRITE = "Internal error from Core"
 # What gRPC says of a call that this process has cancelled.
 CANCELLED_HERE = "Locally cancelled by application!", "Channel closed!"
-# What servers that stop say of calls that they have not begun (github.com/grpc/grpc/issues/41785). Of those that they
-# have begun, and do not complete in time, they say that all calls are cancelled, with the code UNAVAILABLE.
+# What servers say of calls that they have not begun: those that stop (github.com/grpc/grpc/issues/41785), and those
+# where too many wait. Of calls that they have begun, and do not complete in time, servers that stop say that all calls
+# are cancelled, with the code UNAVAILABLE.
 CANCELLED_UNBEGUN = "CANCELLED"
 # What gRPC says of calls for which there is no connection.
 NOT_CONNECTED = "failed to connect to all addresses", "DNS resolution failed"
@@ -244,8 +245,11 @@ def error_of(call: grpc.Call | grpc.RpcError, proxy: str | None = None) -> Dynhu
         return UnavailableError("the connection was lost while a message was sent", grpc.StatusCode.INTERNAL, "", {})
     status = rpc_status.from_call(call)
     if status is None and call.code() == grpc.StatusCode.CANCELLED and call.details() not in CANCELLED_HERE:
-        reason = "DRAINING" if call.details() == CANCELLED_UNBEGUN else ""
-        return UnavailableError("the server ended the call, as one that stops", grpc.StatusCode.UNAVAILABLE, reason, {})
+        if call.details() == CANCELLED_UNBEGUN:
+            why, reason = "has not begun the call: it stops, or too many wait there; try again", "DRAINING"
+        else:
+            why, reason = "ended the call, as one that stops", ""
+        return UnavailableError(f"the server {why}", grpc.StatusCode.UNAVAILABLE, reason, {})
     message = call.details()
     if proxy is not None and message is not None and message.startswith(NOT_CONNECTED):
         message += f" (through the proxy {proxy})"
