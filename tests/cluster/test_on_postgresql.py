@@ -8,6 +8,7 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
+from cases import with_all_cases
 from cluster import processes
 from command_line import dynhull
 from metrics import scrape
@@ -107,6 +108,23 @@ def test_workers_are_killed_and_have_their_partitions_again(url: str) -> None:
         server.process.kill()
     with server_process(*options) as server, HullClient(server.address) as client:
         assert [state(client, prefix) for prefix in prefixes] == before
+
+
+@with_all_cases
+@pytest.mark.one_process("a gateway answers for a worker that is away")
+def test_a_network_to_the_database_that_swallows_bytes(url: str) -> None:
+    given = conninfo_to_dict(url)
+    with proxy(f"{given['host']}/.s.PGSQL.5432") as between:
+        host, port = between.address.split(":")
+        where = f"host={host} port={port} dbname={given['dbname']} user={given['user']} tcp_user_timeout=1000"
+        with server_process("--journal", where, *QUIET) as server, HullClient(server.address) as client:
+            client.create_hull("a", keyed="str")
+            client.put("a", ["first"], [[1, 1]])
+            between.silence()
+            with client.writer("a", producer="p") as writer:  # repeats what was not committed
+                writer.put(keys=["second"], points=[[2, 2]])
+            found = client.get_hull("a")
+            assert (found.revision, found.info.points) == (2, 2)
 
 
 @pytest.mark.one_process("a gateway answers for a worker that is away")

@@ -1,9 +1,14 @@
 """Connections to a PostgreSQL database, and its errors as those of the storage."""
 
 import logging
+import os
+import socket
+import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, LiteralString
+from weakref import WeakSet
 
 import psycopg
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
@@ -12,8 +17,6 @@ from dynhull_server.storage.port import FormatError, StorageError
 from dynhull_server.storage.rows.tables import UnreadableError
 
 from .refusals import meaning_of
-
-Connection = psycopg.Connection[tuple[Any, ...]]
 
 SCHEMA = "dynhull"
 SCHEMES = "postgresql", "postgres"
@@ -48,6 +51,27 @@ DEFAULTS = {
 logging.getLogger("psycopg").setLevel(logging.ERROR)
 
 
+class Connection(psycopg.Connection[tuple[Any, ...]]):
+    """A connection that other threads may end while this one waits for an answer."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._since = time.monotonic()
+        # A descriptor of its own: that of the connection may be closed meanwhile, and be another file's.
+        self._socket = socket.socket(fileno=os.dup(self.fileno()))
+
+    def close(self) -> None:
+        """Close it."""
+        super().close()
+        self._socket.close()
+
+    def end_if_older(self, seconds: float) -> None:
+        """Have whoever waits for an answer get an error, unless the connection is younger."""
+        if time.monotonic() > self._since + seconds:
+            with suppress(OSError):  # it has ended
+                self._socket.shutdown(socket.SHUT_RDWR)
+
+
 class Database:
     """A PostgreSQL database.
 
@@ -68,6 +92,9 @@ class Database:
             raise ValueError(f"no address of a PostgreSQL database: {_words(error)}; {EXAMPLES}") from None
         given["options"] = " ".join([*filter(None, [given.get("options")]), *(f"-c {each}" for each in SETTINGS)])
         self._address = make_conninfo(**given)
+        self._silence = int(given["tcp_user_timeout"]) / 1000
+        self._open: WeakSet[Connection] = WeakSet()
+        self._adding = threading.Lock()  # to them
         where = f"{given.get('host') or 'localhost'}{':' + str(given['port']) if given.get('port') else ''}"
         self._words = f"the database {given.get('dbname') or given.get('user') or 'of the user'} on {where}"
 
@@ -83,9 +110,13 @@ class Database:
             FormatError: the server is too old, the database has another encoding than UTF-8, or a pooler is in between.
         """
         try:
-            connection = psycopg.connect(self._address, autocommit=True, application_name=name, client_encoding="utf8")
+            connection = Connection.connect(
+                self._address, autocommit=True, application_name=name, client_encoding="utf8"
+            )
         except psycopg.Error as error:
             raise self._refused(error) from error
+        with self._adding:
+            self._open.add(connection)
         try:
             if connection.info.server_version < OLDEST_VERSION * 10_000:
                 version = connection.info.parameter_status("server_version")
@@ -105,6 +136,18 @@ class Database:
     def _refused(self, error: psycopg.Error) -> StorageError:
         message = f"cannot connect to {self}: {_words(error)}"
         return StorageError(message, for_callers=FOR_CALLERS, meaning=meaning_of(error))
+
+    def end_silent(self, seconds: float) -> None:
+        """End the connections, if a small question has had no answer for so long; the next ones are others.
+
+        The operating system ends those whose data nobody acknowledges. Behind a proxy, somebody does. How long is too
+        long says `tcp_user_timeout`, for both.
+        """
+        if seconds >= self._silence:
+            with self._adding:
+                silent = list(self._open)
+            for each in silent:
+                each.end_if_older(self._silence)
 
     def _require_own_session(self, connection: Connection) -> None:
         """Refuse a pooler, which gives the connection a process of PostgreSQL for a while, with settings of its own."""

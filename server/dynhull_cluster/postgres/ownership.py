@@ -97,6 +97,7 @@ class Ownership:
         self._lost = lost
         self._worker = worker or this_worker()
         self._until = 0.0
+        self._asked: float | None = None  # when the question was asked that has no answer yet
         self._turn = threading.Lock()  # of the connection
         self._connection: Connection | None = None
         self._stop = threading.Event()
@@ -139,6 +140,7 @@ class Ownership:
             time.sleep(LOOK)
         self._thread = threading.Thread(target=self._keep, name="lease", daemon=True)
         self._thread.start()
+        threading.Thread(target=self._watch, name="lease watch", daemon=True).start()
 
     def announce(self, address: str) -> None:
         """Say where callers reach the owner from now on.
@@ -270,11 +272,19 @@ class Ownership:
             self._until = 0.0
             self._lost(words(error))
 
+    def _watch(self) -> None:
+        """End connections to a database that is silent until `release`: who waits for an answer cannot."""
+        while not self._stop.wait(RENEWAL):
+            asked = self._asked
+            if asked is not None:
+                self._database.end_silent(_now() - asked)
+
     @contextmanager
     def _working(self) -> Iterator[Connection]:
         """The connection; after an error, the next one is another."""
         try:
             with as_storage_errors():
+                self._asked = _now()
                 if self._connection is None:
                     self._connection = self._database.connect(f"dynhull lease {self._partition}")
                     self._show(self._connection)
@@ -282,6 +292,8 @@ class Ownership:
         except BaseException:
             self._disconnect()
             raise
+        finally:
+            self._asked = None
 
     def _show(self, connection: Connection) -> None:
         """Show that the owner is connected, to those who are connected to the same database."""
