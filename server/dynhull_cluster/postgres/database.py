@@ -92,7 +92,7 @@ class Database:
             raise ValueError(f"no address of a PostgreSQL database: {_words(error)}; {EXAMPLES}") from None
         given["options"] = " ".join([*filter(None, [given.get("options")]), *(f"-c {each}" for each in SETTINGS)])
         self._address = make_conninfo(**given)
-        self._silence = int(given["tcp_user_timeout"]) / 1000
+        self._silence = (int(given["tcp_user_timeout"]) or UNACKNOWLEDGED_MS) / 1000
         self._open: WeakSet[Connection] = WeakSet()
         self._adding = threading.Lock()  # to them
         where = f"{given.get('host') or 'localhost'}{':' + str(given['port']) if given.get('port') else ''}"
