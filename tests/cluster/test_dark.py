@@ -19,7 +19,7 @@ from dynhull_cluster.machines.board import Owner, Tables
 from dynhull_cluster.worker_link import WorkerLink
 from dynhull_server.rpc.status import RelayedError
 
-PARTITION, GREETING = 3, b"3/secret"
+PARTITION, GREETING = 3, b"3/a/secret"
 READ, WRITE = "/dynhull.v1.HullService/GetHull", "/dynhull.v1.HullService/DeleteHull"
 CALL: Any = SimpleNamespace(owner="owner", caller=SimpleNamespace(key=""))
 
@@ -28,7 +28,7 @@ CALL: Any = SimpleNamespace(owner="owner", caller=SimpleNamespace(key=""))
 async def linked(port: int, ping_interval: float) -> AsyncIterator[WorkerLink]:
     """A gateway's link to a worker behind a network."""
     ways = Addresses("secret", None, ping_interval)
-    ways.learn(Tables({PARTITION: Owner(1, "a", "", f"127.0.0.1 1 {port}", "now", False)}, {}, {}, {}))
+    ways.learn(Tables({PARTITION: Owner(1, "a", "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}))
     link = WorkerLink(PARTITION, ways, (), lambda: None)
     running = asyncio.create_task(link.run())
     try:
