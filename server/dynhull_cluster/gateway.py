@@ -10,7 +10,7 @@ import grpc
 from google.protobuf.descriptor import MethodDescriptor, ServiceDescriptor
 from grpc_health.v1 import health_pb2
 
-from dynhull_server.app import LAST_STATUSES, SCRUB, SERVICES, end_process, token_file
+from dynhull_server.app import SCRUB, SERVICES, end_process, token_file
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
 from dynhull_server.entrance import PublicEntrance, grpc_server
@@ -43,6 +43,9 @@ WORKER = "dynhull.v1.worker"
 AWAY_SECONDS = 30.0
 # Seconds that a gateway looks for all workers before it serves some.
 FIRST_SECONDS = 5.0
+# Seconds at a shutdown for clients to hear of it. What they send before is refused as not begun, so that they send it
+# elsewhere; when gRPC ends a connection before that, they cannot know. Others serve meanwhile.
+GOODBYES = 5.0
 WHOLE = ""
 
 SERVING = health_pb2.HealthCheckResponse.SERVING
@@ -127,9 +130,9 @@ class Gateway:
             log.info("draining")
         self._health.stop()
         # At once, so that callers connect to another gateway, and not when the last call has ended.
-        stopping = asyncio.create_task(self._server.stop(self._settings.grace + LAST_STATUSES))
+        stopping = asyncio.create_task(self._server.stop(self._settings.grace + GOODBYES))
         await self._calls.drain(self._settings.grace)
-        await self._server.stop(LAST_STATUSES)
+        await self._server.stop(GOODBYES)
         await stopping
         await self._supervisor.stop()
         for link in self._links:
