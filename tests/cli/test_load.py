@@ -1,10 +1,13 @@
 """`dynhull load`: the hull gets every point of the file once, after any failure on the way."""
 
+import ctypes
 import hashlib
 import json
 import signal
 import subprocess
+import sys
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -265,7 +268,22 @@ def test_a_server_that_goes_and_comes_back(tmp_path):
             assert client.get_hull("a").info.points == 32_768
 
 
-def test_an_interruption(served, name):
+def interrupt_process(process):
+    process.send_signal(signal.SIGINT)
+
+
+def interrupt_another_thread(process):
+    """As if the signal had come between the last look at signals and a wait for input, which it does not end then."""
+    threads = {int(each.name) for each in Path(f"/proc/{process.pid}/task").iterdir()} - {process.pid}
+    assert ctypes.CDLL(None).tgkill(process.pid, min(threads), signal.SIGINT) == 0
+
+
+HAS_TGKILL = sys.platform == "linux" and hasattr(ctypes.CDLL(None), "tgkill")
+OTHER = pytest.param(interrupt_another_thread, marks=pytest.mark.skipif(not HAS_TGKILL, reason="needs tgkill of Linux"))
+
+
+@pytest.mark.parametrize("interrupt", [interrupt_process, OTHER])
+def test_an_interruption(served, name, interrupt):
     command = [COMMAND, "load", name, "-", "--producer", "p"]
     with (
         HullClient(served) as client,
@@ -274,7 +292,7 @@ def test_an_interruption(served, name):
         loading.stdin.write("x,y\n" + "1,2\n" * 120_000)
         loading.stdin.flush()
         wait_until(lambda: any(info.revision >= 1 for info in client.list_hulls(name)))
-        loading.send_signal(signal.SIGINT)
+        interrupt(loading)
         said = loading.stderr.read()
         assert loading.wait() == 130
     assert "--resume loads the rest" in said

@@ -16,6 +16,7 @@ from ..columns import LONGITUDE_LATITUDE, are_degrees
 from ..csv_table import UTF16_MARKS
 from ..peek import peek
 from .chunks import Chunks
+from .interruptible import InterruptibleInput, can_be_interrupted
 from .options import STANDARD_INPUT, Format, Options
 from .places import places_only
 
@@ -134,11 +135,15 @@ def open_source(name: str, kind: Format | None, options: Options, *, integer_key
     try:
         if name == STANDARD_INPUT:
             raw: Any = getattr(sys.stdin.buffer, "raw", sys.stdin.buffer)
-            stdin = io.BufferedReader(raw)
-            try:
-                yield _source("standard input", stdin, None, kind, options, integer_keys)
-            finally:
-                stdin.detach()
+            if can_be_interrupted(raw):
+                with io.BufferedReader(InterruptibleInput(raw)) as stdin:
+                    yield _source("standard input", stdin, None, kind, options, integer_keys)
+            else:
+                stdin = io.BufferedReader(raw)
+                try:
+                    yield _source("standard input", stdin, None, kind, options, integer_keys)
+                finally:
+                    stdin.detach()
         else:
             path = Path(name)
             with path.open("rb") as file:
