@@ -3,8 +3,8 @@
     python tests/robustness/cluster/planned.py --changes 300 --seed 1 [--restarts]
 
 Real servers share a real PostgreSQL. Partitions are moved by hand, machines join and leave, workers give up what they
-have, and with --restarts all processes of a machine are restarted one at a time. These end gateways, too, where gRPC
-itself may lose a call of the last moment ("Stream removed (Socket closed (GOAWAY received"), about once in 60.
+have, and with --restarts all processes of a machine are restarted one at a time. These end gateways, too: gRPC loses
+a call ("Stream removed (Socket closed (GOAWAY received") of a client that has not heard of it five seconds later.
 
 Callers of every kind (steady_callers.py) call a machine that stays, with the defaults of the client. In the end there
 is a table, and no error.
