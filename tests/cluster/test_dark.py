@@ -16,10 +16,11 @@ from dynhull_cluster.frame_server import FrameServer
 from dynhull_cluster.frames import VERSION, Frames, Kind
 from dynhull_cluster.machines.addresses import Addresses
 from dynhull_cluster.machines.board import Owner, Tables
+from dynhull_cluster.machines.entrance import proof_of
 from dynhull_cluster.worker_link import WorkerLink
 from dynhull_server.rpc.status import RelayedError
 
-PARTITION, GREETING = 3, b"3/a/secret"
+PARTITION, WORKER, SECRET = 3, "north-1/0", "secret"
 READ, WRITE = "/dynhull.v1.HullService/GetHull", "/dynhull.v1.HullService/DeleteHull"
 CALL: Any = SimpleNamespace(owner="owner", caller=SimpleNamespace(key=""))
 
@@ -27,8 +28,8 @@ CALL: Any = SimpleNamespace(owner="owner", caller=SimpleNamespace(key=""))
 @asynccontextmanager
 async def linked(port: int, ping_interval: float) -> AsyncIterator[WorkerLink]:
     """A gateway's link to a worker behind a network."""
-    ways = Addresses("secret", None, ping_interval)
-    ways.learn(Tables({PARTITION: Owner(1, "a", "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}))
+    ways = Addresses(SECRET, None, ping_interval)
+    ways.learn(Tables({PARTITION: Owner(1, WORKER, "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}))
     link = WorkerLink(PARTITION, ways, (), lambda: None)
     running = asyncio.create_task(link.run())
     try:
@@ -56,21 +57,26 @@ def test_a_gateway_goes_on_by_another_connection() -> None:
         service = grpc.method_handlers_generic_handler(
             "dynhull.v1.HullService", {"GetHull": handler, "DeleteHull": handler}
         )
-        server = FrameServer([service], {}, GREETING)
+        server = FrameServer([service], {}, proof_of(PARTITION, WORKER, SECRET).encode())
         bound = socket.create_server(("127.0.0.1", 0))
         await server.listen_on(bound, None)
-        with proxy(f"127.0.0.1:{bound.getsockname()[1]}") as way:
-            async with linked(port_of(way), 0.4) as link:
-                await until(lambda: link.present)
-                swallowed = asyncio.create_task(link.ask(WRITE, CALL, b""))
-                await asyncio.sleep(0)
-                way.silence()
-                with pytest.raises(RelayedError, match="the outcome is unknown"):
-                    await swallowed
-                may_answer.set()
-                assert await link.ask(READ, CALL, b"") == b"answer"
-        server.say_goodbye()
-        await server.close()
+        try:
+            with proxy(f"127.0.0.1:{bound.getsockname()[1]}") as way:
+                await over(way)
+        finally:
+            server.say_goodbye()
+            await server.close()
+
+    async def over(way: Proxy) -> None:
+        async with linked(port_of(way), 0.4) as link:
+            await until(lambda: link.present)
+            swallowed = asyncio.create_task(link.ask(WRITE, CALL, b""))
+            await asyncio.sleep(0)
+            way.silence()
+            with pytest.raises(RelayedError, match="the outcome is unknown"):
+                await swallowed
+            may_answer.set()
+            assert await link.ask(READ, CALL, b"") == b"answer"
 
     asyncio.run(run())
 
@@ -88,8 +94,7 @@ class Earlier(Frames):
 def test_a_worker_that_knows_no_pings_is_not_lost() -> None:
     async def run() -> None:
         listening = await asyncio.get_running_loop().create_server(Earlier, "127.0.0.1", 0)
-        async with linked(listening.sockets[0].getsockname()[1], 0.05) as link:
+        async with listening, linked(listening.sockets[0].getsockname()[1], 0.05) as link:
             assert await link.ask(WRITE, CALL, b"") == b"late"
-        listening.close()
 
     asyncio.run(run())
