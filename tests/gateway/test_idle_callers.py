@@ -25,12 +25,14 @@ def strict(address: str, *options: str) -> Iterator[tuple[Gateway, str]]:
         yield gateway, f"127.0.0.1:{port}"
 
 
-def connect(gateway: Gateway) -> socket.socket:
+def connect(gateway: Gateway, request: bytes = b"") -> socket.socket:
+    """A connection of a caller that sends this at once."""
     connection = socket.socket()
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     connection.settimeout(PATIENCE)
     place = urlsplit(gateway.url)
     connection.connect((place.hostname, place.port))
+    connection.sendall(request)
     return connection
 
 
@@ -40,12 +42,13 @@ def rest(connection: socket.socket) -> bytes:
 
 
 def test_half_requests_end(address: str) -> None:
-    with strict(address, "--head-timeout", "500ms") as (gateway, metrics), ExitStack() as stack:
-        half, silent, second = ([stack.enter_context(closing(connect(gateway))) for _ in range(CALLERS)] for _ in "123")
-        for connection in half:
-            connection.sendall(b"GET / HTTP/1.1\r\nHost: local")
-        for connection in second:  # the first request of a connection is whole
-            connection.sendall(b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\nGET / HTTP/1.1\r\n")
+    begins = b"GET / HTTP/1.1\r\nHost: local"
+    whole = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    with strict(address, "--head-timeout", "2s") as (gateway, metrics), ExitStack() as stack:
+        half, silent, second = (
+            [stack.enter_context(closing(connect(gateway, sent))) for _ in range(CALLERS)]
+            for sent in (begins, b"", whole + begins)
+        )
         for connection in half:
             head, _, body = rest(connection).partition(b"\r\n\r\n")
             assert head.startswith(b"HTTP/1.1 408 ")
@@ -69,8 +72,8 @@ def test_readers_that_do_not_read_end(address: str, name: str) -> None:
         client.apply(name, insert=[[i, i * i] for i in range(300_000)])  # 6 MB as JSON: more than sockets hold
         deaf = [stream] * 5 + [f"/hulls/{name}"]
         for path in deaf:
-            connection = stack.enter_context(closing(connect(gateway)))
-            connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            request = f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
+            stack.enter_context(closing(connect(gateway, request)))
         other = stack.enter_context(closing(Events(gateway, stream)))
         assert len(other.next()[1]["vertices"]) == 300_000
         wait_until(lambda: scrape(metrics)[DEAF] >= len(deaf))
