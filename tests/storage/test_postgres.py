@@ -176,7 +176,7 @@ def test_a_successor_ends_the_transaction_of_a_server_that_was_stopped(url):
     query(url, TAKEN_AND_LEFT)
     second, _ = opened(url)
     append(second, LAST + 1, LAST + 1)
-    with pytest.raises(Exception, match="terminat"):
+    with closing(stopped), pytest.raises(Exception, match="terminat"):
         stopped.execute("COMMIT")
     wait_until(lambda: heard)
     first.close()
