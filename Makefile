@@ -155,7 +155,7 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	$(BIN)/python tests/robustness/cluster/planned.py --changes 300
 
 cluster: .venv/.test  ## all tests of several processes and machines; `make test` runs the cheaper ones
-	CLUSTER_CASES=all $(BIN)/pytest tests/cluster -n 4
+	CLUSTER_CASES=all $(BIN)/pytest tests/cluster tests/robustness/cluster -n 4
 
 ray: .venv/.test  ## all tests of Ray: Datasets, and as a launcher of servers; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray

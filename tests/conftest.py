@@ -23,7 +23,7 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
     print_blob=True,
     derandomize=True,
-    max_examples=50,
+    max_examples=30,
 )
 settings.register_profile("properties", settings.get_profile("dynhull"), derandomize=False, max_examples=1000)
 # Each mutant gets the same examples: none that another one has left in the database, and no time spent on shrinking.

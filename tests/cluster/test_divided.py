@@ -287,6 +287,7 @@ def test_killed_workers_lose_and_double_nothing(tmp_path: Path) -> None:
         assert client.verify("fleet").equal
 
 
+@with_all_cases
 @pytest.mark.one_process("the rows of one database are counted")
 def test_logs_of_shards_do_not_grow_for_ever(tmp_path: Path) -> None:
     with (
@@ -590,7 +591,7 @@ def in_order(points: np.ndarray) -> list[list[float]]:
 HERDS = "north/a", "cows/a"
 
 
-@pytest.mark.parametrize("options", [(), WORKERS], ids=["process", "workers"])
+@pytest.mark.parametrize("options", [pytest.param((), marks=with_all_cases), WORKERS], ids=["process", "workers"])
 def test_copies_beside_writes_are_of_one_revision(
     tmp_path: Path, options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:

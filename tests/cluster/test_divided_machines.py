@@ -159,6 +159,7 @@ def test_killed_workers_lose_and_double_nothing(fleet: Fleet) -> None:
     fleet.check()
 
 
+@with_all_cases
 def test_owners_that_were_stopped_cannot_disturb_those_that_replaced_them(fleet: Fleet) -> None:
     """The worker with the root, and one with shards alone: each goes on after others have all that it had."""
     root_alone = fleet.owners()[fleet.root]

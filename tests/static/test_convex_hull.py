@@ -13,7 +13,7 @@ from inputs import CIRCLE, points
 from dynhull import KERNEL, DynamicHull, convex_hull, static
 
 # Large enough for the filter, and for two threads, to come by themselves; Python alone has neither.
-LARGE, HUGE = (40_000, 1_000_000) if KERNEL == "cpp" else (2_000, 5_000)
+LARGE, HUGE = (15_000, 500_000) if KERNEL == "cpp" else (2_000, 5_000)
 
 every = pytest.mark.parametrize("hull_of", ONE_SHOT.values(), ids=ONE_SHOT.keys())
 

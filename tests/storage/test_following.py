@@ -162,7 +162,7 @@ def loaded(contents: Any) -> list[int]:
     return [row.number for row in contents.hulls if row.settings.shard is None]
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_what_is_read_ahead_is_what_is_there(url, seed):
     fenced = seed % 2 == 1
     owner = Owner(url, seed)

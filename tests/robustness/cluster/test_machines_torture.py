@@ -1,4 +1,4 @@
-"""A short run of the torture; `make robustness-cluster` has the long one."""
+"""A short run of the torture for `make cluster`; `make robustness-cluster` has the long one."""
 
 import os
 import re
@@ -7,10 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from cases import with_all_cases
 from postgresql import postgres_program
 
 
-@pytest.mark.long
+@with_all_cases
 @pytest.mark.skipif(os.geteuid() != 0, reason="PostgreSQL refuses to run as the root that a namespace makes of others")
 def test_no_promise_is_broken():
     postgres_program("postgres")  # else the test is skipped
