@@ -74,6 +74,30 @@ def test_the_flights_live_until_ctrl_c(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_signal_ends_the_wait_whenever_it_comes() -> None:
+    """At each line that the wait runs through."""
+    program = """
+import signal, sys
+from dynhull_cli.demo.live import stopped_by_signals
+
+for line in range(1, 200):
+    with stopped_by_signals() as stop:
+        left = line
+        def trace(frame, event, argument):
+            global left
+            left -= 1
+            if left == 0:
+                signal.raise_signal(signal.SIGINT)
+            return trace
+        sys.settrace(trace)
+        stop.wait(0)
+        sys.settrace(None)
+        assert stop.wait(0) or left > 0, line
+"""
+    done = servers.finished([sys.executable, "-c", program])
+    assert done.returncode == 0, done.stderr
+
+
 def test_the_processes_end_with_a_demo_that_is_killed() -> None:
     program = (
         "import sys; from dynhull_cli.demo.server import SERVE, running\n"

@@ -1,10 +1,10 @@
 """The day of flights live: a server with its gateway and dashboard, until they are ended."""
 
 import signal
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from queue import Empty, SimpleQueue
 from urllib.parse import urlencode
 
 from rich.console import Console
@@ -31,7 +31,7 @@ def live(console: Console, scene: Scene, speed: float) -> None:
     Raises:
         RuntimeError: one of the processes did not start, or has ended.
     """
-    with _stopped_by_signals() as stop, running("server", *SERVE, "--metrics-port", "0", lines=2, apart=True) as server:
+    with stopped_by_signals() as stop, running("server", *SERVE, "--metrics-port", "0", lines=2, apart=True) as server:
         address, metrics = server.addresses
         where = "--port", "0", "--address", address
         with (
@@ -39,7 +39,7 @@ def live(console: Console, scene: Scene, speed: float) -> None:
             running("dashboard", "dynhull_cli", "dashboard", *where, "--metrics", metrics, apart=True) as dashboard,
             HullClient(address) as hulls,
         ):
-            if stop.is_set():
+            if stop.wait(0):
                 return
             _create(hulls, scene)
             query = urlencode([("hull", scene.hull_name), *(("fence", name) for name in scene.circles)])
@@ -54,12 +54,35 @@ def live(console: Console, scene: Scene, speed: float) -> None:
             _replay(hulls, scene, MINUTE / speed, stop, (server, gateway, dashboard))
 
 
+class Stop:
+    """Whether a signal has come. A handler may note one at any moment of a wait.
+
+    That of a `threading.Event` would wait for a lock that the very wait has taken, which it interrupts.
+    """
+
+    def __init__(self) -> None:
+        self._come: SimpleQueue[None] = SimpleQueue()
+
+    def note(self, *_: object) -> None:
+        """Note a signal: a handler of signals."""
+        self._come.put(None)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for one; whether one has come."""
+        try:
+            self._come.get(timeout=max(0.0, seconds))
+        except Empty:
+            return False
+        self._come.put(None)
+        return True
+
+
 @contextmanager
-def _stopped_by_signals() -> Iterator[threading.Event]:
-    """An event that is set by the signals that would end the process."""
-    stop = threading.Event()
+def stopped_by_signals() -> Iterator[Stop]:
+    """Notes the signals that would end the process."""
+    stop = Stop()
     numbers = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
-    before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+    before = [signal.signal(number, stop.note) for number in numbers]
     try:
         yield stop
     finally:
@@ -73,9 +96,7 @@ def _create(client: HullClient, scene: Scene) -> None:
         client.create_fence(name, Circle(*circle), scene.hull_name)
 
 
-def _replay(
-    client: HullClient, scene: Scene, pause: float, stop: threading.Event, processes: tuple[Process, ...]
-) -> None:
+def _replay(client: HullClient, scene: Scene, pause: float, stop: Stop, processes: tuple[Process, ...]) -> None:
     there: set[str] = set()
     due = time.monotonic()
     for frame in _forever(scene):
