@@ -323,6 +323,13 @@ def test_the_picture_is_moved_by_keys_and_by_hand(browser: Browser, url: str, hu
         assert place_of(page, 4, 4) == pytest.approx([begun[0] - 50, begun[1] + 20], abs=5)
         page.get_by_role("button", name="Show all").click()
         wait_until(lambda: place_of(page, 4, 4) == pytest.approx(begun))
+        picture.press("+")
+        # A key that comes before all is drawn again moves what is shown then.
+        page.evaluate("""() => {
+            document.querySelector(".map button[name=all]").click()
+            picture.element.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowRight", bubbles: true}))
+        }""")
+        assert place_of(page, 4, 4) == pytest.approx([begun[0] - 60, begun[1]])
 
 
 def test_the_picture_is_paused_and_shows_what_was_before(

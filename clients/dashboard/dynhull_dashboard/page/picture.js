@@ -100,6 +100,7 @@ class Picture {
     this.draw_soon()
   }
   move(change) {
+    this.choose_view()  // "Show all" may be asked for, and not drawn yet
     this.following = false
     this.moving = true
     clearTimeout(this.resting)
