@@ -56,7 +56,7 @@ def burst(address, token, calls):
 
 
 def resets(address, _token, calls):
-    """The seconds in which so many calls are begun and reset."""
+    """The seconds that it takes to begin and reset this number of calls."""
     begun = time.perf_counter()
     with grpc.insecure_channel(address) as channel:
         method = channel.unary_unary(GET_HULL)

@@ -48,7 +48,7 @@ class AskingFrames(Frames):
             del self._waiting[VERSION]
 
     def ping(self, seconds: float) -> None:
-        """Ask the worker now and every so many seconds whether it is there; if it is not, the connection is lost."""
+        """Ask the worker whether it is there, now and at this interval; without an answer, the connection is lost."""
         if not self._heard:
             self.abort()
         elif self._transport is not None and self._answers_pings:

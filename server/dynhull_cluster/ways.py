@@ -61,7 +61,7 @@ class Ways(Protocol):
 
 
 def pings(seconds: float) -> list[tuple[str, int]]:
-    """The options of channels that ping so often, and are lost when a ping has no answer for as long."""
+    """The options of channels that ping at this interval, and are lost when a ping has no answer for as long."""
     milliseconds = math.ceil(seconds * 1000)
     return [
         ("grpc.keepalive_time_ms", milliseconds),

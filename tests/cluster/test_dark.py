@@ -2,15 +2,15 @@
 
 import asyncio
 import socket
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager
 from types import SimpleNamespace
 from typing import Any
 
 import grpc
 import pytest
-from patience import PATIENCE, until
+from patience import until
 from proxy import Proxy, proxy
+from worker_links import running
 
 from dynhull_cluster.frame_server import FrameServer
 from dynhull_cluster.frames import VERSION, Frames, Kind
@@ -25,20 +25,11 @@ READ, WRITE = "/dynhull.v1.HullService/GetHull", "/dynhull.v1.HullService/Delete
 CALL: Any = SimpleNamespace(owner="owner", caller=SimpleNamespace(key=""))
 
 
-@asynccontextmanager
-async def linked(port: int, ping_interval: float) -> AsyncIterator[WorkerLink]:
+def linked(port: int, ping_interval: float) -> AbstractAsyncContextManager[WorkerLink]:
     """A gateway's link to a worker behind a network."""
     ways = Addresses(SECRET, None, ping_interval)
     ways.learn(Tables({PARTITION: Owner(1, WORKER, "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}))
-    link = WorkerLink(PARTITION, ways, (), lambda: None)
-    running = asyncio.create_task(link.run())
-    try:
-        async with asyncio.timeout(PATIENCE):
-            yield link
-    finally:
-        running.cancel()
-        await asyncio.wait([running])
-        await link.close()
+    return running(WorkerLink(PARTITION, ways, (), lambda: None))
 
 
 def port_of(way: Proxy) -> int:

@@ -2,8 +2,7 @@
 
 import asyncio
 import socket
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import grpc
 import pytest
 from patience import PATIENCE
+from worker_links import running
 
 from dynhull_cluster import worker_link
 from dynhull_cluster.divisions.peers import PeerAwayError, Peers, peer_handler
@@ -64,20 +64,11 @@ class Worker(Frames):
 workers: asyncio.Queue[Worker]
 
 
-@asynccontextmanager
-async def linked(folder: Path) -> AsyncIterator[WorkerLink]:
+def linked(folder: Path) -> AbstractAsyncContextManager[WorkerLink]:
     """A gateway's link to the workers at a socket."""
     global workers
     workers = asyncio.Queue()
-    link = WorkerLink(0, Sockets(folder), (), lambda: None)
-    running = asyncio.create_task(link.run())
-    try:
-        async with asyncio.timeout(PATIENCE):
-            yield link
-    finally:
-        running.cancel()
-        await asyncio.wait([running])
-        await link.close()
+    return running(WorkerLink(0, Sockets(folder), (), lambda: None))
 
 
 async def started(folder: Path) -> tuple[asyncio.Server, Worker]:

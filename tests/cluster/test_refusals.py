@@ -7,10 +7,9 @@ from typing import NoReturn
 import psycopg
 import pytest
 from forked import COMMAND
-from logged_process import Logged, logged_process
+from logged_process import Logged, logged_process, require_service
 from postgresql import FAST, PostgreSQL, postgresql
 
-from dynhull_client import HullClient
 from dynhull_cluster.postgres.refusals import meaning_of
 from dynhull_server.storage.refusals import Meaning
 
@@ -30,14 +29,6 @@ def serving(url: str, *options: str) -> Iterator[Logged]:
         yield logged
 
 
-def require_serving(logged: Logged) -> None:
-    assert logged.process.stdout is not None
-    first = logged.process.stdout.readline()
-    assert first.startswith("dynhull serving on "), logged.lines()
-    with HullClient(first.split()[-1]) as client:
-        client.create_hull("a")
-
-
 def test_a_database_that_recovers_is_waited_for(server: PostgreSQL) -> None:
     urls = [server.new_database() for _ in SHAPES]
     server.kill()
@@ -51,7 +42,7 @@ def test_a_database_that_recovers_is_waited_for(server: PostgreSQL) -> None:
                 assert "the database system is " in said["reason"]
                 assert said["pause"] > 0
         for logged in started:
-            require_serving(logged)
+            require_service(logged)
 
 
 def test_a_server_that_waits_ends_when_it_is_told_to(server: PostgreSQL) -> None:
@@ -65,7 +56,7 @@ def test_connections_are_waited_for(server: PostgreSQL) -> None:
         with connections(server):
             logged = stack.enter_context(serving(url))
             assert "too many clients already" in logged.wait_for("cannot serve yet")["reason"]
-        require_serving(logged)
+        require_service(logged)
 
 
 @contextmanager

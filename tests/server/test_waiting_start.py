@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 from forked import COMMAND
-from logged_process import Logged, logged_process
+from logged_process import logged_process, require_service
 
-from dynhull_client import HullClient
 from dynhull_server.starting import FIRST_PAUSE, started
 from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.refusals import Meaning
@@ -19,14 +18,6 @@ from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 SERVE = (COMMAND, "serve", "--port", "0", "--log-format", "json", "--scrub-cpu", "0", "--data")
 FULL_DISK = 'mount -t tmpfs -o size=1m none "$0" && head -c 2M /dev/zero > "$0/ballast"; exec "$@"'
-
-
-def require_serving(logged: Logged) -> None:
-    assert logged.process.stdout is not None
-    first = logged.process.stdout.readline()
-    assert first.startswith("dynhull serving on "), logged.lines()
-    with HullClient(first.split()[-1]) as client:
-        client.create_hull("a")
 
 
 def test_a_database_that_another_program_has_locked(tmp_path: Path) -> None:
@@ -38,7 +29,7 @@ def test_a_database_that_another_program_has_locked(tmp_path: Path) -> None:
         with logged_process([*SERVE, str(tmp_path)]) as logged:
             assert "database is locked" in logged.wait_for("cannot serve yet")["reason"]
             other.execute("ROLLBACK")
-            require_serving(logged)
+            require_service(logged)
 
 
 def test_a_disk_that_is_full(tmp_path: Path) -> None:
@@ -46,7 +37,7 @@ def test_a_disk_that_is_full(tmp_path: Path) -> None:
     with logged_process([*wrap, *SERVE, str(tmp_path / "data")]) as logged:
         logged.wait_for("cannot serve yet")
         Path(f"/proc/{logged.process.pid}/root{tmp_path}/ballast").unlink()
-        require_serving(logged)
+        require_service(logged)
 
 
 PASSES, DOUBTFUL, FINAL = Meaning

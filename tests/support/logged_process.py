@@ -11,6 +11,8 @@ from typing import IO, Any
 from forked import Process
 from patience import PATIENCE, wait_until
 
+from dynhull_client import HullClient
+
 
 class Logged:
     def __init__(self, process: subprocess.Popen[str], errors: IO[str]) -> None:
@@ -46,3 +48,12 @@ def logged_process(command: Sequence[str], *, killed: bool = False, code: int = 
             process.terminate()
             ended = process.wait(PATIENCE)
             assert ended == (-signal.SIGKILL if killed else code), f"{ended}: {''.join(logged.lines())}"
+
+
+def require_service(logged: Logged) -> None:
+    """Wait until `dynhull serve` says that it serves, and have it take a hull."""
+    assert logged.process.stdout is not None
+    first = logged.process.stdout.readline()
+    assert first.startswith("dynhull serving on "), logged.lines()
+    with HullClient(first.split()[-1]) as client:
+        client.create_hull("a")

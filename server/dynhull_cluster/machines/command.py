@@ -30,12 +30,13 @@ def status(journal: JOURNAL) -> None:
         tables = read(connection)
     served = Counter(owner.worker for owner in tables.owners.values() if not owner.free)
     typer.echo(f"{count} partitions")
+    apart = tables.apart()
     alone = {owner.worker for owner in tables.owners.values() if owner.alone and owner.connected}
     for worker in sorted({*tables.workers, *served}):
         present = tables.workers.get(worker)
         if worker in alone:
             state = "serves, without --cluster"
-        elif worker in tables.apart():
+        elif worker in apart:
             state = "not connected to this database"
         elif present is None:
             state = "away"

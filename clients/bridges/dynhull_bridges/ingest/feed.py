@@ -49,7 +49,7 @@ class Message:
         key: its key, where the broker's messages have one.
         number: its place in the log, from 1, rising and perhaps with gaps; 0 where the broker has no log.
         token: what the feed needs to acknowledge it.
-        lost: so many messages, at most, were removed from right before it before they were read.
+        lost: how many messages between the one before and this one were removed unread, at most.
     """
 
     topic: str

@@ -29,7 +29,7 @@ class Kafka:
         partition: the number of the partition.
         producer: the name under which hulls count the offsets; None for one of topic and partition.
         group: the group that keeps the offset.
-        ping_interval: seconds; a request, of which one is always under way, may take twice as long.
+        ping_interval: seconds. One request is always under way, and it may take twice as long.
     """
 
     def __init__(

@@ -7,7 +7,7 @@ import os
 import sys
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import IO, Any, cast
@@ -135,11 +135,8 @@ def open_source(name: str, kind: Format | None, options: Options, *, integer_key
     try:
         if name == STANDARD_INPUT:
             raw: Any = getattr(sys.stdin.buffer, "raw", sys.stdin.buffer)
-            if can_be_interrupted(raw):
-                with io.BufferedReader(InterruptibleInput(raw)) as stdin:
-                    yield _source("standard input", stdin, None, kind, options, integer_keys)
-            else:
-                stdin = io.BufferedReader(raw)
+            with InterruptibleInput(raw) if can_be_interrupted(raw) else nullcontext(raw) as unbuffered:
+                stdin = io.BufferedReader(unbuffered)
                 try:
                     yield _source("standard input", stdin, None, kind, options, integer_keys)
                 finally:
