@@ -17,6 +17,15 @@ def processes(supervisor: int) -> dict[str, int]:
     return found
 
 
+def runs(process: int) -> bool:
+    """Whether a process has not ended, though nobody may have asked for its exit code."""
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False
+    return not stat.rpartition(")")[2].startswith(" Z")
+
+
 def descendants(process: int) -> list[int]:
     """The numbers of the processes that it has started, and those that they have.
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import psycopg
+from cluster import descendants, runs
 from patience import PATIENCE, wait_until
 from peers import program
 
@@ -71,6 +72,7 @@ class PostgreSQL:
         waiting = f"until test -e {go_on} || ! test -e {self._data}; do sleep 0.05; done; false"
         self._launch(*self._settings, f"restore_command={waiting}")
         try:
+            wait_until(self._refuses)
             yield
         finally:
             go_on.touch()
@@ -93,6 +95,15 @@ class PostgreSQL:
             return False
         return True
 
+    def _refuses(self) -> bool:
+        """Whether it says that it is not ready: before that, nobody listens."""
+        assert self.runs(), (self._home / "log").read_text()
+        try:
+            self.query("SELECT 1", database="postgres")
+        except psycopg.OperationalError as error:
+            return "the database system is " in str(error)
+        return False
+
     def stop(self, number: int = signal.SIGQUIT) -> None:
         """End it; by default at once, without a checkpoint."""
         if self.process is not None:
@@ -104,9 +115,16 @@ class PostgreSQL:
         """Whether it has not ended by itself."""
         return self.process is not None and self.process.poll() is None
 
+    @property
+    def processes(self) -> list[int]:
+        """The numbers of its processes, the first one first."""
+        return [self.process.pid, *descendants(self.process.pid)]
+
     def kill(self) -> None:
-        """SIGKILL its first process; the others end by themselves, and only then can it start again."""
+        """SIGKILL its first process, and wait until the others have ended: before that, it cannot start again."""
+        _, *others = self.processes
         self.stop(signal.SIGKILL)
+        wait_until(lambda: not any(map(runs, others)))
 
     def url(self, database: str) -> str:
         """The address of a database."""

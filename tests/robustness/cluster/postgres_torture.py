@@ -22,9 +22,8 @@ from psycopg.conninfo import conninfo_to_dict, make_conninfo
 sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 import torture
-from cluster import descendants
 from pacing import pause
-from patience import PATIENCE, wait_until
+from patience import PATIENCE
 from postgresql import FAST, PostgreSQL, query
 from promises import require
 from proxy import Proxy
@@ -90,14 +89,12 @@ class Torture(torture.Torture):
 
     def _crash(self) -> None:
         """The first process of PostgreSQL is killed, and it starts again when the others have ended, too."""
-        _, *others = self._processes()
         self._database.kill()
-        wait_until(lambda: not any(Path(f"/proc/{each}").exists() for each in others))
         self._database.start()
 
     def _freeze(self) -> None:
         """PostgreSQL stands still."""
-        stopped = self._processes()
+        stopped = self._database.processes
         for each in stopped:
             with suppress(ProcessLookupError):
                 os.kill(each, signal.SIGSTOP)
@@ -131,10 +128,6 @@ class Torture(torture.Torture):
         ballast.unlink()
         if not self._database.runs():
             self._database.start()
-
-    def _processes(self) -> list[int]:
-        first = self._database.process.pid
-        return [first, *descendants(first)]
 
     def finish(self) -> None:
         super().finish()
