@@ -21,6 +21,7 @@ from math import cos, isfinite, sin
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
+import numpy.ma  # np.unique needs it, and two threads cannot import it at its first call: python/cpython#149728
 import numpy.typing as npt
 
 from ._exact import Integers, as_integers, root

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.ma  # np.unique needs it, and two threads cannot import it at its first call: python/cpython#149728
 import numpy.typing as npt
 
 from ._predicates import Point, dot_sign, orient2d, orientation

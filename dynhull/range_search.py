@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.ma  # np.unique needs it, and two threads cannot import it at its first call: python/cpython#149728
 
 from ._areas import on_segment, squared_distance
 from ._exact import squared_length

@@ -93,7 +93,8 @@ def hull_nd(points: npt.ArrayLike, merge: bool = False) -> HullND:
     >>> hull_nd([[0, 0, 7], [1, 0, 7], [0, 1, 7]]).dimension
     2
     """
-    rows = np.unique(as_rows(points), axis=0)
+    # Without the indices, np.unique imports numpy.ma, which two threads cannot do: python/cpython#149728.
+    rows, _ = np.unique(as_rows(points), axis=0, return_index=True)
     n, d = rows.shape
     if n < 2:
         return HullND(n - 1, rows, [] if merge else np.empty((0, max(n - 1, 0)), np.int64), np.empty((0, d)))

@@ -12,6 +12,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
+# np.unique needs it, and two threads cannot import it at its first call: python/cpython#149728.
+import numpy.ma  # noqa: F401
+
 T = TypeVar("T")
 
 
