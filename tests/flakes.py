@@ -28,7 +28,7 @@ DOCUMENTATION = [":!*.md", ":!docs/images"]
 # Ends with its parent, however that ends.
 SPIN = "import os; parent = os.getppid()\nwhile os.getppid() == parent: sum(range(100_000))"
 LONGEST = 3600  # seconds of a run; single tests have a limit of their own
-SHOWN = 4000  # characters of a traceback, its end
+SHOWN = 4000  # characters of a traceback, at each end: the first has the error that led to others
 THE_RUN = "(the run itself)"
 
 Run = dict[str, Any]
@@ -99,10 +99,15 @@ def read(report: Path) -> tuple[dict[str, int], list[dict[str, str]]]:
         for kind in ("failure", "error"):
             for each in case.iter(kind):
                 name = f"{case.get('classname')}::{case.get('name')}"
-                failures.append({"test": name, "traceback": (each.text or each.get("message", ""))[-SHOWN:]})
+                failures.append({"test": name, "traceback": shown(each.text or each.get("message", ""))})
     tests, failed, errors, skipped = (int(suite.get(name)) for name in ("tests", "failures", "errors", "skipped"))
     bad = failed + errors
     return {"passed": tests - bad - skipped, "failed": bad, "skipped": skipped}, failures
+
+
+def shown(traceback: str) -> str:
+    """What is kept of a traceback."""
+    return traceback if len(traceback) <= 2 * SHOWN else f"{traceback[:SHOWN]}\n…\n{traceback[-SHOWN:]}"
 
 
 def described(result: Run) -> str:

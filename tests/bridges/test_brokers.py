@@ -184,9 +184,9 @@ def test_nats(client: HullClient, address: str, name: str, tmp_path: Path, port:
         pass_through(client, name, KEYS)
         with broker(command, port):
             wait_until(lambda: acknowledged(client, name) == 12)
-            client.delete_consumer(name, "test")  # as if nothing had been acknowledged: all events are sent again
             relay.process.terminate()
             relay.process.wait(PATIENCE)
+            client.delete_consumer(name, "test")  # as if nothing had been acknowledged: all events are sent again
             with relay_process(address, tmp_path, name, *to):
                 wait_until(lambda: acknowledged(client, name) == 12)
             stored = asyncio.run(read_stream(port))
