@@ -135,11 +135,11 @@ class Processes:
 
     async def stop(self) -> None:
         """Stop the gateways, which end their calls, and then the workers."""
-        for group in (self._gateways, self._workers):
-            await asyncio.gather(*(each.stop() for each in group))
         for task in self._tasks:
             if task.get_name() == RESTART:
                 task.cancel()
+        for group in (self._gateways, self._workers):
+            await asyncio.gather(*(each.stop() for each in group))
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def _restart_whenever(self, again: asyncio.Event) -> None:
@@ -157,15 +157,12 @@ class Processes:
     async def _replace(self, gateway: ChildProcess) -> None:
         """Restart a gateway, which ends only when its heir serves on the same port: there may be no other one."""
         heir = gateway.heir()
+        self._gateways.append(heir)
         self._tasks.add(asyncio.create_task(heir.run(), name=heir.name))
-        try:
-            await heir.serving.wait()
-        except asyncio.CancelledError:
-            await heir.stop()
-            raise
-        for group in (self._gateways, self.all):
-            group[group.index(gateway)] = heir
+        await heir.serving.wait()
+        self.all[self.all.index(gateway)] = heir
         await gateway.stop()
+        self._gateways.remove(gateway)
 
     async def _wait(self, stop: asyncio.Event, *events: asyncio.Event) -> bool:
         """Wait for all of the events, or for `stop`; returns False for that.

@@ -11,8 +11,9 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
+from cases import with_all_cases
 from client_kinds import CLIENTS
-from cluster import descendants, processes
+from cluster import descendants, processes, runs
 from command_line import dynhull
 from forked import COMMAND
 from grpc_health.v1 import health_pb2, health_pb2_grpc
@@ -193,6 +194,24 @@ def test_callers_notice_no_restart_even_of_the_only_gateway(tmp_path: Path) -> N
         for caller in callers:
             caller.finish()
             assert caller.errors == []
+
+
+@with_all_cases  # the gateway is killed after ten seconds
+def test_a_gateway_that_hangs_while_it_is_replaced_ends_with_the_server() -> None:
+    options = ("--workers", "1", "--gateways", "1", "--grace", "0")
+    with server_process(*options, complaints="does not end: it is killed") as server:
+        gateway = processes(server.process.pid)["gateway-0"]
+        os.kill(gateway, signal.SIGSTOP)
+        server.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: is_pending(signal.SIGTERM, gateway))  # its heir serves
+    assert not runs(gateway)
+
+
+def is_pending(number: int, process: int) -> bool:
+    """Whether a process has been sent a signal that it has not taken."""
+    status = Path(f"/proc/{process}/status").read_text()
+    (pending,) = (line.split()[1] for line in status.splitlines() if line.startswith("ShdPnd"))
+    return bool(int(pending, 16) & 1 << (number - 1))
 
 
 def test_signals_during_a_restart_make_one_more() -> None:
