@@ -521,32 +521,38 @@ class IntersectLinesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., exits: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class GetHullRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys", "layer")
+    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys", "layer", "vertex_page_size", "vertex_page_token")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     VIEW_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_PAGE_SIZE_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     view: HullView
     include_keys: bool
     layer: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ...) -> None: ...
+    vertex_page_size: int
+    vertex_page_token: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., vertex_page_size: _Optional[int] = ..., vertex_page_token: _Optional[str] = ...) -> None: ...
 
 class GetHullResponse(_message.Message):
-    __slots__ = ("hull", "vertices", "measures", "vertex_keys")
+    __slots__ = ("hull", "vertices", "measures", "vertex_keys", "next_vertex_page_token")
     HULL_FIELD_NUMBER: _ClassVar[int]
     VERTICES_FIELD_NUMBER: _ClassVar[int]
     MEASURES_FIELD_NUMBER: _ClassVar[int]
     VERTEX_KEYS_FIELD_NUMBER: _ClassVar[int]
+    NEXT_VERTEX_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
     hull: _hull_pb2.Hull
     vertices: _points_pb2.Points
     measures: _hull_pb2.Measures
     vertex_keys: _points_pb2.Keys
-    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
+    next_vertex_page_token: str
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., next_vertex_page_token: _Optional[str] = ...) -> None: ...
 
 class SamplePointsRequest(_message.Message):
     __slots__ = ("name", "min_revision", "sample_size", "encoding", "include_keys")

@@ -66,9 +66,14 @@ def encode_keys(keys: Keys, encoding: points_pb2.PointEncoding) -> points_pb2.Ke
     return points_pb2.Keys(strings=keys) if lists else points_pb2.Keys(lengths=keys.lengths, text=keys.data)
 
 
+def key_sequence(keys: VertexKeys) -> Keys:
+    """Keys in an array of str or of uint64, packed if they are strings."""
+    return PackedKeys.pack(keys.tolist()) if keys.dtype == object else keys
+
+
 def encode_key_array(keys: VertexKeys, encoding: points_pb2.PointEncoding) -> points_pb2.Keys:
     """Keys in an array of str or of uint64."""
-    return encode_keys(PackedKeys.pack(keys.tolist()) if keys.dtype == object else keys, encoding)
+    return encode_keys(key_sequence(keys), encoding)
 
 
 def encode_times(times: Times, encoding: points_pb2.PointEncoding) -> points_pb2.Times:

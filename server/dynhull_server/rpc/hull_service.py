@@ -29,6 +29,7 @@ from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .status import ANSWERED, PartRefusedError
+from .vertex_pages import VertexPages, page_token
 from .writing import (
     MOST_IN_A_MESSAGE,
     StreamedBatches,
@@ -40,8 +41,8 @@ from .writing import (
 
 # The side of a missing key.
 MISSING_SIDE = -128
-# The number of keys in a part of ReadEntities.
-ENTITIES_A_PART = 65_536
+# The number of keys in a part of ReadEntities, so that none exceeds the 4 MiB that gRPC receives by default.
+ENTITIES_A_PART = 8_192
 
 
 class HullService:
@@ -59,6 +60,7 @@ class HullService:
         self._metrics = metrics
         self._create_on_write = create_on_write
         self._max_watch_lag = max_watch_lag
+        self._pages = VertexPages(engine.machine.clock)
         self._queried = {kind: getattr(self, method) for kind, method in METHODS.items()}
 
     # Hulls
@@ -317,22 +319,24 @@ class HullService:
 
     async def GetHull(self, request: pb.GetHullRequest, call: Call) -> pb.GetHullResponse:
         hull = self._read(call, request.name)
-        encoding, layer = decode.decode_encoding(request.encoding), decode.decode_layer(request)
+        encoding = decode.decode_encoding(request.encoding)
         if not decode.decode_view(request.view):
             await hull.reached(request.min_revision)
             return pb.GetHullResponse(hull=encode.encode_hull(hull, hull.counts))
-        keys = None
-        if request.include_keys and hull.keyed:
-            counts, vertices, keys = await hull.named_vertices(request.min_revision, layer)
-        else:
-            counts, vertices = await hull.vertices(request.min_revision, layer)
-        measures = await encode.encode_measures(vertices, self._run(len(vertices)), geographic=hull.geographic)
-        return pb.GetHullResponse(
-            hull=encode.encode_hull(hull, counts),
-            vertices=encode.encode_points(vertices, encoding),
-            measures=measures,
-            vertex_keys=None if keys is None else encode.encode_key_array(keys, encoding),
+        found, page = await self._pages.read(hull, request, self._run)
+        rows = slice(0, len(found.vertices)) if page is None else found.rows(page)
+        response = pb.GetHullResponse(
+            hull=encode.encode_hull(hull, found.counts),
+            vertices=encode.encode_points(found.vertices[rows], encoding),
+            vertex_keys=None if found.keys is None else encode.encode_keys(found.keys[rows], encoding),
         )
+        if not rows.start:
+            run = self._run(len(found.vertices))
+            measures = await encode.encode_measures(found.vertices, run, geographic=hull.geographic)
+            response.measures.CopyFrom(measures)
+        if rows.stop < len(found.vertices):
+            response.next_vertex_page_token = page_token(hull.uid, found.counts.revision, rows.stop)
+        return response
 
     async def GetLayers(self, request: pb.GetLayersRequest, call: Call) -> pb.GetLayersResponse:
         hull = self._read(call, request.name)

@@ -29,6 +29,7 @@ from ..state.errors import (
     LimitExceededError,
     NotStoredError,
     OutcomeUnknownError,
+    PagesForgottenError,
     PointMissingError,
     RefusedError,
     RestoredError,
@@ -232,6 +233,9 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
         case RevisionForgottenError():
             metadata = {"field": "resume.revision", "value": str(error.revision)}
             metadata |= {"oldest": str(error.oldest), "newest": str(error.newest)}
+            return _status(code.OUT_OF_RANGE, str(error), "REVISION_FORGOTTEN", metadata)
+        case PagesForgottenError():
+            metadata = {"field": "vertex_page_token", "value": str(error.revision)}
             return _status(code.OUT_OF_RANGE, str(error), "REVISION_FORGOTTEN", metadata)
         case HullReplacedError():
             metadata = {"field": "resume.uid", "value": error.name, "uid": error.uid}

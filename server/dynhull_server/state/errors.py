@@ -227,6 +227,18 @@ class RevisionForgottenError(RefusedError):
         self.newest = newest
 
 
+class PagesForgottenError(RefusedError):
+    """The vertices of that revision are not kept for pages any more.
+
+    Attributes:
+        revision: the revision.
+    """
+
+    def __init__(self, revision: int) -> None:
+        super().__init__(f"revision {revision} is not kept for pages any more: begin again without a page token")
+        self.revision = revision
+
+
 class HullReplacedError(RefusedError):
     """The hull of that name has been deleted and created again, or restored from a backup.
 
