@@ -1,9 +1,12 @@
 """`dynhull backup`, `dynhull restore`, `dynhull check` and `dynhull export`: commands for data folders."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from dynhull_cli.connected import Connect, connecting
 
 from .addresses import is_database
 
@@ -70,16 +73,24 @@ def check(
     raise typer.Exit(0 if check_folder(data) else 1)
 
 
+@partial(connecting, optional=True)
 def export(
+    connect: Connect,
     name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")],
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="The file to write: .csv, .parquet or .geojson.", dir_okay=False)
     ],
     data: Annotated[
-        Path, typer.Option(help="The data folder or a backup; a server may be using it.", callback=_folder)
-    ] = DATA,
+        Path | None,
+        typer.Option(
+            help="The data folder or a backup; a server may be using it. dynhull-data without this and --address.",
+            callback=_folder,
+        ),
+    ] = None,
 ) -> None:
     """Write the points of one hull, as of the last commit, to a file.
+
+    They are read from a data folder, or with --address from a server, which needs a token that may read the hull.
 
     CSV and Parquet have columns x and y, and those of key, time and expires that the hull has; expires is the time at
     which a point leaves the hull. In GeoJSON the key is the id of a feature, and its times are properties. Times are in
@@ -88,6 +99,16 @@ def export(
         dynhull export fleet fleet.csv
         dynhull load copy fleet.csv --key key --time time --expires expires
     """
-    from .data_folders import export_hull
+    if not connect.address:
+        from .data_folders import export_hull
 
-    export_hull(data, name, file)
+        export_hull(data or DATA, name, file)
+        return
+    if data is not None:
+        raise typer.BadParameter("give --data or --address, not both")
+    from dynhull_client import HullClient
+
+    from .exporting import export_served
+
+    with connect(HullClient) as client:
+        export_served(client, name, file)

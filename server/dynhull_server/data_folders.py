@@ -8,7 +8,8 @@ import typer
 
 from dynhull_cli.plural import plural
 
-from .exports import WRITERS, complete_file
+from .exporting import exported, require_format, write_export
+from .exports import in_parts
 from .failure import code_of, fail, text_of
 from .progress import progress_bar
 from .state.contents import replayed
@@ -88,17 +89,14 @@ def hulls_counted(hulls: int, shards: int) -> str:
 
 def export_hull(data: Path, name: str, file: Path) -> None:
     """Write the points of a hull to a file, in the format of its suffix."""
-    if file.suffix not in WRITERS:
-        fail(f"{file}: the name must end in {', '.join(WRITERS)}")
+    require_format(file)
     with _errors_reported():
         found = copies.read(parts_of(data), name)
         for note in found.notes:
             typer.echo(note, err=True)
         contents = joined([replayed(kept, settings).stored() for settings, kept in found.kepts])
-        with complete_file(file) as unfinished, progress_bar("points") as progress:
-            WRITERS[file.suffix](unfinished, contents, progress, geographic=found.row.settings.geographic)
-    points = "1 point" if len(contents) == 1 else f"{len(contents):,} points"
-    typer.echo(f"{file}: {points} of {name} at revision {found.revision}")
+        write_export(file, in_parts(contents), len(contents), geographic=found.row.settings.geographic)
+    exported(file, name, len(contents), found.revision)
 
 
 @contextmanager

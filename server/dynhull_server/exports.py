@@ -1,8 +1,9 @@
 """The contents of a hull as a file: CSV, GeoJSON or Parquet."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
@@ -14,7 +15,6 @@ from dynhull.arrays import Points
 from dynhull.keys import PackedKeys, key_list
 
 from .state.records import FOREVER, NO_TIME, Contents, Times
-from .storage.port import Progress
 from .storage.sqlite.disk import make_durable
 
 ROWS_A_STEP = 100_000
@@ -37,11 +37,20 @@ def complete_file(file: Path) -> Iterator[Path]:
     make_durable(target.parent)
 
 
-def write_csv(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:
+def in_parts(contents: Contents) -> Iterator[Contents]:
+    """The contents in parts for the functions below, at least one: all parts have the same columns."""
+    for first in range(0, max(len(contents), 1), ROWS_A_STEP):
+        rows = slice(first, first + ROWS_A_STEP)
+        times, deadlines = (None if each is None else each[rows] for each in (contents.times, contents.deadlines))
+        yield Contents(contents.points[rows], None if contents.keys is None else contents.keys[rows], times, deadlines)
+
+
+def write_csv(file: Path, parts: Iterable[Contents], *, geographic: bool = False) -> None:
     """Write columns key, x, y (lon, lat), time and expires, those that the hull has; string keys in quotes."""
     with file.open("w", encoding="utf-8", newline="") as out:
-        out.write(",".join(_names(contents, geographic=geographic)) + "\n")
-        for part in _parts(contents, progress):
+        first, parts = _begun(parts)
+        out.write(",".join(_names(first, geographic=geographic)) + "\n")
+        for part in parts:
             columns: list[list[str]] = []
             if part.keys is not None:
                 columns.append(list(map(_quoted if isinstance(part.keys, PackedKeys) else str, key_list(part.keys))))
@@ -50,7 +59,7 @@ def write_csv(file: Path, contents: Contents, progress: Progress, *, geographic:
             out.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
-def write_geojson(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:
+def write_geojson(file: Path, parts: Iterable[Contents], *, geographic: bool = False) -> None:
     """Write a feature for each point: its key as the id, its times as the properties time and expires.
 
     Longitudes of a geographic hull beyond 180 degrees are written as the same place within (RFC 7946). Of a plane the
@@ -61,24 +70,25 @@ def write_geojson(file: Path, contents: Contents, progress: Progress, *, geograp
     with file.open("w", encoding="utf-8") as out:
         out.write('{"type": "FeatureCollection", ' + ("" if geographic else '"crs": null, ') + '"features": [\n')
         between = ""
-        for part in _parts(contents, progress):
+        for part in parts:
             for feature in _features(part, geographic=geographic):
                 out.write(between + json.dumps(feature))
                 between = ",\n"
         out.write("\n]}\n")
 
 
-def write_parquet(file: Path, contents: Contents, progress: Progress, *, geographic: bool = False) -> None:
+def write_parquet(file: Path, parts: Iterable[Contents], *, geographic: bool = False) -> None:
     """Write columns key (string or uint64), x, y (lon, lat), time and expires (UTC), those that the hull has."""
     import pyarrow as pa  # slow to load, and only this format needs it
     import pyarrow.parquet as pq
 
-    key = pa.string() if isinstance(contents.keys, PackedKeys) else pa.uint64()
+    first, parts = _begun(parts)
+    key = pa.string() if isinstance(first.keys, PackedKeys) else pa.uint64()
     types = {"key": key, **dict.fromkeys(_axes(geographic=geographic), pa.float64())}
     time = pa.timestamp("us", tz="UTC")
-    schema = pa.schema([(name, types.get(name, time)) for name in _names(contents, geographic=geographic)])
+    schema = pa.schema([(name, types.get(name, time)) for name in _names(first, geographic=geographic)])
     with pq.ParquetWriter(file, schema) as out:
-        for part in _parts(contents, progress):
+        for part in parts:
             columns = [] if part.keys is None else [_arrow_keys(part.keys)]
             columns += [pa.array(np.ascontiguousarray(axis)) for axis in part.points.T]
             columns += [pa.array(_dates(times), time) for times in (part.times, part.deadlines) if times is not None]
@@ -98,12 +108,11 @@ def _names(contents: Contents, *, geographic: bool) -> list[str]:
     return [name for name, column in columns.items() if column is not None]
 
 
-def _parts(contents: Contents, progress: Progress) -> Iterator[Contents]:
-    for first in range(0, len(contents), ROWS_A_STEP):
-        progress(first, len(contents))
-        rows = slice(first, first + ROWS_A_STEP)
-        times, deadlines = (None if each is None else each[rows] for each in (contents.times, contents.deadlines))
-        yield Contents(contents.points[rows], None if contents.keys is None else contents.keys[rows], times, deadlines)
+def _begun(parts: Iterable[Contents]) -> tuple[Contents, Iterable[Contents]]:
+    """The first part, and all parts."""
+    following = iter(parts)
+    first = next(following)
+    return first, chain([first], following)
 
 
 def _features(part: Contents, *, geographic: bool) -> Iterator[dict[str, Any]]:

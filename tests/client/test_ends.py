@@ -77,6 +77,10 @@ async def listing(client: AsyncHullClient) -> Waiting:
     return Waiting(client, lambda: anext(client.list_hulls("ends/")))
 
 
+async def reading_points(client: AsyncHullClient) -> Waiting:
+    return Waiting(client, lambda: anext(client.read_points(HULL)))
+
+
 async def watching(client: AsyncHullClient) -> Waiting:
     watch = client.watch(HULL)
     await anext(watch)
@@ -156,6 +160,7 @@ KINDS: dict[str, Callable[[AsyncHullClient], Awaitable[Waiting]]] = {
     "numbered": call("put", KEYED, [9], [[1, 1]], producer="p", sequence=1),
     "hull awaited": call("wait_for_hull", "ends/none"),
     "list": listing,
+    "points": reading_points,
     "watch": watching,
     "fence": watching_a_fence,
     "writer's start": opening_a_writer,
@@ -364,6 +369,7 @@ BLOCKING: dict[str, Callable[[HullClient], tuple[Work, Work]]] = {
     "pipeline": piped,
     "ingest": ingested,
     "list": lambda client: (lambda: next(client.list_hulls("ends/")), client.close),
+    "points": lambda client: (lambda: next(client.read_points(HULL)), client.close),
     "hull awaited": only_client("wait_for_hull", "ends/none"),
     "writer's start": started,
 }

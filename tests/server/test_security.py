@@ -66,6 +66,7 @@ EVERY_CALL = {
     "Count": lambda stub, name: stub.Count(pb.CountRequest(name=name)),
     "GetPositions": lambda stub, name: stub.GetPositions(pb.GetPositionsRequest(name=name)),
     "ReadEntities": lambda stub, name: next(stub.ReadEntities(pb.ReadEntitiesRequest(name=name))),
+    "ReadPoints": lambda stub, name: next(stub.ReadPoints(pb.ReadPointsRequest(name=name))),
     "Support": lambda stub, name: stub.Support(pb.SupportRequest(name=name)),
     "Tangents": lambda stub, name: stub.Tangents(pb.TangentsRequest(name=name)),
     "SamplePoints": lambda stub, name: stub.SamplePoints(pb.SamplePointsRequest(name=name)),

@@ -54,6 +54,14 @@ def _pem(variable: str, text: str) -> Any:
 Address = Annotated[
     str, _option("ADDRESS", "HOST or HOST:PORT; the port is 50051 unless given. https://HOST asks for TLS.")
 ]
+GivenAddress = Annotated[
+    str,
+    typer.Option(
+        help="Ask the server at HOST or HOST:PORT. https://HOST asks for TLS.",
+        rich_help_panel="Server",
+        show_default=False,
+    ),
+]
 Token = Annotated[str | None, _option("TOKEN", "Bearer token.")]
 Tls = Annotated[bool, _option("TLS", "Encrypt, and trust the certificates that this machine trusts.")]
 TlsCa = Annotated[Path | None, _pem("TLS_CA", "encrypt, and trust these certificates.")]
@@ -89,8 +97,11 @@ def connected(command: Callable[..., None]) -> Callable[..., None]:
     return connecting(with_client)
 
 
-def connecting(command: Callable[..., None]) -> Callable[..., None]:
-    """As `connected`, but the first argument is a function that makes a client, synchronous or asyncio."""
+def connecting(command: Callable[..., None], *, optional: bool = False) -> Callable[..., None]:
+    """As `connected`, but the first argument is a function that makes a client, synchronous or asyncio.
+
+    With `optional`, for commands that can do without a server, its address is empty unless --address is given.
+    """
 
     def run(
         *,
@@ -155,6 +166,9 @@ def connecting(command: Callable[..., None]) -> Callable[..., None]:
 
     own = list(inspect.signature(command).parameters.values())[1:]
     shared = [each for each in inspect.signature(run).parameters.values() if each.kind is each.KEYWORD_ONLY]
+    if optional:
+        address = shared[0].replace(annotation=GivenAddress, default="")
+        shared = [address, *shared[1:]]
     parameters = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in own] + shared
     run.__doc__, run.__name__ = command.__doc__, command.__name__
     run.__annotations__ = {each.name: each.annotation for each in parameters}

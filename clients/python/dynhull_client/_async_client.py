@@ -36,6 +36,16 @@ def _answering(
     return method
 
 
+def _reading(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["AsyncHullClient", P], AsyncIterator[Result]]:
+    """The method that makes a call and returns its answer part by part."""
+
+    def method(self: "AsyncHullClient", /, *arguments: P.args, **options: P.kwargs) -> AsyncIterator[Result]:
+        return self._connection.parts(described(describe, *arguments, **options))
+
+    documented(method, describe, f"AsyncIterator[{answer_of(describe)}]")
+    return method
+
+
 class AsyncHullClient(Client[AsyncConnection]):
     """A client of a dynhull server for asyncio; arguments and errors as for `HullClient`.
 
@@ -61,6 +71,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     count = _answering(calls.count)
     positions = _answering(calls.positions)
     entities = _answering(calls.entities)
+    read_points = _reading(calls.read_points)
     support = _answering(calls.support)
     tangents = _answering(calls.tangents)
     distance = _answering(calls.distance)

@@ -12,6 +12,7 @@ import grpc
 from ._calls import Call
 from ._connection import BlockingConnection, Connection, client_is_closed
 from ._errors import DynhullError
+from ._retry import Attempts
 
 Result = TypeVar("Result")
 
@@ -78,6 +79,31 @@ class AsyncConnection(Connection):
                 return call.decode(response)
             except DynhullError as error:
                 call, pause = attempts.after(call, error)
+            await self.pause(pause)
+
+    async def parts(self, call: Call[Result]) -> AsyncIterator[Result]:
+        """Make a call that is answered by a stream, and return what is decoded of each message of it.
+
+        It may be repeated until the first message is there. It has no limit of time but its own.
+        """
+        attempts, begun = Attempts(call, call.timeout, self.retries), False
+        while True:
+            stream = self.begin(getattr(self.stub, call.method), call.request, attempts.timeout())
+            try:
+                messages = aiter(stream)
+                while True:
+                    with CallErrors(self):
+                        message = await anext(messages, None)
+                    if message is None:
+                        return
+                    begun = True
+                    yield call.decode(message)
+            except DynhullError as error:
+                if begun:
+                    raise
+                call, pause = attempts.after(call, error)
+            finally:
+                stream.cancel()
             await self.pause(pause)
 
     async def pause(self, seconds: float) -> None:

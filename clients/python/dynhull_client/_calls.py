@@ -34,6 +34,7 @@ from ._messages import (
     Located,
     Positions,
     Sampled,
+    Stored,
     Supported,
     Tangents,
     Verification,
@@ -544,6 +545,34 @@ def entities(name: str, *, min_revision: int = 0, timeout: float | None = None) 
     """All keys, their positions and times at one revision. HullUnsuitableError if the hull is not keyed."""
     request = pb.ReadEntitiesRequest(name=name, min_revision=min_revision)
     return Call("ReadEntities", request, messages.decode_entities, timeout, in_parts=True)
+
+
+def read_points(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Call[Stored]:
+    """All points of a hull at one revision, part by part, with keys and times: those of large hulls need not be held.
+
+    There is at least one part. The call begins when the first one is asked for, and is repeated only before that one is
+    there. The server ends it if a part is not received for ten minutes (`dynhull serve --max-watch-lag`).
+
+    >>> from dynhull_client import HullClient
+    >>> client = HullClient()  # doctest: +SKIP
+    >>> sum(len(part.points) for part in client.read_points("fleet"))  # doctest: +SKIP
+    4
+
+    Args:
+        name: the hull.
+        min_revision: a revision that it must have reached.
+        timeout: seconds that all of it may take; None for no limit.
+    """
+    request = pb.ReadPointsRequest(name=name, min_revision=min_revision)
+    info: HullInfo | None = None
+
+    def decode(part: pb.ReadPointsResponse) -> Stored:
+        nonlocal info
+        if info is None or part.HasField("hull"):
+            info = messages.decode_info(part.hull)
+        return messages.decode_stored(part, info)
+
+    return Call("ReadPoints", request, decode, timeout)
 
 
 def count(name: str, xy: npt.ArrayLike, *, min_revision: int = 0, timeout: float | None = None) -> Call[Counted]:

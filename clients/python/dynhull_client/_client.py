@@ -34,6 +34,16 @@ def _answering(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["Hul
     return method
 
 
+def _reading(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["HullClient", P], Iterator[Result]]:
+    """The method that makes a call and returns its answer part by part."""
+
+    def method(self: "HullClient", /, *arguments: P.args, **options: P.kwargs) -> Iterator[Result]:
+        return self._connection.parts(described(describe, *arguments, **options))
+
+    documented(method, describe, f"Iterator[{answer_of(describe)}]")
+    return method
+
+
 class HullClient(Client[BlockingConnection]):
     """A client of a dynhull server. Threads may share it. A context manager, which closes it.
 
@@ -76,6 +86,7 @@ class HullClient(Client[BlockingConnection]):
     count = _answering(calls.count)
     positions = _answering(calls.positions)
     entities = _answering(calls.entities)
+    read_points = _reading(calls.read_points)
     support = _answering(calls.support)
     tangents = _answering(calls.tangents)
     distance = _answering(calls.distance)

@@ -1,6 +1,6 @@
 """A channel to a server, and calls on it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import copy
 from functools import partial
 from threading import Condition, Event
@@ -214,6 +214,28 @@ class BlockingConnection(Connection):
             except grpc.RpcError as failure:
                 call, pause = attempts.after(call, self.error_of(failure))
             self.pause(pause, ended)
+
+    def parts(self, call: Call[Result]) -> Iterator[Result]:
+        """Make a call that is answered by a stream, and return what is decoded of each message of it.
+
+        It may be repeated until the first message is there. It has no limit of time but its own.
+        """
+        attempts, begun = Attempts(call, call.timeout, self.retries), False
+        while True:
+            stream = self.begin(getattr(self.stub, call.method), call.request, attempts.timeout())
+            try:
+                for message in stream:
+                    begun = True
+                    yield call.decode(message)
+                return
+            except grpc.RpcError as failure:
+                error = self.error_of(failure)
+                if begun:
+                    raise error from None
+                call, pause = attempts.after(call, error)
+            finally:
+                stream.cancel()
+            self.pause(pause, lambda: False)
 
     def pause(self, seconds: float, ended: Callable[[], bool]) -> None:
         """Wait before a new attempt, while the connection is open and `ended` returns False."""

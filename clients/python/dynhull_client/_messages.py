@@ -276,6 +276,25 @@ class Entities(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Stored(Value):
+    """Some of the points of a hull, n of them, with what it has stored of each.
+
+    Attributes:
+        info: the hull, at the revision that all parts are of.
+        points: (n, 2) the points, as often as the hull has them.
+        keys: n keys, ascending, strings bytewise: `dynhull.keys.PackedKeys` or (n,) uint64; None if it is not keyed.
+        times: (n,) event times as datetime64[us] in UTC, NaT for a point without one; None if the hull has none.
+        expire_times: (n,) when each leaves the hull, likewise; None if no put has said so.
+    """
+
+    info: HullInfo
+    points: Points
+    keys: Keys | None = None
+    times: Times | None = None
+    expire_times: Times | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Counted(Value):
     """The multiplicity of each point, (n,) int64; 0 for a point that the hull does not hold."""
 
@@ -622,6 +641,26 @@ def decode_entities(parts: Iterable[hull_service_pb2.ReadEntitiesResponse]) -> E
         np.concatenate([decode_points(part.positions) for part in received]),
         np.concatenate([decode_times(part.times) for part in received]) if received[0].HasField("times") else None,
     )
+
+
+def decode_stored(message: hull_service_pb2.ReadPointsResponse, info: HullInfo) -> Stored:
+    """A part of the points of a hull."""
+    keys = None if info.keyed is None else decode_keys(message.keys)
+    if info.keyed == "int" and not len(message.points.packed):
+        keys = np.empty(0, np.uint64)
+    return Stored(
+        info,
+        decode_points(message.points),
+        keys,
+        _known(message.times, message.timed) if message.HasField("times") else None,
+        _known(message.expire_times, message.expires) if message.HasField("expire_times") else None,
+    )
+
+
+def _known(message: points_pb2.Times, known: bytes) -> Times:
+    """Times, NaT where none is known."""
+    times = decode_times(message)
+    return np.where(np.frombuffer(known, np.bool_), times, np.datetime64("NaT")) if known else times
 
 
 def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False) -> Event | None:

@@ -416,6 +416,36 @@ class ReadEntitiesResponse(_message.Message):
     times: _points_pb2.Times
     def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
 
+class ReadPointsRequest(_message.Message):
+    __slots__ = ("name", "min_revision", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    min_revision: int
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class ReadPointsResponse(_message.Message):
+    __slots__ = ("revision", "hull", "points", "keys", "times", "timed", "expire_times", "expires")
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    TIMED_FIELD_NUMBER: _ClassVar[int]
+    EXPIRE_TIMES_FIELD_NUMBER: _ClassVar[int]
+    EXPIRES_FIELD_NUMBER: _ClassVar[int]
+    revision: int
+    hull: _hull_pb2.Hull
+    points: _points_pb2.Points
+    keys: _points_pb2.Keys
+    times: _points_pb2.Times
+    timed: bytes
+    expire_times: _points_pb2.Times
+    expires: bytes
+    def __init__(self, revision: _Optional[int] = ..., hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., timed: _Optional[bytes] = ..., expire_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., expires: _Optional[bytes] = ...) -> None: ...
+
 class SupportRequest(_message.Message):
     __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys", "layer")
     NAME_FIELD_NUMBER: _ClassVar[int]

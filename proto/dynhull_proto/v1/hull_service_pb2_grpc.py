@@ -148,6 +148,11 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesResponse.FromString,
                 _registered_method=True)
+        self.ReadPoints = channel.unary_stream(
+                '/dynhull.v1.HullService/ReadPoints',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadPointsRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadPointsResponse.FromString,
+                _registered_method=True)
         self.Support = channel.unary_unary(
                 '/dynhull.v1.HullService/Support',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.SupportRequest.SerializeToString,
@@ -385,6 +390,14 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def ReadPoints(self, request, context):
+        """Sends all points of a hull at one revision, as often as the hull has them, with keys and times. The call ends if the
+        client does not read the parts, as in Watch.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def Support(self, request, context):
         """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
 
@@ -598,6 +611,11 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.ReadEntities,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesResponse.SerializeToString,
+            ),
+            'ReadPoints': grpc.unary_stream_rpc_method_handler(
+                    servicer.ReadPoints,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadPointsRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.ReadPointsResponse.SerializeToString,
             ),
             'Support': grpc.unary_unary_rpc_method_handler(
                     servicer.Support,
@@ -1141,6 +1159,33 @@ class HullService(object):
             '/dynhull.v1.HullService/ReadEntities',
             dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.ReadEntitiesResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ReadPoints(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/dynhull.v1.HullService/ReadPoints',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ReadPointsRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.ReadPointsResponse.FromString,
             options,
             channel_credentials,
             insecure,

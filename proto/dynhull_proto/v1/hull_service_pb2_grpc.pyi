@@ -117,6 +117,10 @@ class HullServiceStub:
     """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys."""
     ReadEntities: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.ReadEntitiesRequest, _hull_service_pb2.ReadEntitiesResponse]
     """Sends all keys of a keyed hull at one revision, with their positions."""
+    ReadPoints: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.ReadPointsRequest, _hull_service_pb2.ReadPointsResponse]
+    """Sends all points of a hull at one revision, as often as the hull has them, with keys and times. The call ends if the
+    client does not read the parts, as in Watch.
+    """
     Support: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]
     """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
 
@@ -275,6 +279,10 @@ class HullServiceAsyncStub(HullServiceStub):
     """Finds the positions of keys. FAILED_PRECONDITION if the hull is not keyed, as for all questions about keys."""
     ReadEntities: _aio.UnaryStreamMultiCallable[_hull_service_pb2.ReadEntitiesRequest, _hull_service_pb2.ReadEntitiesResponse]  # type: ignore[assignment]
     """Sends all keys of a keyed hull at one revision, with their positions."""
+    ReadPoints: _aio.UnaryStreamMultiCallable[_hull_service_pb2.ReadPointsRequest, _hull_service_pb2.ReadPointsResponse]  # type: ignore[assignment]
+    """Sends all points of a hull at one revision, as often as the hull has them, with keys and times. The call ends if the
+    client does not read the parts, as in Watch.
+    """
     Support: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SupportRequest, _hull_service_pb2.SupportResponse]  # type: ignore[assignment]
     """Finds the extreme vertex in each of some directions. Exact. FAILED_PRECONDITION if the hull has no points.
 
@@ -526,6 +534,16 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.ReadEntitiesResponse], _abc.AsyncIterator[_hull_service_pb2.ReadEntitiesResponse]]:
         """Sends all keys of a keyed hull at one revision, with their positions."""
+
+    @_abc_1.abstractmethod
+    def ReadPoints(
+        self,
+        request: _hull_service_pb2.ReadPointsRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.ReadPointsResponse], _abc.AsyncIterator[_hull_service_pb2.ReadPointsResponse]]:
+        """Sends all points of a hull at one revision, as often as the hull has them, with keys and times. The call ends if the
+        client does not read the parts, as in Watch.
+        """
 
     @_abc_1.abstractmethod
     def Support(

@@ -69,6 +69,14 @@ async def entities(hull: LiveHull, min_revision: int) -> tuple[Counts, Contents]
     return await hull.read(lambda state: _keyed(state).stored(), hull.counts.points, min_revision)
 
 
+async def contents(hull: LiveHull, min_revision: int) -> tuple[Counts, Contents]:
+    """All points of a hull; of a keyed one in the order of their keys."""
+    if isinstance(hull, DividedHull):
+        await hull.reached(min_revision)
+        return await hull.division.contents()
+    return await hull.read(lambda state: state.contents.stored(), hull.counts.points, min_revision)
+
+
 async def held(hull: LiveHull, after: Key | None, most: int, min_revision: int) -> tuple[Counts, HeldRows, bool]:
     """At most that many positions in the quarantine of a keyed hull, after a key; and whether there are more."""
 

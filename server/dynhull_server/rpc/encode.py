@@ -4,6 +4,7 @@ import math
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull import globe, measure
 from dynhull.arrays import Points
@@ -21,6 +22,7 @@ from ..state.contents.keyed import Found
 from ..state.fences.faults import FenceFault
 from ..state.hull_state import Cause, Counts, VertexKeys
 from ..state.records import (
+    FOREVER,
     NO_TIME,
     Center,
     Contents,
@@ -170,6 +172,31 @@ def encode_entities(
         positions=encode_points(entities.points[rows], encoding),
         times=times,
     )
+
+
+def encode_part(
+    counts: Counts, contents: Contents, rows: slice, encoding: points_pb2.PointEncoding
+) -> hull_service_pb2.ReadPointsResponse:
+    """Some rows of the points of a hull."""
+    part = hull_service_pb2.ReadPointsResponse(
+        revision=counts.revision,
+        points=encode_points(contents.points[rows], encoding),
+        keys=None if contents.keys is None else encode_keys(contents.keys[rows], encoding),
+    )
+    if contents.times is not None:
+        times = contents.times[rows]
+        part.times.CopyFrom(encode_times(times, encoding))
+        part.timed = _which(times != NO_TIME)
+    if contents.deadlines is not None:
+        known = contents.deadlines[rows] != FOREVER
+        part.expire_times.CopyFrom(encode_times(np.where(known, contents.deadlines[rows], NO_TIME), encoding))
+        part.expires = _which(known)
+    return part
+
+
+def _which(rows: npt.NDArray[np.bool_]) -> bytes:
+    """A byte for each row, 1 for those that are meant; none if all are."""
+    return b"" if rows.all() else rows.tobytes()
 
 
 def encode_held(

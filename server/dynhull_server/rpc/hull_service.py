@@ -21,6 +21,7 @@ from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..state.errors import HullEmptyError, HullFencedError
 from ..state.frames import require_lines, require_reach
+from ..state.records import Contents
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
@@ -41,8 +42,8 @@ from .writing import (
 
 # The side of a missing key.
 MISSING_SIDE = -128
-# The number of keys in a part of ReadEntities, so that none exceeds the 4 MiB that gRPC receives by default.
-ENTITIES_A_PART = 8_192
+# The number of points in a part of all points, so that none exceeds the 4 MiB that gRPC receives by default.
+POINTS_A_PART = 8_192
 
 
 class HullService:
@@ -231,10 +232,21 @@ class HullService:
         hull.require_keys("name")
         with call.cutoff():
             counts, contents = await entities.entities(hull, request.min_revision)
-        for first in range(0, max(len(contents), 1), ENTITIES_A_PART):
-            rows = slice(first, first + ENTITIES_A_PART)
+        for rows in _parts(contents):
             with call.cutoff():
                 part = await self._engine.aside(partial(encode.encode_entities, counts, contents, rows, encoding))
+            await call.write_within(self._max_watch_lag, part)
+
+    async def ReadPoints(self, request: pb.ReadPointsRequest, call: Call) -> None:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        with call.cutoff():
+            counts, contents = await entities.contents(hull, request.min_revision)
+        for rows in _parts(contents):
+            with call.cutoff():
+                part = await self._engine.aside(partial(encode.encode_part, counts, contents, rows, encoding))
+            if not rows.start:
+                part.hull.CopyFrom(encode.encode_hull(hull, counts))
             await call.write_within(self._max_watch_lag, part)
 
     async def ListHeld(self, request: pb.ListHeldRequest, call: Call) -> pb.ListHeldResponse:
@@ -546,6 +558,12 @@ def _acknowledgements(streamed: StreamedBatches) -> Iterator[pb.StreamResponse]:
             response = pb.StreamResponse()
     if streamed.several:
         yield response
+
+
+def _parts(contents: Contents) -> Iterator[slice]:
+    """The rows of each part of all points; there is at least one part."""
+    for first in range(0, max(len(contents), 1), POINTS_A_PART):
+        yield slice(first, first + POINTS_A_PART)
 
 
 def _places(hull: LiveHull, points: points_pb2.Points) -> Checked:
