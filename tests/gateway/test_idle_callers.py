@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from urllib.parse import urlsplit
 
+import numpy as np
 from gateway_process import Events, Gateway, gateway_process
 from metrics import scrape
 from patience import PATIENCE, wait_until
@@ -15,6 +16,7 @@ from dynhull_client import HullClient
 
 CALLERS = 30
 LATE, DEAF = "dynhull_gateway_late_requests_total", "dynhull_gateway_deaf_readers_total"
+WAITING = "dynhull_gateway_waiting_bytes"
 
 
 @contextmanager
@@ -81,3 +83,14 @@ def test_readers_that_do_not_read_end(address: str, name: str) -> None:
         assert other.next()[1]["revision"] == 2
         figures = scrape(metrics)
         assert (figures[DEAF], figures["dynhull_gateway_streams"]) == (len(deaf), 1)
+
+
+def test_what_waits_for_a_reader_is_counted(address: str, name: str) -> None:
+    with HullClient(address) as client, strict(address, "--reader-timeout", "1h") as (gateway, metrics):
+        client.create_hull(name)
+        x = np.arange(300_000.0)
+        client.apply(name, insert=np.column_stack([x, x * x]))
+        request = f"GET /hulls/{name}/events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
+        with closing(connect(gateway, request)):
+            wait_until(lambda: scrape(metrics)[WAITING] > 0)
+        wait_until(lambda: scrape(metrics)[WAITING] == 0)

@@ -228,6 +228,22 @@ def test_conflated_watches_leave_out_what_cancels(
     assert (response.conflated, response.sequence) == (4, 5)
 
 
+def test_few_events_are_sent_together_unless_they_may_cancel_each_other(
+    stub: HullServiceStub, fences: FenceServiceStub, name: str, fleet: str
+) -> None:
+    """Whoever passes them on to a reader that does not read holds no more of a thousand."""
+    create(fences, name, circle_area={"radius": 5}, subject_hull=fleet, initial="FENCE_INITIAL_NONE")
+    put(stub, fleet, **{f"truck-{row}": (1.0, 1.0) for row in range(1000)})
+    for conflate, together in ((False, 250), (True, 1000)):
+        request = fs.WatchFenceRequest(name=name, after_sequence=0, conflate=conflate)
+        watch = fences.WatchFence(request, timeout=PATIENCE)
+        sizes: list[int] = []
+        while sum(sizes) < 1000:
+            sizes.append(len(next(watch).events))
+        assert max(sizes) == together
+        watch.cancel()
+
+
 def test_fences_are_listed_by_name(fences: FenceServiceStub, name: str, fleet: str) -> None:
     names = [f"{name}/{letter}" for letter in "bca"]
     for each in names:

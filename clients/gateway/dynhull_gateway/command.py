@@ -9,6 +9,8 @@ from dynhull_cli.connected import Connect, connecting
 from dynhull_cli.durations import more_than_0
 
 MIB = 2**20
+# Bytes of a stream of the server that wait here for a caller who does not read.
+READ_AHEAD = 2**17
 
 
 @connecting
@@ -101,7 +103,7 @@ def gateway(
         metrics=None if metrics_port is None else (metrics_host, metrics_port),
     )
     limit = more_than_0(timeout, "--timeout")
-    run(lambda: connect(AsyncHullClient, timeout=limit), host, port, settings)
+    run(lambda: connect(AsyncHullClient, timeout=limit, read_ahead=READ_AHEAD), host, port, settings)
 
 
 def _origin(text: str) -> str:

@@ -29,6 +29,13 @@ class Figures:
         self.open_streams = 0
         streams = Gauge("dynhull_gateway_streams", "Streams of events that are open.", registry=registry)
         streams.set_function(lambda: self.open_streams)
+        self.waiting_bytes = 0
+        waiting = Gauge(
+            "dynhull_gateway_waiting_bytes",
+            "Bytes of events that wait for their readers; those that wait for many readers are held once.",
+            registry=registry,
+        )
+        waiting.set_function(lambda: self.waiting_bytes)
         self.events = Counter("dynhull_gateway_events", "Events that were sent.", registry=registry)
         self.skipped = Counter(
             "dynhull_gateway_snapshots_for_slow_readers",

@@ -65,6 +65,8 @@ class HullClient(Client[BlockingConnection]):
         ping_interval: seconds between questions whether the server is still there, on connections without calls, too.
             One without an answer for as long again is lost, though nobody has closed it: calls on it end, and watches
             go on by a new one. Servers permit one each five seconds by default (`--min-ping-interval`).
+        read_ahead: bytes that a stream may receive before the program asks for them; None for as many as keep a distant
+            server busy, which may be some megabytes. For programs with many streams that are read slowly.
     """
 
     _connect = BlockingConnection

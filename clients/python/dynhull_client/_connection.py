@@ -61,9 +61,12 @@ class Connection:
         tls: grpc.ChannelCredentials | None,
         retries: int,
         ping_interval: float,
+        read_ahead: int | None,
     ) -> None:
-        require_not_negative(timeout=timeout, retries=retries)
+        require_not_negative(timeout=timeout, retries=retries, read_ahead=read_ahead)
         self._options = [*OPTIONS, *_pings(ping_interval)]
+        if read_ahead is not None:
+            self._options += [("grpc.http2.lookahead_bytes", read_ahead), ("grpc.http2.bdp_probe", 0)]
         self.address, encrypted = target(address)
         if is_local(self.address):
             self._options.append(("grpc.enable_http_proxy", 0))
@@ -79,6 +82,7 @@ class Connection:
             tls=tls,
             retries=retries,
             ping_interval=ping_interval,
+            read_ahead=read_ahead,
         )
         self._timeout = timeout
         self._tls = tls

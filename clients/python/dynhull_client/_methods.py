@@ -43,6 +43,7 @@ class Client(Generic[AnyConnection]):
         tls: grpc.ChannelCredentials | None = None,
         retries: int = DEFAULT_RETRIES,
         ping_interval: float = DEFAULT_PING_INTERVAL,
+        read_ahead: int | None = None,
     ) -> None:
         self._connection = self._connect(
             address,
@@ -52,6 +53,7 @@ class Client(Generic[AnyConnection]):
             tls=tls,
             retries=retries,
             ping_interval=ping_interval,
+            read_ahead=read_ahead,
         )
 
     @property

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from ..state.fences.records import EventType, FenceEvent
 from .fences import LiveFence
 
-# The number of events that are sent together, at most.
-EVENTS_TOGETHER = 1000
+# The number of events that are sent together, at most: a gateway holds them for a reader that does not read. Of more of
+# them more cancel each other.
+EVENTS_TOGETHER, CONFLATED_TOGETHER = 250, 1000
 # Seconds between looks at a fence of which the storage has dropped what is still to be published as dropped.
 ABOUT_TO = 0.05
 
@@ -63,7 +64,7 @@ async def watch_fence(
             yield Sent(after)
             continue
         await asyncio.sleep(sent + min_interval - loop.time())
-        events = await fence.events(after, EVENTS_TOGETHER)
+        events = await fence.events(after, CONFLATED_TOGETHER if conflate else EVENTS_TOGETHER)
         response = following(after, events, fence.fence.first)
         if response is None:
             if fence.fence.ended:
@@ -73,6 +74,7 @@ async def watch_fence(
         if conflate:
             response.events = conflated(events)
             response.conflated = len(events) - len(response.events)
+        del events
         after = response.sequence
         sent = loop.time()
         yield response

@@ -98,9 +98,9 @@ class Feed:
                 figures.skipped.inc()
                 place = None
             elif place is not None and place < self._count:
-                missed, place = self._count - place, self._count
-                for sent in list(self._events)[-missed:]:
-                    yield sent.text
+                sent = self._events[place - self._count]
+                place += 1
+                yield sent.text
             else:
                 try:
                     async with asyncio.timeout(min(keepalive, patience) if patience > 0 else keepalive):

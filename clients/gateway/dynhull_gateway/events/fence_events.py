@@ -96,9 +96,10 @@ async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) 
                 if event.after is not None:
                     idents = [f"{event.uid}:{reading.after}~{event.after}"] * (len(together) - 1)
                     idents.append(f"{event.uid}:{event.after}")
-                    yield b"".join(map(_text, together, idents))
+                    text = b"".join(map(_text, together, idents))
+                    together.clear()  # they take more memory than the text, and a reader may take long
+                    yield text
                     reading.uid, reading.after = event.uid, event.after
-                    together.clear()
                     if exact and event.after >= reading.exact:
                         return
                 coming = asyncio.ensure_future(anext(watch))

@@ -76,8 +76,16 @@ class EventStream(Response):
 
     async def _write(self, send: Send, text: bytes) -> None:
         async with self._turn:  # no event within another one
-            for begin in range(0, len(text), PIECE):
-                await send({"type": "http.response.body", "body": text[begin : begin + PIECE], "more_body": True})
+            left = len(text)
+            self._figures.waiting_bytes += left
+            try:
+                for begin in range(0, len(text), PIECE):
+                    piece = text[begin : begin + PIECE]
+                    await send({"type": "http.response.body", "body": piece, "more_body": True})
+                    left -= len(piece)
+                    self._figures.waiting_bytes -= len(piece)
+            finally:
+                self._figures.waiting_bytes -= left
 
 
 async def _left(receive: Receive) -> None:
