@@ -12,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 
+LAYERS = "core", "shell", "sqlite", "cluster"
 FINDINGS = Path(__file__).parent / "findings"
 
 # Plans from one collection of garbage to the next, and lives from one line of progress to the next.
@@ -22,12 +23,12 @@ ROOM = 10**9
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="simulation", description=__doc__.splitlines()[0])
-    parser.add_argument("--package", help="the folder of another copy of dynhull_server")
+    parser.add_argument("--package", help="the folder of other copies of the server's packages")
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="random plans")
     run.add_argument("--seconds", type=float, default=60.0)
     run.add_argument("--seed", type=int, default=1)
-    run.add_argument("--layer", choices=("core", "shell", "sqlite", "all"), default="all")
+    run.add_argument("--layer", choices=(*LAYERS, "all"), default="all")
     run.add_argument("--lives", type=int, default=None, help="end after this number of lives")
     run.add_argument("--keep", action="store_true", help="shrink what is found, and keep its plan")
     replay = commands.add_parser("replay", help="a plan that was kept")
@@ -68,7 +69,7 @@ def _search(arguments: argparse.Namespace) -> int:
     from .plan import random_plan
     from .play import play
 
-    layers = ("core", "shell", "sqlite") if arguments.layer == "all" else (arguments.layer,)
+    layers = LAYERS if arguments.layer == "all" else (arguments.layer,)
     lives = dict.fromkeys(layers, 0)
     seconds = dict.fromkeys(layers, 0.0)
     begun = time.monotonic()
@@ -130,7 +131,7 @@ def _trace(plans: int) -> int:
     from .play import play
 
     for seed in range(plans):
-        outcome = play(random_plan(seed, ("core", "shell", "sqlite")[seed % 3]))
+        outcome = play(random_plan(seed, LAYERS[seed % len(LAYERS)]))
         print(seed, outcome.trace, outcome.finding)
     return 0
 

@@ -33,6 +33,7 @@ from dynhull_server.state.errors import (
     NotStoredError,
     OutcomeUnknownError,
     PointMissingError,
+    RestoredError,
     RevisionForgottenError,
     SequenceAheadError,
     SequenceGapError,
@@ -78,8 +79,8 @@ class Server(Protocol):
     async def delete_at_once(self, name: str, times: int) -> None:
         """Remove a hull repeatedly, and ignore the answers."""
 
-    async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
-        """Apply a batch."""
+    async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:
+        """Apply a batch, whose number may be one of the hull with a uid."""
 
     async def apply_together(self, write: WriteTogether) -> list[Applied]:
         """Apply a batch to each of several hulls."""
@@ -166,6 +167,7 @@ class Client:
         calm: whether nothing may be refused but for a limit.
         seen: what it has read of each hull.
         fences: the uid of each fence that it follows, and the last event that it has.
+        uids: the uid of each hull of which its numbers are.
     """
 
     def __init__(self, number: int, server: Server, model: Model) -> None:
@@ -175,7 +177,12 @@ class Client:
         self.calm = False
         self.seen: dict[str, list[tuple[str, int, Content]]] = {}
         self.fences: dict[str, tuple[str, int]] = {}
+        self.uids: dict[str, str] = {}
         self._next: dict[str, int] = {}
+
+    def remember(self, before: "Client") -> None:
+        """Go on as the client that it was in the life before."""
+        self.seen, self.fences, self.uids, self._next = before.seen, before.fences, before.uids, before._next
 
     async def do(self, op: Operation) -> None:
         """Carry out one operation."""
@@ -246,13 +253,25 @@ class Client:
         name, producer = op["name"], self._producer(op)
         sequence = self._numbers(op, producer)[0]
         attempt, write = self._batch(op, producer, sequence)
+        uid, least = self.uids.get(name + producer, "") if producer else "", self.model.kept_last(name, producer)
         asked = self.model.ask(name, makes=op["create"])
         try:
-            applied = await self.server.apply(name, write, create=op["create"])
+            applied = await self.server.apply(name, write, create=op["create"], uid=uid)
+        except RestoredError as error:
+            self.model.restored(asked, error, least)
+            self.refused(asked, error, (RestoredError,), [attempt])
+            self._next[name + producer], self.uids[name + producer] = error.last + 1, error.uid
+        except SequenceGapError as error:
+            if not uid:
+                self.model.unexplained(asked)
+            self._batch_refused(op, asked, error, [attempt])
         except Exception as error:
             self._batch_refused(op, asked, error, [attempt])
         else:
+            self.model.require_present(name, uid)
             self._applied(asked, attempt, applied, producer, sequence)
+            if producer and not applied.duplicate:
+                self.uids[name + producer] = self.model.uid_of(attempt)
             if name in TIMED:
                 self._put(op, attempt, applied)
 

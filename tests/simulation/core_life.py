@@ -16,7 +16,7 @@ from dynhull_server.engine.batch_stream import BatchStream
 from dynhull_server.engine.fences import who_waits
 from dynhull_server.engine.group_commit import GroupCommit
 from dynhull_server.engine.server_time import ServerTime
-from dynhull_server.engine.threads import Clock
+from dynhull_server.engine.threads import Clock, Threads
 from dynhull_server.engine.watch_fence import Sent, following
 from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
@@ -154,9 +154,11 @@ class NoThreads:
 
 
 class CoreServer:
-    """Drives a Core as Engine does, an event a turn."""
+    """Drives a Core as Engine does, an event a turn. Commits take one turn, unless there are `threads` for them."""
 
-    def __init__(self, limits: Limits, storage: Storage, model: Model, schedule: Schedule) -> None:
+    def __init__(
+        self, limits: Limits, storage: Storage, model: Model, schedule: Schedule, threads: Threads | None = None
+    ) -> None:
         self.model = model
         self.schedule = schedule
         self._limits = limits
@@ -168,8 +170,8 @@ class CoreServer:
             self.core.restore(row, HullState(limits, row.settings, kept, now=0.0), len(kept.records))
         fences = storage.read_fences([row.number for row in contents.fences])
         self.core.restore_fences([each for each in fences if each is not None])
-        threads: Any = NoThreads()
-        self._commits = GroupCommit(storage, threads, Clock(), lambda _: None, lambda _: None)
+        turns = NoThreads()
+        self._commits = GroupCommit(storage, threads or turns, Clock(), lambda _: None, lambda _: None)  # type: ignore[arg-type]
         self._events: deque[Event] = deque()
         self._stepping = False
         self._clock = StoppedClock(schedule.random.uniform(0, 10))
@@ -179,7 +181,8 @@ class CoreServer:
         self._computing: deque[Trip] = deque()
         self._pauses: deque[Trip] = deque()
         self._clients: list[ClientActor] = []
-        schedule.actor("commits", lambda: threads.items, lambda: threads.run())
+        if threads is None:
+            schedule.actor("commits", lambda: turns.items, lambda: turns.run())
         schedule.actor("news", lambda: self._news, lambda: self._news.popleft()())
         schedule.actor("disk", lambda: self._examining, self._examine)
         schedule.actor("turns", lambda: self._computing, self._compute)
@@ -297,7 +300,7 @@ class CoreServer:
             self.dispatch(request)
         await Wait(lambda: all(request.to.answered for request in requests))
 
-    async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
+    async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:  # noqa: ARG002
         write.to, write.name, write.arrived = Answer(), name, self.time()
         if create:
             write.birth = self._birth()

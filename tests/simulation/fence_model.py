@@ -133,6 +133,10 @@ class FenceModel:
         self.ever: dict[int, FenceTruth] = {}
         self._told: dict[tuple[int, int], list[tuple[FenceTruth, int]]] = {}
 
+    def belong_to(self, model: "Model") -> None:
+        """Go on beside another model of the hulls."""
+        self._model = model
+
     # What is kept
 
     def landed(self, changes: Sequence[Any], before: "dict[str, tuple[Truth, int]]") -> None:
@@ -202,7 +206,7 @@ class FenceModel:
 
     def _deleted(self, fence: FenceTruth) -> None:
         """The fence has one more event, which only those see who watch it."""
-        closed = self._summary(fence, EventType.CLOSED, 0)
+        closed = self.summary(fence, EventType.CLOSED, 0)
         fence.events.append(closed._replace(time=fence.events[-1].time if fence.events else NO_TIME))
         fence.deleted = self._model.commits
         del self.alive[fence.row.name]
@@ -227,7 +231,7 @@ class FenceModel:
                     expected.append(there.event(EventType.ENTER, Cause.CREATED))
         match config.initial:
             case "snapshot":
-                expected = [self._summary(fence, EventType.SNAPSHOT, Cause.CREATED)]
+                expected = [self.summary(fence, EventType.SNAPSHOT, Cause.CREATED)]
             case "none":
                 kept = _members(added.inside.members)
                 if kept != _members(self._members(fence)):
@@ -544,7 +548,8 @@ class FenceModel:
             keys = sorted(key for hull, key in fence.inside if hull == name)
             yield Members(name, as_keys(keys, self._model.alive[name].row.settings.identity), now[name])
 
-    def _summary(self, fence: FenceTruth, kind: EventType, causes: int) -> FenceEvent:
+    def summary(self, fence: FenceTruth, kind: EventType, causes: int) -> FenceEvent:
+        """An event with all who are inside of a fence."""
         now = self._now()
         there = Expected(fence.config, now, "", WHOLE, None, None)
         return there.event(kind, causes)._replace(inside=tuple(self._members(fence)))

@@ -156,14 +156,12 @@ class Thread:
 class SimulatedThreads(Threads):
     """Makes simulated threads."""
 
-    def __init__(self, loop: Loop, model: Model, schedule: Schedule) -> None:
-        self._loop = loop
+    def __init__(self, model: Model, schedule: Schedule) -> None:
         self._model = model
         self._schedule = schedule
         self._hub = getcurrent()
         self._all: list[Thread] = []
         self._pools: list[_Pool] = []
-        loop.executor(self.pool("to_thread", 4).submit)
 
     def current(self) -> Thread | None:
         """The thread that runs, None for the event loop's."""

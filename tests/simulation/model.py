@@ -11,6 +11,7 @@ its x, and all points of a parabola are vertices: so an answer names the batches
 * No answer to a later request is older than an answer that has been seen.
 * Positions are held out of a hull, and let in, as its rules say: see `quarantine_model`.
 * Events of fences follow from the revisions: see `fence_model`.
+* A restored backup is taken for what there was before by nobody, least of all by writers: see `incarnation`.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
 
@@ -23,6 +24,7 @@ import numpy as np
 from support.sides import Rings, hull
 
 from dynhull_server.state.batch import Applied
+from dynhull_server.state.errors import RestoredError
 from dynhull_server.state.fences.records import Cause
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
@@ -70,12 +72,14 @@ class Truth:
     `requests` those about the quarantine that are not answered.
     `corners` is for fences. `since` is the number of commits when it was made.
     `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
+    `restored` is whether a backup has brought it back.
     """
 
     row: HullRow
     contents: list[Content] = field(default_factory=lambda: [()])
     producers: dict[str, int] = field(default_factory=dict)
     deleted: bool = False
+    restored: bool = False
     bonds: deque[tuple[int, list[int]]] = field(default_factory=deque)
     keys: list[dict[float, Key]] = field(default_factory=lambda: [{}])
     held: list[dict[Key, Entity]] = field(default_factory=lambda: [{}])
@@ -153,6 +157,7 @@ class Model:
         fences: the fences.
         numbers: the numbers of all hulls and fences.
         commits: how many there have been.
+        uids_ever: the uids that there were before a restore.
         finding: the first promise that was broken.
     """
 
@@ -161,6 +166,7 @@ class Model:
         self.alive: dict[str, Truth] = {}
         self.fences = FenceModel(self)
         self.numbers: set[int] = set()
+        self.uids_ever: set[str] = set()
         self.commits = 0
         self.faulty = self.stopping = self.days = False
         self.finding: str | None = None
@@ -202,6 +208,10 @@ class Model:
             self._see(truth.row.name, (truth.row.number, DELETED if truth.deleted else truth.revision))
         for number, fence in self.fences.ever.items():
             self._see(PREFIX + fence.row.name, (number, fence.last if fence.deleted is None else DELETED))
+
+    def forget_answers(self) -> None:
+        """A backup is restored: it lacks what may have been answered since."""
+        self._floor = {}
 
     # What is kept
 
@@ -459,6 +469,34 @@ class Model:
             hulls = [each for each in self._hulls.values() if each.row.name == name]
             return any(each.producers.get(producer, 0) >= sequence for each in hulls)
         return bool(self._numbered.get((name, producer, sequence)))
+
+    def uid_of(self, attempt: int) -> str:
+        """The uid of the hull that has a batch."""
+        return self._places[attempt][0].row.uid
+
+    def require_present(self, name: str, uid: str) -> None:
+        """A numbered batch of a hull with a uid was acknowledged: it is no other one, because of a restore."""
+        truth = self.alive.get(name)
+        if uid and truth is not None and truth.restored and truth.row.uid != uid:
+            raise self.finds(f"a batch to {uid} was acknowledged by {truth.row}, which was restored")
+
+    def unexplained(self, asked: Asked) -> None:
+        """Numbers that do not say of which hull they are leave a gap in one: a restore is not the reason."""
+        truth = self.alive.get(asked.name)
+        if truth is not None and truth.restored and truth.row.number == asked.floor[0]:
+            raise self.finds(f"a gap in {asked.name} is answered as one, and the hull was restored")
+
+    def restored(self, asked: Asked, error: RestoredError, least: int) -> None:
+        """A writer was refused as one from before a restore, which has kept a number of it, at least this one."""
+        truth = self._uids.get(error.uid)
+        if truth is None or not truth.restored or error.name != asked.name:
+            raise self.finds(f"{error!r} was answered, and no such hull was restored")
+        if not least <= error.last <= truth.producers.get(error.producer, 0):
+            raise self.finds(f"{error!r} was answered, kept is {truth.producers}")
+
+    def kept_last(self, name: str, producer: str) -> int:
+        """The last number of a producer that a hull has kept."""
+        return self.alive[name].producers.get(producer, 0) if name in self.alive else 0
 
     def put(self, attempt: int, applied: Applied, puts: int, *, timed: bool) -> None:
         """A batch of keys has been acknowledged: what it is said to have done must be what it did.

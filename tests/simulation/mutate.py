@@ -12,8 +12,10 @@ from pathlib import Path
 
 import dynhull_server
 
+from .package import NAMES
+
 HERE = Path(__file__).parent
-PACKAGE = Path(dynhull_server.__file__).parent
+PACKAGES = Path(dynhull_server.__file__).parents[1]
 PATCHES = sorted((HERE / "mutants").glob("*.patch"))
 # Lives within which a fault must be found.
 MOST_LIVES = 10_000
@@ -33,13 +35,13 @@ class Hunt:
 
 def fits(patch: Path) -> None:
     """Raise RuntimeError if a patch no longer applies to the code."""
-    _apply(patch, PACKAGE.parent, "--check")
+    _apply(patch, PACKAGES, "--check")
 
 
 def _put_in(patch: Path, folder: Path) -> None:
-    """Make a copy of the package with a fault in it."""
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(PACKAGE, folder / "dynhull_server", ignore=ignored)
+    """Make a copy of the packages with a fault in it."""
+    for name in NAMES:
+        shutil.copytree(PACKAGES / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     _apply(patch, folder)
 
 
@@ -51,7 +53,7 @@ def _apply(patch: Path, folder: Path, *options: str) -> None:
 
 
 def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
-    """Put a fault into a copy of the package, and look for it."""
+    """Put a fault into a copy of the packages, and look for it."""
     layer = re.search(r"^Layer: (\w+)$", patch.read_text(), re.MULTILINE)
     assert layer is not None, f"{patch} does not say in which layer"
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Another copy of the server's package in place of the installed one: to be called before anything imports it."""
+"""Other copies of the server's packages in place of those installed: to be called before anything imports them."""
 
 import sys
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
 
-NAME = "dynhull_server"
+NAMES = "dynhull_server", "dynhull_cluster"
 
 
 class _Finder(MetaPathFinder):
@@ -14,11 +14,11 @@ class _Finder(MetaPathFinder):
         self._folder = folder
 
     def find_spec(self, name: str, path: Sequence[str] | None = None, _: ModuleType | None = None) -> ModuleSpec | None:
-        if name == NAME:
+        if name in NAMES:
             return PathFinder.find_spec(name, [self._folder])
-        return PathFinder.find_spec(name, path) if name.startswith(NAME + ".") else None
+        return PathFinder.find_spec(name, path) if name.partition(".")[0] in NAMES else None
 
 
 def use_package(folder: str) -> None:
-    """Import the package from a folder: an editable installation would come before the search path."""
+    """Import the packages from a folder: an editable installation would come before the search path."""
     sys.meta_path.insert(0, _Finder(folder))

@@ -7,16 +7,15 @@ says who comes when, is drawn from the plan's seed and nothing else.
      "lives": [{"clients": [[operation, ...], ...], "end": "kill", "after": 40}, ...],
      "faults": [{"at": "commit", "nth": 3, "kind": "ghost", "calls": 1}, ...]}
 
+A life with `restored` begins with the last backup in place of what the life before has left.
 An operation names what to do and to which hull; with `leave` its caller disconnects after that number of turns.
 """
 
 import random
 from typing import Any
 
+from .cluster_plan import Operation, Plan, random_cluster_plan
 from .globe import CENTERS, FAR, GLOBE
-
-Plan = dict[str, Any]
-Operation = dict[str, Any]
 
 NAMES = ("a", "b", "c")
 # Hulls with keys, and of which type these are; and one of points in a window.
@@ -92,6 +91,9 @@ SWARM = (0, 1, 1, 5)
 # hardly ever meet.
 RECALLS_BESIDE_DELETES = 0.1
 
+# The share of the plans on SQLite in which a backup is made and restored: with fences, without them.
+WITH_RESTORES = 0.8, 0.3
+
 # How a commit fails: surely not done; done or not though it raised; and not decided before it is settled.
 COMMIT_FAULTS = ("nothing", "full", "lost", "ghost", "memory", "ghost memory", "later lost", "later ghost")
 # How everything else fails.
@@ -107,6 +109,8 @@ ENDS = ("kill", "kill", "stop")
 
 def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
+    if layer == "cluster":
+        return random_cluster_plan(seed)
     draw = random.Random(seed)
     with_fences = draw.random() < WITH_FENCES
     with_times = with_fences or draw.random() < 0.5
@@ -170,12 +174,40 @@ def random_plan(seed: int, layer: str) -> Plan:
     held = [name for name in timed if name in QUARANTINED]
     if held and quarantine.random() < WITH_QUARANTINE:
         _add_quarantine(quarantine, plan, held)
+    restores = random.Random(f"restores {seed}")
+    if layer == "sqlite" and restores.random() < WITH_RESTORES[not fences]:
+        _add_restore(restores, plan, (names, timed, fences), weights)
     queries = random.Random(f"queries {seed}")
     if layer != "core" and queries.random() < WITH_QUERIES:
         for _ in range(queries.choice(QUERIES)):
             client = queries.choice(queries.choice(lives)["clients"])
             client.insert(queries.randint(0, len(client)), _query(queries, (*names, *timed)))
     return plan
+
+
+def _add_restore(draw: random.Random, plan: Plan, names: "Names", weights: dict[str, int]) -> None:
+    """A backup in one life, more of it, perhaps more lives, and one that begins with what the backup has."""
+    lives = plan["lives"]
+    backed_up = draw.randrange(len(lives))
+    clients = lives[backed_up]["clients"]
+    if draw.random() < WITH_SCENES:
+        clients.insert(0, _numbered(draw, names[0][0]))
+    compared = [name for name in names[2] if FENCED[name][0] != "other"]
+    if compared and draw.random() < WITH_SCENES:
+        clients.append(_fence_changes(draw, draw.choice(compared)))
+        plan["fences"] |= {"max_fences": 10, "max_fence_consumers": 10}
+    client = draw.choice((clients[0], clients[-1], draw.choice(clients)))
+    client.insert(draw.randint(0, len(client)), {"do": "backup"})
+    after = _life(draw, names, weights) | {"restored": True}
+    after["clients"].insert(0, _numbered(draw, names[0][0]))
+    lives.insert(draw.choice((backed_up + 1, draw.randint(backed_up + 1, len(lives)))), after)
+
+
+def _numbered(draw: random.Random, name: str) -> list[Operation]:
+    """A writer's batches, among which a backup may come."""
+    write = {"do": "write", "name": name, "create": name not in GLOBE, "numbered": True, "rows": 1}
+    rest = {"do": "rest", "name": name, "seconds": 0.01}
+    return draw.choices([write, write, rest], k=draw.randint(3, 8))
 
 
 def _query(draw: random.Random, names: tuple[str, ...]) -> Operation:

@@ -5,11 +5,13 @@ import traceback
 from dataclasses import dataclass
 from typing import Any
 
+import dynhull_cluster
 import dynhull_server
 from dynhull_server.state.limits import FenceLimits, Limits
 from dynhull_server.storage.memory import MemoryStorage
 
 from .clients import Client, probe, probe_fence
+from .cluster_life import World
 from .core_life import CoreServer
 from .model import Finding, Model
 from .plan import Plan
@@ -41,26 +43,31 @@ class Outcome:
 
 def play(plan: Plan) -> Outcome:
     """Play a plan to its end, or to the first broken promise. Nothing is logged."""
-    log = logging.getLogger(dynhull_server.__name__)
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
+    logs = [logging.getLogger(each.__name__) for each in (dynhull_server, dynhull_cluster)]
+    levels = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL + 1)
     try:
         return _play(plan)
     finally:
-        log.setLevel(level)
+        for log, level in zip(logs, levels, strict=True):
+            log.setLevel(level)
 
 
 def _play(plan: Plan) -> Outcome:
+    if plan["layer"] == "cluster":
+        return _play_cluster(plan)
     limits = Limits(**plan["limits"], fences=FenceLimits(**plan.get("fences", {})))
     model, schedule = Model(limits), Schedule(plan["seed"])
     storage = _storage(plan, model)
     lives = 0
     where = ""
     try:
+        clients: list[Client] = []
         for life in plan["lives"]:
             lives += 1
-            _live(plan["layer"], life, limits, model, schedule, storage)
-        _live(plan["layer"], {"clients": [], "end": "kill"}, limits, model, schedule, storage)
+            clients = _live(plan["layer"], life, limits, model, schedule, storage, clients)
+        _live(plan["layer"], {"clients": [], "end": "kill"}, limits, model, schedule, storage, [])
     except Finding:
         where = traceback.format_exc()
     except Exception as error:  # the server's own code has failed
@@ -71,6 +78,20 @@ def _play(plan: Plan) -> Outcome:
     return Outcome(lives, schedule.trace, model.finding, where)
 
 
+def _play_cluster(plan: Plan) -> Outcome:
+    model, schedule = Model(Limits(**plan["limits"])), Schedule(plan["seed"])
+    where = ""
+    try:
+        World(plan, model, schedule).play()
+    except Finding as finding:
+        model.finds(str(finding))
+        where = traceback.format_exc()
+    except Exception as error:  # the server's own code has failed
+        model.finds(f"{type(error).__name__}: {error}")
+        where = traceback.format_exc()
+    return Outcome(1, schedule.trace, model.finding, where)
+
+
 def _storage(plan: Plan, model: Model) -> FaultyStorage:
     if plan["storage"] == "sqlite":
         return SQLiteLives(model, plan["faults"])
@@ -78,16 +99,29 @@ def _storage(plan: Plan, model: Model) -> FaultyStorage:
 
 
 def _live(
-    layer: str, life: dict[str, Any], limits: Limits, model: Model, schedule: Schedule, storage: FaultyStorage
-) -> None:
+    layer: str,
+    life: dict[str, Any],
+    limits: Limits,
+    model: Model,
+    schedule: Schedule,
+    storage: FaultyStorage,
+    before: list[Client],
+) -> list[Client]:
+    """One life. The clients of a life that begins with a restore are those of the life before."""
     schedule.clear()
     storage.calm = True
+    if life.get("restored"):
+        storage.restore()
     server: CoreServer | ShellServer = LAYERS[layer](limits, storage, model, schedule)
     model.new_life()
     server.check()
     storage.calm = False
-    for number, operations in enumerate(life["clients"]):
-        server.client(Client(number, server, model), operations)
+    clients = [Client(number, server, model) for number in range(len(life["clients"]))]
+    for client, operations in zip(clients, life["clients"], strict=True):
+        server.client(client, operations)
+    if life.get("restored"):
+        for client, former in zip(clients, before, strict=False):
+            client.remember(former)
     if "after" in life:
         for _ in range(life["after"]):
             if not server.turn():
@@ -101,6 +135,7 @@ def _live(
             raise model.finds(f"after the end these wait: {server.waiting()}")
     storage.dead = True
     server.kill()
+    return clients
 
 
 def _look(server: CoreServer | ShellServer, model: Model, schedule: Schedule, storage: FaultyStorage) -> None:

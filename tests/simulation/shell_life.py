@@ -13,6 +13,7 @@ from dynhull_server.engine.supervisor import TRANSIENT, Supervisor
 from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
 from dynhull_server.engine.watch import watch
 from dynhull_server.engine.watch_fence import watch_fence
+from dynhull_server.rpc.writing import gap_explained, require_present
 from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import HullNotFoundError
@@ -76,8 +77,10 @@ class ShellServer:
     def __init__(self, limits: Limits, storage: FaultyStorage, model: Model, schedule: Schedule) -> None:
         self.model = model
         self.schedule = schedule
+        self._storage = storage
         self.loop = Loop(model, schedule)
-        self._threads = SimulatedThreads(self.loop, model, schedule)
+        self._threads = SimulatedThreads(model, schedule)
+        self.loop.executor(self._threads.pool("to_thread", 4).submit)
         storage.give_way = self._threads.give_way
         self._supervisor = WatchedSupervisor(model, self.loop)
         machine = simulated_machine(self.loop, self._threads, model)
@@ -127,8 +130,13 @@ class ShellServer:
     async def delete_at_once(self, name: str, times: int) -> None:
         await asyncio.gather(*(self._engine.delete(name) for _ in range(times)), return_exceptions=True)
 
-    async def apply(self, name: str, write: WriteBatch, *, create: bool) -> Applied:
-        return await self._engine.apply(name, write, create=create)
+    async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:
+        try:
+            if uid and self._engine.has(name):
+                await require_present(self._engine.get(name), write.producer, uid)
+            return await self._engine.apply(name, write, create=create)
+        except Exception as error:
+            raise gap_explained(error, self._engine, name, uid) from None
 
     async def apply_together(self, write: WriteTogether) -> list[Applied]:
         return await self._engine.apply_together(write)
@@ -194,9 +202,12 @@ class ShellServer:
                     return
 
     async def special(self, client: Client, op: Operation) -> None:
-        """Let time pass, send a stream of reads, or watch a hull."""
+        """Let time pass, make a backup, send a stream of reads, or watch a hull."""
         if op["do"] == "rest":
             await asyncio.sleep(op["seconds"])
+            return
+        if op["do"] == "backup":
+            self._storage.back_up()
             return
         if op["do"] == "query":
             await Queries(self._engine, self.model).ask(client, op)

@@ -57,8 +57,8 @@ def _smaller(plan: Plan) -> Iterator[Plan]:
         for client in range(len(clients)):
             for op in range(len(clients[client])):
                 yield _without(plan, "lives", life, "clients", client, op)
-        for key in ("after", "end"):
-            if key == "after" and key in plan["lives"][life]:
+        for key in ("after", "restored"):
+            if key in plan["lives"][life]:
                 yield _without(plan, "lives", life, key)
     for i, fault in enumerate(plan["faults"]):
         if fault["calls"] > 1:

@@ -8,21 +8,27 @@ import shutil
 import sqlite3
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
+from dynhull_server.state.fences.records import KeptFence
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import Contents, Progress
+from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.sqlite.disk import Access, Disk
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
+from .incarnation import Backup
 from .model import Model
 from .store import FaultyStorage
 
 FAILED = {"full": sqlite3.SQLITE_FULL, "lost": sqlite3.SQLITE_IOERR, "ghost": sqlite3.SQLITE_IOERR_FSYNC}
 # Where the folders of the lives are: in memory, where there is such a place.
 SHARED_MEMORY = Path("/dev/shm")
+# More events than a fence has.
+MANY = 10**6
 
 
 class SQLiteLives(FaultyStorage):
@@ -34,6 +40,8 @@ class SQLiteLives(FaultyStorage):
         self._folders = 1
         self._disk = _FaultyDisk(self.fault, self._landed)
         self._pending: Sequence[Any] = ()
+        self._backup: tuple[Path, Backup] | None = None
+        self._restores = False
 
     @property
     def _folder(self) -> Path:
@@ -49,13 +57,41 @@ class SQLiteLives(FaultyStorage):
             left = self._folder
             self._folders += 1
             self._folder.mkdir()
-            for file in left.iterdir():
-                if not file.name.endswith("-shm"):
-                    shutil.copy(file, self._folder)
+            self._follow(left)
             self._disk.drop()
             shutil.rmtree(left)
         self._inner = SQLiteStorage(self._folder, Durability.SYNC, self._disk)
-        return super().open(progress)
+        contents = super().open(progress)
+        if self._restores and self._backup is not None:
+            self._backup[1].restore(self._model, contents, self._fences(contents))
+        self._restores = False
+        return contents
+
+    def _follow(self, left: Path) -> None:
+        """Have the next folder begin as the last one was left, or as the last backup."""
+        if self._restores and self._backup is not None:
+            list(copies.copy_all([(self._backup[0], self._folder)], lambda *_: None, restores=True))
+            return
+        for file in left.iterdir():
+            if not file.name.endswith("-shm"):
+                shutil.copy(file, self._folder)
+
+    def _fences(self, contents: Contents) -> list[KeptFence]:
+        """The fences in the folder, each with all of its events."""
+        numbers = [row.number for row in contents.fences]
+        kept = [each for each in self._inner.read_fences(numbers) if each is not None]
+        return [replace(each, events=self._inner.read_events(each.row.number, 0, MANY)) for each in kept]
+
+    def back_up(self) -> None:
+        """Copy the folder while a server uses it. Its server may hold it, so the copy is made as of its last commit."""
+        backup = Path(self._home.name) / f"backup-{self._folders}-{self._model.commits}"
+        if not backup.exists():
+            copies.copy(self._folder, backup, lambda *_: None)
+        self._backup = backup, Backup(self._model)
+
+    def restore(self) -> None:
+        """Have the next life find the last backup, if there is one."""
+        self._restores = True
 
     def commit(self, changes: Sequence[Any]) -> None:
         """Keep the changes."""

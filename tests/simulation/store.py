@@ -62,6 +62,14 @@ class FaultyStorage:
         self._decide()
         return self._inner.open(progress)
 
+    def back_up(self) -> None:
+        """Copy it as it is now."""
+        raise NotImplementedError("only folders are copied")
+
+    def restore(self) -> None:
+        """Have the next life find the last copy, if there is one, in place of what is there."""
+        raise NotImplementedError("only folders are copied")
+
     def commit(self, changes: Sequence[Any]) -> None:
         """Keep the changes, and fail before, instead or afterwards."""
         self.give_way()

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, Self
 
@@ -12,7 +13,7 @@ from dynhull_proto.v1 import hull_service_pb2
 from ..engine.engine import Engine
 from ..engine.live_hull import LiveHull
 from ..state.batch import Applied
-from ..state.errors import RestoredError, SequenceGapError
+from ..state.errors import HullNotFoundError, RestoredError, SequenceGapError
 from ..state.events import WriteBatch, WriteTogether
 from . import decode
 from .calls import Call
@@ -57,7 +58,8 @@ def decode_together(
 async def require_present(hull: LiveHull, producer: str, uid: str) -> None:
     """Raise RestoredError if the hull is no longer the one of this uid, because a backup was restored."""
     if uid not in ("", hull.uid) and hull.restored:
-        raise RestoredError(hull.name, hull.uid, producer, await hull.last_sequence(producer))
+        with suppress(HullNotFoundError):  # deleted meanwhile: it is no longer any hull
+            raise RestoredError(hull.name, hull.uid, producer, await hull.last_sequence(producer))
 
 
 def gap_explained(error: Exception, engine: Engine, name: str, uid: str) -> Exception:
