@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster cluster ray kafka simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster torture cluster ray kafka simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -154,6 +154,16 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100 --workers
 	$(BIN)/python tests/robustness/cluster/machines_torture.py --faults 100
 	$(BIN)/python tests/robustness/cluster/planned.py --changes 300
+
+FAULTS ?= 25
+
+torture: .venv/.test .venv/.peers  ## FAULTS from SEED for each kind of server: one process, several workers, PostgreSQL, a cluster; appended to build/torture, whose sums are printed
+	$(BIN)/python tests/robustness/server/torture.py --faults $(FAULTS) --seed $(SEED) --record
+	$(BIN)/python tests/robustness/server/torture.py --faults $(FAULTS) --seed $(SEED) --record --workers
+	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults $(FAULTS) --seed $(SEED) --record
+	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults $(FAULTS) --seed $(SEED) --record --workers
+	$(BIN)/python tests/robustness/cluster/machines_torture.py --faults $(FAULTS) --seed $(SEED) --record
+	$(BIN)/python tests/robustness/server/record.py
 
 cluster: .venv/.test  ## all tests of several processes and machines; `make test` runs the cheaper ones
 	CLUSTER_CASES=all $(BIN)/pytest tests/cluster tests/robustness/cluster -n 4

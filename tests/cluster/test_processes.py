@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from blind import blind, may_blind
 from forked import COMMAND
-from peers import missing, program
+from peers import missing
 from postgresql import PostgreSQL
 from server_process import finished, server_process
 
@@ -17,28 +18,23 @@ from dynhull_client import HullClient
 from dynhull_cluster.postgres.processes import is_known_dead, this_process
 
 QUIET = ("--scrub-cpu", "0", "--log-level", "error")
-# Another user, who may read this project's files, and sees no processes but its own in /proc.
-BLIND = (
-    "mount -t proc -o hidepid=2 proc /proc && exec setpriv --reuid 65534 --regid 65534 --clear-groups "
-    '--inh-caps +dac_override --ambient-caps +dac_override "$@"'
-)
 IDENTIFIED = "from dynhull_cluster.postgres.processes import this_process; print(this_process(), flush=True); input()"
 
 
-def blind() -> list[str]:
-    """The words before a command that has another user run it, with a /proc that hides processes."""
-    words = [program("unshare"), "--mount", "sh", "-c", BLIND, "sh"]
-    if subprocess.run([*words, "true"], capture_output=True, check=False).returncode:
+@pytest.fixture
+def other_user() -> list[str]:
+    """The words before a command that another user runs, who sees no processes of others."""
+    if not may_blind():
         missing("right to mount another /proc", "run the tests as root")
-    return words
+    return blind()
 
 
 @pytest.mark.one_process("its owner is the process that the test starts")
-def test_an_owner_whose_process_is_hidden_keeps_its_database(postgres: PostgreSQL) -> None:
+def test_an_owner_whose_process_is_hidden_keeps_its_database(postgres: PostgreSQL, other_user: list[str]) -> None:
     options = ("--journal", postgres.new_database(), *QUIET)
     with server_process(*options) as server, HullClient(server.address) as client:
         client.create_hull("hull")
-        other = finished([*blind(), COMMAND, "serve", "--port", "0", *options])
+        other = finished([*other_user, COMMAND, "serve", "--port", "0", *options])
         assert other.returncode != 0
         assert "is served by process" in other.stderr
         assert client.apply("hull", insert=[[1, 2]]).revision == 1

@@ -8,16 +8,28 @@ network to it those of postgres_torture.py. The other faults:
 * a worker is killed, or stopped until its partitions are taken over, and then goes on
 * a gateway is killed
 * a machine with its worker and its gateway is killed, or stopped as an operator does it, and started again
+* a machine is started again as another user, who sees no processes of others
+* the database is copied while it serves, and a server begins on the copy: nothing of that arrives
 * partitions are moved by hand; or are to be moved when the worker that has one, or is to have it, is killed or stopped,
   or PostgreSQL is killed
+
+Between machines, and to callers, there is TLS.
 """
 
+import argparse
 import os
 import signal
 import sys
-from collections.abc import Sequence
+import tempfile
 from contextlib import suppress
 from pathlib import Path
+
+import grpc
+import trustme
+from psycopg.conninfo import conninfo_to_dict
+
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
@@ -25,12 +37,15 @@ sys.path.append(str(Path(__file__).parents[2] / "support"))
 sys.path.append(str(Path(__file__).parent))
 import postgres_torture
 import torture
+from actors import persist
+from blind import blind, may_blind
 from cluster import processes
 from pacing import pause
 from patience import PATIENCE, wait_until
-from postgresql import query
+from postgresql import postgresql, query
 from promises import require
 from server_process import run as run_command
+from tortured import Server, killed_at_the_end
 
 PARTITIONS = 4
 OPTIONS = ("--cluster", "--partitions", str(PARTITIONS), "--grace", "10")
@@ -43,13 +58,15 @@ class Torture(postgres_torture.Torture):
     shards = 3
 
     def __init__(self, folder: Path, seed: int, breath: float) -> None:
-        self._other: torture.Server | None = None
-        super().__init__(folder, seed, breath, OPTIONS)
-        self._other = torture.Server(folder, OPTIONS, self._journal)
+        self._other: Server | None = None
+        self._given = (*OPTIONS, *certified(folder))
+        tls = grpc.ssl_channel_credentials((folder / "ca.pem").read_bytes())
+        super().__init__(folder, seed, breath, self._given, tls)
+        self._other = Server(folder, self._given, self._journal)
         self._other.start()
         self._balanced()
 
-    def _machines(self) -> list[torture.Server]:
+    def _machines(self) -> list[Server]:
         return [self.server] if self._other is None else [self.server, self._other]
 
     def _balanced(self) -> None:
@@ -81,6 +98,7 @@ class Torture(postgres_torture.Torture):
         self._balanced()
         worker = self._one_of("worker")
         os.kill(worker, signal.SIGSTOP)
+        self._begins()
         try:
             wait_until(lambda: len({each for (each,) in query(self._url, SERVED)}) == 1)
             pause(self._random.uniform(0.1, 1.0))
@@ -102,8 +120,30 @@ class Torture(postgres_torture.Torture):
         if self._random.random() < 0.5:
             self._turn()
         self._other.kill()
+        self._begins()
         pause(self._random.uniform(0.0, 6.0))
         self._other.start()
+
+    def _hidden(self) -> None:
+        """The machine of the clients is of another user than the other one, which sees no processes of others."""
+        self._turn()
+        self._other.kill()
+        self._begins()
+        self._other.start(blind() if may_blind() else ())
+        self._balanced()
+
+    def _copy(self) -> None:
+        """A server on a physical copy of the database: what it acknowledges never arrives here."""
+        database = conninfo_to_dict(self._url)["dbname"]
+        request = pb.ApplyRequest(name=torture.HULL)
+        request.batch.inserts.coordinates.extend([0.5, 0.5])
+        with postgresql(copied=self._database) as copied, tempfile.TemporaryDirectory() as folder:
+            beside = Server(Path(folder), self._given, copied.url(database))
+            beside.start()
+            with killed_at_the_end(beside), self.shared.channel(beside.address) as channel:
+                stub = HullServiceStub(channel)
+                counts = [persist(stub.Apply, request).result.point_count for _ in range(8)]
+            require(counts == list(range(counts[0], counts[0] + 8)), f"the points of the copy: {counts}")
 
     def _stop_machine(self) -> None:
         """As systemd does it: its partitions move first."""
@@ -184,14 +224,25 @@ KINDS = [
     "crash_in_move",
     "freeze",
     "kill_machine",
+    "hidden",
     "full_disk",
+    "copy",
 ]
 
 
-def run(folder: Path, kinds: Sequence[str], faults: int, seed: int, breath: float) -> str:
+def certified(folder: Path) -> tuple[str, ...]:
+    """The options of servers with a certificate."""
+    authority = trustme.CA()
+    authority.issue_cert("127.0.0.1").private_key_and_cert_chain_pem.write_to_path(folder / "cert.pem")
+    authority.cert_pem.write_to_path(folder / "ca.pem")
+    cert = str(folder / "cert.pem")
+    return ("--tls-cert", cert, "--tls-key", cert, "--cluster-ca", str(folder / "ca.pem"))
+
+
+def run(folder: Path, options: argparse.Namespace) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
-    tortured = Torture(folder, seed, breath)
-    tortured.rounds(kinds, faults)
+    tortured = Torture(folder, options.seed, options.breath)
+    tortured.rounds(options.kinds, options.faults, record=options.record)
     return tortured.counts()
 
 
@@ -199,12 +250,7 @@ def main() -> None:
     parser = torture.arguments("Kill, stop and cut off the machines of a cluster while a model watches.")
     parser.add_argument("--kinds", nargs="+", choices=sorted({*KINDS}), default=KINDS, help="which (default: all)")
     options = parser.parse_args()
-    torture.on_small_disk(
-        __file__,
-        postgres_torture.DISK,
-        lambda folder: run(folder, options.kinds, options.faults, options.seed, options.breath),
-        mounted=options.mounted,
-    )
+    torture.on_small_disk(__file__, postgres_torture.DISK, lambda folder: run(folder, options), mounted=options.mounted)
 
 
 if __name__ == "__main__":

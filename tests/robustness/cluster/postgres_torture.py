@@ -10,6 +10,7 @@ The clients and the models are those of tests/robustness/server/torture.py, and 
 * the network between the two is cut; or passes nothing on for a while
 """
 
+import argparse
 import os
 import signal
 import sys
@@ -17,6 +18,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+import grpc
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 sys.path.append(str(Path(__file__).parents[1] / "server"))
@@ -27,6 +29,7 @@ from patience import PATIENCE
 from postgresql import FAST, PostgreSQL, query
 from promises import require
 from proxy import Proxy
+from tortured import Server
 
 DISK = "256m"
 # So that a disk of that size can be full, and yet have room for the log.
@@ -37,7 +40,14 @@ ENDED = 70  # the exit code of a server that cannot go on
 class Torture(torture.Torture):
     """A server on PostgreSQL, which it reaches through a proxy."""
 
-    def __init__(self, folder: Path, seed: int, breath: float, options: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        seed: int,
+        breath: float,
+        options: Sequence[str] = (),
+        tls: grpc.ChannelCredentials | None = None,
+    ) -> None:
         folder.chmod(0o777)
         home = folder / "pg"
         home.mkdir()
@@ -49,15 +59,15 @@ class Torture(torture.Torture):
         given = conninfo_to_dict(self._url)
         self._journal = make_conninfo(dbname=given["dbname"], user=given["user"], host=host, port=port)
         self._options = options
-        super().__init__(folder, seed, breath, options=options, journal=self._journal)
+        super().__init__(folder, seed, breath, options, self._journal, tls)
 
     def _socket(self) -> str:
         return f"{conninfo_to_dict(self._url)['host']}/.s.PGSQL.5432"
 
-    def _take_over(self) -> torture.Server:
+    def _take_over(self) -> Server:
         """Start another server, and send new calls there; returns the one before it."""
         before = self.server
-        self.server = torture.Server(self._folder, self._options, self._journal)
+        self.server = Server(self._folder, self._options, self._journal)
         self._start()
         self._proxy.server = self.server.address
         return before
@@ -66,12 +76,14 @@ class Torture(torture.Torture):
         """A kill, and another server."""
         self.shared.gate.clear()
         self.server.kill()
+        self._begins()
         self._proxy.cut()
         self._take_over()
 
     def _zombie(self) -> None:
         """A server that is stopped until another one has taken over. Calls that it has keep waiting for it."""
         self.server.process.send_signal(signal.SIGSTOP)
+        self._begins()
         try:
             before = self._take_over()
             pause(self._random.uniform(0.1, 1.0))
@@ -135,10 +147,10 @@ class Torture(torture.Torture):
         self._database.stop()
 
 
-def run(folder: Path, faults: int, seed: int, breath: float, *, workers: bool) -> str:
+def run(folder: Path, options: argparse.Namespace) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     kinds = ["zombie", "crash", "terminate", "cut", "kill", "hold", "replace", "freeze", "terminate", "full_disk"]
-    if workers:
+    if options.workers:
         kinds = [
             "kill_worker",
             "crash",
@@ -150,20 +162,15 @@ def run(folder: Path, faults: int, seed: int, breath: float, *, workers: bool) -
             "freeze",
             "full_disk",
         ]
-    tortured = Torture(folder, seed, breath, torture.WORKERS if workers else ())
-    tortured.rounds(kinds, faults)
+    tortured = Torture(folder, options.seed, options.breath, torture.WORKERS if options.workers else ())
+    tortured.rounds(kinds, options.faults, record=options.record)
     return tortured.counts()
 
 
 def main() -> None:
     description = "Kill, stop and cut off a server and its PostgreSQL while a model watches."
     options = torture.arguments(description).parse_args()
-    torture.on_small_disk(
-        __file__,
-        DISK,
-        lambda folder: run(folder, options.faults, options.seed, options.breath, workers=options.workers),
-        mounted=options.mounted,
-    )
+    torture.on_small_disk(__file__, DISK, lambda folder: run(folder, options), mounted=options.mounted)
 
 
 if __name__ == "__main__":

@@ -39,15 +39,26 @@ class Shared:
     """The state that all threads share."""
 
     target: str
+    tls: grpc.ChannelCredentials | None = None
     breath: float = BREATH
     gate: threading.Event = field(default_factory=threading.Event)  # open: writers write
     over: threading.Event = field(default_factory=threading.Event)
     failures: list[BaseException] = field(default_factory=list)
 
     def stub(self) -> tuple[grpc.Channel, HullServiceStub]:
-        options = [("grpc.initial_reconnect_backoff_ms", 20), ("grpc.max_reconnect_backoff_ms", 200)]
-        channel = grpc.insecure_channel(self.target, options=[*options, ("grpc.use_local_subchannel_pool", 1)])
+        channel = self.channel(self.target)
         return channel, HullServiceStub(channel)
+
+    def channel(self, target: str) -> grpc.Channel:
+        """A channel of its own to a server."""
+        options = [
+            ("grpc.initial_reconnect_backoff_ms", 20),
+            ("grpc.max_reconnect_backoff_ms", 200),
+            ("grpc.use_local_subchannel_pool", 1),
+        ]
+        if self.tls is None:
+            return grpc.insecure_channel(target, options=options)
+        return grpc.secure_channel(target, self.tls, options=options)
 
 
 class Actor(threading.Thread):
@@ -101,6 +112,7 @@ class Writer(Actor):
         self.hulls = hulls
         self.batches: list[Any] = []
         self.acknowledged = 0
+        self.moments: list[float] = []  # at which batches were acknowledged
         self.idle = threading.Event()
 
     def act(self, stub: HullServiceStub) -> None:
@@ -128,6 +140,7 @@ class Writer(Actor):
         """The next batch is acknowledged, with its result for each hull, or none if only its number is known."""
         require(len(results) in (0, len(self.hulls)), f"{self.name}: {len(results)} results")
         self.acknowledged += 1
+        self.moments.append(time.monotonic())
 
     def create_batch(self) -> Any:
         raise NotImplementedError
@@ -269,7 +282,7 @@ class Watcher(Actor):
         self.moved = threading.Condition()
         self.resumed = 0
         self._seen: deque[Seen] = deque(maxlen=20)
-        self._uid = ""
+        self._uid = self._of = ""
         self._request = pb.WatchRequest(name=hull, include_keys=keys)
         self._request.progress_interval.FromMilliseconds(200)
 
@@ -290,6 +303,9 @@ class Watcher(Actor):
         with self.moved:
             if response.HasField("snapshot"):
                 self._uid = response.snapshot.uid
+                if self._uid != self._of:  # another hull, as a restored one is
+                    self._seen.clear()
+                self._of = self._uid
             else:
                 self.resumed += 1
                 require(response.revision >= self.copy.revision, f"{self.name}: revision {response.revision} came back")

@@ -19,6 +19,9 @@ keys between two hulls. After every fault models check each promise of docs/guar
 * a server whose data have one changed bit does not start, and reports why; or it keeps all this except for the last
   batches, and reports that it lost them
 * a backup of the running server, and a restore of a killed one's folder, have every batch acknowledged before
+* a server that begins again with a restored backup has what was in it; what resumes begins anew, and a writer with
+  numbers from after the backup gets RESTORED with the last number that is kept
+* after each fault all writers get batches acknowledged again; with --record it is noted how long that took
 """
 
 import argparse
@@ -33,7 +36,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 import grpc
@@ -57,65 +60,22 @@ from actors import (
     persist,
 )
 from cluster import processes
-from forked import COMMAND, Process
 from pacing import pause
 from patience import PATIENCE
 from promises import require
 from proxy import Proxy
+from record import recorded
 from server_process import run
 from timed import ModelledHull, Shuttle, TimedWriter, wall
 from timeline import FLEETS, SECOND, TIMED
+from tortured import Server, killed_at_the_end
 
 HULL = "tortured"
 POINT_WRITERS = 2
 WORKERS = ("--workers", "2", "--gateways", "2")
 DISK = "64m"
 PAGE_BYTES = 8192  # of the database
-
-
-class Server:
-    """`dynhull serve` on a folder, or on a database, with these options; it keeps its port over its lives."""
-
-    def __init__(self, folder: Path, options: Sequence[str] = (), journal: str = "") -> None:
-        self.data = folder / "data"
-        self._options = [*options, *(["--journal", journal] if journal else ["--data", str(self.data)])]
-        self._port = 0
-        self._log = folder / "server.log"
-
-    def start(self, wrap: Sequence[str] = ()) -> None:
-        require(self.starts(wrap), f"the server did not start: {self.said()}")
-
-    def starts(self, wrap: Sequence[str] = ()) -> bool:
-        command = [*wrap, COMMAND, "serve", "--port", str(self._port)]
-        command += ["--create-on-write", "--snapshot-points", "300", "--log-level", "warning", "--scrub-cpu", "0"]
-        command += self._options
-        with self._log.open("ab") as log:
-            self.process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
-        line = self.process.stdout.readline()
-        if "serving on" not in line:
-            self.process.wait()
-            return False
-        self._port = int(line.rsplit(":", 1)[1])
-        return True
-
-    @property
-    def address(self) -> str:
-        return f"127.0.0.1:{self._port}"
-
-    def said(self) -> str:
-        return self._log.read_text()
-
-    def kill(self) -> None:
-        self.process.kill()
-        self.process.wait()
-
-
-@contextmanager
-def killed_at_the_end(server: Server) -> Iterator[None]:
-    try:
-        yield
-    finally:
-        server.kill()
+ON_ITS_WAY = 0.1  # seconds in which answers of a server that has been killed may still arrive
 
 
 class Torture:
@@ -130,6 +90,7 @@ class Torture:
         breath: float,
         options: Sequence[str] = (),
         journal: str = "",
+        tls: grpc.ChannelCredentials | None = None,
     ) -> None:
         self._folder = folder
         self._seed, self._random = seed, random.Random(seed)
@@ -137,7 +98,7 @@ class Torture:
         self.server.start()
         self._started = wall(), time.monotonic()
         self._proxy = Proxy(self.server.address)
-        self.shared = Shared(self._proxy.address, breath)
+        self.shared = Shared(self._proxy.address, tls, breath)
         self._channel, self._stub = self.shared.stub()
         persist(self._stub.CreateHull, pb.CreateHullRequest(name=HULL, config={"shards": self.shards}))
         for kind in (*TIMED, *FLEETS):
@@ -158,6 +119,8 @@ class Torture:
         self.leavers = [Leaver(self.shared, f"leaver-{i}", HULL, seed + i) for i in range(2)]
         self.faults: Counter[str] = Counter()
         self.damage: Counter[str] = Counter()
+        self.seconds: list[float] = []
+        self._began: float | None = None
         for actor in (*self.writers, *self.readers, *self.watchers, *self.leavers):
             actor.start()
         self.shared.gate.set()
@@ -166,12 +129,34 @@ class Torture:
         """Traffic, a fault during it, the checks that must hold at once, and those that must hold at rest."""
         self.faults[fault] += 1
         pause(self._random.uniform(0.05, 0.6))
+        self._began = None
         getattr(self, f"_{fault}")()
         self.shared.gate.set()
+        self._wait_until_served(self._began or time.monotonic())
         pause(self._random.uniform(0.05, 0.3))
         self._settle()
         self._check()
         self.shared.gate.set()
+
+    def _begins(self) -> None:
+        """From now on it counts how long it takes until all is served again; else from the end of the fault on."""
+        self._began = time.monotonic()
+
+    def _wait_until_served(self, since: float) -> None:
+        """Count from now on how long it takes until all is served again; else that begins with the end of the fault."""
+        least = since + ON_ITS_WAY
+        self._wait(lambda: all(writer.moments and writer.moments[-1] > least for writer in self.writers))
+        firsts = [next(moment for moment in writer.moments if moment > least) for writer in self.writers]
+        self.seconds.append(max(firsts) - since)
+        for writer in self.writers:
+            writer.moments = []
+
+    def _wait(self, condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            self._raise_failures()
+            require(time.monotonic() < deadline, f"after {self.faults} not all is served again within {PATIENCE} s")
+            pause(0.02)
 
     def _start(self, wrap: Sequence[str] = ()) -> None:
         """Start the killed server."""
@@ -186,6 +171,7 @@ class Torture:
     def _kill(self) -> None:
         self.shared.gate.clear()
         self.server.kill()
+        self._begins()
         self._proxy.cut()
         self._start()
 
@@ -193,6 +179,7 @@ class Torture:
         """A kill, and a start with the wall clock an hour back."""
         self.shared.gate.clear()
         self.server.kill()
+        self._begins()
         self._proxy.cut()
         self._start(wall_clock.at("-1h"))
 
@@ -209,6 +196,7 @@ class Torture:
 
     def _kill_one_of(self, kind: str) -> None:
         """A kill of one process of several, which the server starts again."""
+        self._begins()
         with suppress(ProcessLookupError):  # a restart of all may be under way, and have ended it
             os.kill(self._one_of(kind), signal.SIGKILL)
 
@@ -270,6 +258,39 @@ class Torture:
             self._proxy.cut()
             self._start()
             self._check_copy(restored, acknowledged)
+
+    def _restore(self) -> None:
+        """A backup is restored in place of the folder, and a writer with later numbers is told so."""
+        self._settle()
+        request = pb.ApplyRequest(name="restored", producer="early")
+        request.batch.inserts.coordinates.extend([0.0, 0.0])
+
+        def send() -> None:
+            request.sequence += 1
+            persist(self._stub.Apply, request)
+
+        persist(self._stub.Apply, pb.ApplyRequest(name="restored", batch=request.batch))  # it creates the hull
+        last = persist(self._stub.GetProducer, pb.GetProducerRequest(name="restored", producer="early"))
+        request.sequence, request.uid = last.last_sequence, last.uid
+        send()
+        kept = request.sequence
+        with tempfile.TemporaryDirectory() as folder:
+            backup = Path(folder) / "backup"
+            self._command("backup", str(backup), "--data", str(self.server.data))
+            send()
+            self.server.kill()
+            self._begins()
+            shutil.rmtree(self.server.data)
+            self._command("restore", str(backup), "--data", str(self.server.data))
+        self._proxy.cut()
+        self._start()
+        request.sequence += 1
+        try:
+            persist(self._stub.Apply, request)
+        except grpc.RpcError as error:
+            require(f"number {kept}:" in error.details(), f"a writer from before a restore: {error.details()}")
+        else:
+            require(False, "a restored hull takes numbers from before")
 
     def _command(self, *words: str) -> None:
         done = run(*words)
@@ -404,12 +425,13 @@ class Torture:
             f"calls left: {sum(leaver.left for leaver in self.leavers)}"
         )
 
-    def rounds(self, kinds: Sequence[str], faults: int) -> None:
+    def rounds(self, kinds: Sequence[str], faults: int, *, record: bool) -> None:
         """That many rounds, of each kind in turn, and the end."""
         try:
-            for i in range(faults):
-                self.round(kinds[i % len(kinds)])
-                print(f"\rseed {self._seed}, {i + 1}/{faults} faults", end="", file=sys.stderr, flush=True)
+            with recorded(self._seed, self.faults, self.seconds) if record else nullcontext():
+                for i in range(faults):
+                    self.round(kinds[i % len(kinds)])
+                    print(f"\rseed {self._seed}, {i + 1}/{faults} faults", end="", file=sys.stderr, flush=True)
         finally:
             self.finish()
 
@@ -422,14 +444,23 @@ class Torture:
         self.server.process.wait()
 
 
-def torture(folder: Path, faults: int, seed: int, breath: float, *, workers: bool = False) -> str:
+def torture(folder: Path, options: argparse.Namespace) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     clock_back = "clock_back" if shutil.which("faketime") else "kill"
-    kinds = ["kill", clock_back, "descriptors", "damage", "kill", "full_disk", "pause", "copy", "kill", "sever"]
-    if workers:
-        kinds = ["kill_worker", "kill_gateway", "restart", "kill_worker", "pause_worker", "full_disk", "sever", "kill"]
-    run = Torture(folder, seed, breath, options=WORKERS if workers else ())
-    run.rounds(kinds, faults)
+    kinds = ["kill", clock_back, "descriptors", "damage", "kill", "full_disk", "pause", "copy", "restore", "sever"]
+    if options.workers:
+        kinds = [
+            "kill_worker",
+            "kill_gateway",
+            "restart",
+            "kill_worker",
+            "pause_worker",
+            "full_disk",
+            "sever",
+            "restore",
+        ]
+    run = Torture(folder, options.seed, options.breath, options=WORKERS if options.workers else ())
+    run.rounds(kinds, options.faults, record=options.record)
     damage = (
         f"with a bit changed: {run.damage['refused']} refused to start, {run.damage['served']} served what is right"
     )
@@ -445,6 +476,7 @@ def arguments(description: str) -> argparse.ArgumentParser:
         "--breath", type=float, default=BREATH, help=f"seconds between the calls of a client (default {BREATH})"
     )
     parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
+    parser.add_argument("--record", action="store_true", help="append the run to build/torture/COMMIT.jsonl")
     parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
     return parser
 
@@ -468,12 +500,7 @@ def on_small_disk(file: str, size: str, work: Callable[[Path], str], *, mounted:
 
 def main() -> None:
     options = arguments("Kill, pause, cut off and starve a server while a model watches.").parse_args()
-    on_small_disk(
-        __file__,
-        DISK,
-        lambda folder: torture(folder, options.faults, options.seed, options.breath, workers=options.workers),
-        mounted=options.mounted,
-    )
+    on_small_disk(__file__, DISK, lambda folder: torture(folder, options), mounted=options.mounted)
 
 
 if __name__ == "__main__":
