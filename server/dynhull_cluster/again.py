@@ -24,7 +24,7 @@ def may_repeat(method: str, message: bytes, status: Status) -> bool:
     """Whether a request may be repeated after this status: it has not begun, or a second time has no effect."""
     if status.code != grpc.StatusCode.UNAVAILABLE.value[0]:
         return False
-    reason = _reason(status)
+    reason = reason_of(status)
     if reason in NOT_BEGUN:
         return True
     if reason:  # it is known what has become of it
@@ -37,7 +37,8 @@ def _is_numbered(request: Any) -> bool:
     return bool(request.producer and request.sequence)
 
 
-def _reason(status: Status) -> str:
+def reason_of(status: Status) -> str:
+    """The reason that a server gives its refusal; empty for none."""
     for detail in status.details:
         info = ErrorInfo()
         if detail.Unpack(info):

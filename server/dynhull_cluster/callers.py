@@ -45,4 +45,4 @@ def authenticator(tokens: TokenFile | None) -> Callable[[Context], Caller]:
 
 @lru_cache(maxsize=1024)
 def _trusted(owner: str) -> Caller:
-    return Caller(owner, EVERYTHING)
+    return Caller(owner, EVERYTHING, for_others=True)

@@ -1,9 +1,23 @@
-"""What many calls at a gateway have in common, for as long as one of them uses it."""
+"""What many calls at a gateway have in common, for as long as one of them uses it.
+
+The worker does not know who reads a feed, and its file of tokens may be another one than that of the gateway. So once a
+feed has begun, each call that is to read it asks the worker whether it may, and when the tokens of the worker change,
+the worker ends the feed: all of its calls then ask again, and go on with the next feed.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from typing import Generic, Protocol, TypeVar
+
+from google.protobuf.message import Message
+from google.rpc import code_pb2
+
+from dynhull_server.rpc.calls import Call
+from dynhull_server.rpc.status import TOKENS_CHANGED, RelayedError
+
+from .again import reason_of
+from .worker_link import WorkerLink
 
 
 class Feed(Protocol):
@@ -43,3 +57,33 @@ class Feeds(Generic[F]):
                 feed.close()
                 if self._feeds.get(key) is feed:
                     del self._feeds[key]
+
+
+async def require_allowed(call: Call, link: WorkerLink, method: str, request: Message) -> None:
+    """Have the worker say whether the caller may read a feed, by a small request that needs the same right.
+
+    Args:
+        call: the call.
+        link: the worker.
+        method: the path of the method of the request.
+        request: the request.
+
+    Raises:
+        RelayedError: it may not, or the worker cannot say.
+        WorkerAwayError: the worker is away.
+    """
+    if not call.caller.key:
+        return
+    try:
+        with call.cutoff():
+            await link.ask(method, call, request.SerializeToString())
+    except (
+        RelayedError
+    ) as refusal:  # rights come first, so what is not there any more may be read; the feed says the rest
+        if refusal.status.code != code_pb2.NOT_FOUND:
+            raise
+
+
+def tokens_have_changed(failure: Exception | None) -> bool:
+    """Whether a feed has ended because its calls have to ask again."""
+    return isinstance(failure, RelayedError) and reason_of(failure.status) == TOKENS_CHANGED

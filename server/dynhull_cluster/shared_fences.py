@@ -20,12 +20,13 @@ from dynhull_server.rpc.methods import FENCES
 from dynhull_server.rpc.metrics import Metrics
 
 from .callers import metadata_of, metadata_of_feed
-from .feeds import Feeds
+from .feeds import Feeds, require_allowed, tokens_have_changed
 from .relay import Relay
 from .upstream import one_request
 from .worker_link import WorkerLink
 
 WATCH_FENCE = f"/{FENCES.full_name}/WatchFence"
+GET_FENCE = f"/{FENCES.full_name}/GetFence"
 # The last responses of a feed, at which watches can join it, and their bytes, at most.
 RECENT, RECENT_BYTES = 64, 2**22
 
@@ -70,10 +71,14 @@ class SharedFences:
             if found is None:
                 return
             feed, number = found
+            await require_allowed(call, link, GET_FENCE, pb.GetFenceRequest(name=request.name))
             sequence = await self._follow(call, feed, number, sending)
             if sequence is None:
                 return
             request.uid, request.after_sequence = feed.uid, sequence
+            if feed.over:  # the tokens of the worker have changed
+                joined.close()
+                feed = self._feed(link, request, feed.uid, joined)
 
     async def _catch_up(
         self,
@@ -102,29 +107,33 @@ class SharedFences:
                         await self._relay.send(call, message)
                 resumed = False
                 if feed is None:
-                    kind = pb.WatchFenceRequest()
-                    kind.CopyFrom(request)
-                    kind.uid, kind.only_new = response.uid, True
-                    begin = partial(FenceFeed, link, kind)
-                    feed = joined.enter_context(self._feeds.use(kind.SerializeToString(deterministic=True), begin))
+                    feed = self._feed(link, request, response.uid, joined)
                 with call.cutoff():
                     await feed.begun()
                 number = feed.number_at(response.sequence)
                 if number is not None:
                     return feed, number
 
+    def _feed(self, link: WorkerLink, request: pb.WatchFenceRequest, uid: str, joined: ExitStack) -> "FenceFeed":
+        """The feed for watches like this one, of the fence with this uid."""
+        kind = pb.WatchFenceRequest()
+        kind.CopyFrom(request)
+        kind.uid, kind.only_new = uid, True
+        begin = partial(FenceFeed, link, kind)
+        return joined.enter_context(self._feeds.use(kind.SerializeToString(deterministic=True), begin))
+
     async def _follow(self, call: Call, feed: "FenceFeed", number: int, sending: Sending) -> int | None:
         """Pass on the feed from the response after that with this number.
 
-        Returns the sequence that the caller has, if the feed has forgotten the next response; None if the watch has
-        ended.
+        Returns the sequence that the caller has, if the feed has forgotten the next response, or the tokens of the
+        worker have changed; None if the watch has ended.
         """
         sequence = feed.at(number).sequence
         while True:
             with call.cutoff():
                 await feed.beyond(number)
             if feed.latest == number:
-                return None
+                return sequence if tokens_have_changed(feed.failure) else None
             number += 1
             if not feed.keeps(number):
                 return sequence
@@ -150,6 +159,7 @@ class FenceFeed:
     Attributes:
         uid: that of the fence.
         over: whether it has ended.
+        failure: what it has ended with, or None.
         latest: the number of the last response.
     """
 
@@ -157,7 +167,7 @@ class FenceFeed:
         self.uid = request.uid
         self.over = False
         self.latest = 0
-        self._failure: Exception | None = None
+        self.failure: Exception | None = None
         self._link = link
         self._request = request
         self._recent: deque[Response] = deque()
@@ -193,8 +203,8 @@ class FenceFeed:
         """Wait for a response after that with this number, or for the end. Raises what the feed has failed with."""
         while self.latest == number and not self.over:
             await self._moved.wait()
-        if self.latest == number and self._failure is not None:
-            raise self._failure
+        if self.latest == number and self.failure is not None and not tokens_have_changed(self.failure):
+            raise self.failure
 
     async def _run(self) -> None:
         try:
@@ -203,7 +213,7 @@ class FenceFeed:
                 while (message := await upstream.read()) is not None:
                     self._take(Response(message, pb.WatchFenceResponse.FromString(message).sequence))
         except Exception as error:  # each watcher raises it, and logs what is a bug
-            self._failure = error
+            self.failure = error
         self.over = True
         self._wake()
 

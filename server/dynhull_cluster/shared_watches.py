@@ -24,13 +24,14 @@ from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import HullNotFoundError
 
 from .callers import metadata_of, metadata_of_feed
-from .feeds import Feeds
+from .feeds import Feeds, require_allowed, tokens_have_changed
 from .held import Held
 from .relay import Relay
 from .upstream import lost_status, one_request
 from .worker_link import WorkerLink
 
 WATCH = f"/{DESCRIPTOR.full_name}/Watch"
+LOCATE = f"/{DESCRIPTOR.full_name}/Locate"
 # Vertices that are compared and edited on the event loop, at most.
 FEW = 256
 # The last revisions of a feed, at which watches can join it, and the bytes of their vertices.
@@ -63,7 +64,7 @@ class SharedWatches:
             begin = partial(self._begin, call, link, request, message, watcher, joined)
             found = await link.answer(WATCH, call, message, begin)
             if found is not None:
-                await self._follow(call, request, watcher, *found)
+                await self._follow(call, link, request, watcher, joined, *found)
 
     async def _begin(
         self,
@@ -108,17 +109,36 @@ class SharedWatches:
                         feed = joined.enter_context(self._feed(link, request, event.snapshot.uid))
                     return feed, Held.of(event, keys=request.include_keys)
 
-    async def _follow(self, call: Call, request: pb.WatchRequest, watcher: object, feed: "Feed", held: Held) -> None:
-        """Pass on the feed to a caller."""
+    async def _follow(
+        self,
+        call: Call,
+        link: WorkerLink,
+        request: pb.WatchRequest,
+        watcher: object,
+        joined: ExitStack,
+        feed: "Feed",
+        held: Held,
+    ) -> None:
+        """Pass on the feed to a caller, and the next one when the tokens of the worker have changed."""
         loop = asyncio.get_running_loop()
         interval = decode_rate(request.max_events_per_second)
         sent = loop.time()
         number: int | None = None
         while True:
             with call.cutoff():
+                if number is None:
+                    await feed.at(held.revision)
+                    await require_allowed(call, link, LOCATE, pb.LocateRequest(name=request.name))
                 await feed.beyond(number, held.revision)
-                await asyncio.sleep(sent + interval - loop.time())
-                number, held, event = await feed.since(number, held)
+                await feed.pause(sent + interval - loop.time())
+                event: Event | None = None
+                if (failure := feed.failure) is None:
+                    number, held, event = await feed.since(number, held)
+                elif tokens_have_changed(failure):
+                    joined.close()
+                    feed, number = joined.enter_context(self._feed(link, request, feed.uid)), None
+                else:
+                    raise failure
             if event is not None:
                 sent = loop.time()
                 with self._metrics.sending(watcher, event.kind):
@@ -185,11 +205,16 @@ class Feed:
         return None if self.failure is not None else self.recent.get(revision)
 
     async def beyond(self, number: int | None, revision: int) -> None:
-        """Wait for a message after that with this number, at this revision or later. Raises the failure of the feed."""
+        """Wait for a message after that with this number, at this revision or later, or for the end of the feed."""
         while self.failure is None and (self._held is None or self._number == number or self._held.revision < revision):
             await self._moved.wait()
-        if self.failure is not None:
-            raise self.failure
+
+    async def pause(self, seconds: float) -> None:
+        """Wait for a time, or for the end of the feed."""
+        if seconds > 0:
+            await asyncio.wait([self._running], timeout=seconds)
+        else:
+            await asyncio.sleep(0)
 
     async def since(self, number: int | None, held: Held) -> tuple[int, Held, Event | None]:
         """The number of the last message, what watchers hold after it, and what brings a watcher there, if anything.

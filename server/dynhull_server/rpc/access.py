@@ -28,6 +28,13 @@ class UnauthenticatedError(RefusedError):
         super().__init__('a valid token is required: metadata "authorization" with "Bearer " and the token')
 
 
+class TokensChangedError(Exception):
+    """The tokens have changed: a caller for others has to have each of them ask anew."""
+
+    def __init__(self) -> None:
+        super().__init__("the tokens have changed")
+
+
 class PermissionDeniedError(RefusedError):
     """The caller's token does not allow the request. This does not reveal whether the hull exists.
 
@@ -80,11 +87,13 @@ class Caller:
         owner: the name whose limits apply; if empty, the limits apply to the address of the call.
         access: its permissions.
         key: the hash of its token; empty if the server uses no tokens.
+        for_others: whether it passes what it gets on to others, each of which has to be allowed that by itself.
     """
 
     owner: str
     access: Access
     key: str = ""
+    for_others: bool = False
 
 
 ANONYMOUS = Caller("", EVERYTHING)

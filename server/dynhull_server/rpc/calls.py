@@ -16,7 +16,14 @@ from grpc_status import rpc_status
 
 from ..logs import caller_has_left
 from ..state.errors import LimitExceededError
-from .access import UNAUTHENTICATED_CALLER, Caller, PermissionDeniedError, Rights, UnauthenticatedError
+from .access import (
+    UNAUTHENTICATED_CALLER,
+    Caller,
+    PermissionDeniedError,
+    Rights,
+    TokensChangedError,
+    UnauthenticatedError,
+)
 from .call_counts import CallCounts
 from .metrics import Metrics
 from .places import Places
@@ -232,12 +239,14 @@ class Calls:
         self._refusals.flush()
 
     def recheck(self, known: Callable[[str], Caller]) -> None:
-        """End the calls that their tokens no longer allow.
+        """End the calls that their tokens no longer allow, and those for others, whose tokens are not known here.
 
         Args:
             known: returns the present caller for the hash of a token, or raises UnauthenticatedError.
         """
         for call in self._open:
+            if call.caller.for_others:
+                call.end(TokensChangedError())
             if not call.caller.key:  # it was admitted without a token
                 continue
             try:

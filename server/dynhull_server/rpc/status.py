@@ -39,10 +39,12 @@ from ..state.errors import (
     ShardAwayError,
     StoppingError,
 )
-from .access import PermissionDeniedError, UnauthenticatedError
+from .access import PermissionDeniedError, TokensChangedError, UnauthenticatedError
 from .decode import InvalidFieldError
 
 DOMAIN = "dynhull.v1"
+# The reason of TokensChangedError, for the gateway that gets it.
+TOKENS_CHANGED = "TOKENS_CHANGED"
 HULL_TYPE, FENCE_TYPE, CONSUMER_TYPE = "dynhull.v1.Hull", "dynhull.v1.Fence", "dynhull.v1.FenceConsumer"
 # Statuses are sent as headers, whose size is limited.
 LONGEST_VALUE = 120
@@ -138,6 +140,7 @@ ANSWERED = (
     RelayedError,
     StartingError,
     StoppingError,
+    TokensChangedError,
 )
 
 
@@ -268,6 +271,8 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
             return _status(code.UNKNOWN, str(error), "OUTCOME_UNKNOWN", where)
         case StartingError() | ShardAwayError():
             return _status(code.UNAVAILABLE, str(error), "STARTING", where)
+        case TokensChangedError():
+            return _status(code.UNAVAILABLE, str(error), TOKENS_CHANGED, where)
         case RelayedError():
             return error.status
         case DrainingError() | StoppingError():
