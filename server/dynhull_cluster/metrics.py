@@ -49,10 +49,10 @@ class _Collector(Collector):
         found: dict[str, Iterable[Metric]] = {
             process: text_string_to_metric_families(page) for process, page in pages.items()
         }
-        serving = GaugeMetricFamily("dynhull_process_serving", "Whether a process serves.", labels=[LABEL])
+        serving = GaugeMetricFamily("dynhull_process_serving", "Whether a process serves, and answers.", labels=[LABEL])
         starts = CounterMetricFamily("dynhull_process_starts", "Starts of a process.", labels=[LABEL])
         for each in self._processes:
-            serving.add_metric([each.name], each.serving.is_set())
+            serving.add_metric([each.name], each.name in pages)
             starts.add_metric([each.name], each.starts)
         yield from (serving, starts, *merged({**found, SUPERVISOR: own}, LABEL))
 

@@ -233,6 +233,11 @@ class Server:
         await scrub.round()
         self._metrics.scrub_round()
 
+    @property
+    def entitled(self) -> bool:
+        """Whether it may answer reads: no other server owns what it has, for all that it knows."""
+        return self._storage.entitled()
+
     def set_machine_well(self, well: bool) -> None:
         """Say whether what this server has in common with others of its process is well; else it is NOT_SERVING."""
         self._machine_well = well

@@ -46,7 +46,8 @@ IDENTITY = (
     b"SELECT system_identifier || '/' || oid FROM pg_control_system(), pg_database WHERE datname = current_database()"
 )
 OWNERS = (
-    f"SELECT partition, epoch, worker, process, address, until::text, until = '-infinity', {IS_CONNECTED} FROM owners"  # noqa: S608  (ours)
+    "SELECT partition, epoch, worker, process, address, until::text, until = '-infinity', "  # noqa: S608  (ours)
+    f"{IS_CONNECTED}, until > clock_timestamp() FROM owners"
 ).encode()
 WORKERS = (
     f"SELECT worker, draining, process FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
@@ -68,7 +69,8 @@ GONE = (
 class Owner(NamedTuple):
     """The row of an owner: of which `until` changes with each renewal, and says nothing else to other machines.
 
-    A copy of the database has the same rows, but none of the owners is `connected` to it.
+    A copy of the database has the same rows, but none of the owners is `connected` to it. Whether the lease has been
+    `renewed` is what PostgreSQL's clock says: for people, because nobody takes a partition by a clock.
     """
 
     epoch: int
@@ -78,6 +80,12 @@ class Owner(NamedTuple):
     until: str
     free: bool
     connected: bool
+    renewed: bool = True
+
+    @property
+    def serves(self) -> bool:
+        """Whether callers can expect answers."""
+        return not self.free and self.connected and self.renewed
 
     @property
     def alone(self) -> bool:
@@ -169,8 +177,15 @@ def _secret(connection: Connection) -> str:
 
 
 def read(connection: Connection) -> Tables:
-    """The tables now."""
+    """The tables now; of a database that was never that of a cluster, its owners."""
+    if not is_of_cluster(connection):
+        return _tables([connection.execute(OWNERS).fetchall(), [], [], []])
     return _tables([connection.execute(sql).fetchall() for sql in ALL])
+
+
+def is_of_cluster(connection: Connection) -> bool:
+    """Whether a database has the tables of a cluster."""
+    return connection.execute("SELECT to_regclass('cluster') IS NOT NULL").fetchone() == (True,)
 
 
 class Board:

@@ -1,6 +1,5 @@
 """The commands `dynhull cluster ...`: they write into the tables what is wished, and the workers do it."""
 
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Annotated
@@ -8,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dynhull_cli.groups import group
+from dynhull_cli.plural import plural
 
 if TYPE_CHECKING:
     from ..postgres.database import Connection
+    from .board import Tables
 
 JOURNAL = Annotated[
     str,
@@ -28,34 +29,43 @@ def status(journal: JOURNAL) -> None:
 
     with _connected(journal) as (connection, count):
         tables = read(connection)
-    served = Counter(owner.worker for owner in tables.owners.values() if not owner.free)
-    typer.echo(f"{count} partitions")
-    apart = tables.apart()
-    alone = {owner.worker for owner in tables.owners.values() if owner.alone and owner.connected}
-    for worker in sorted({*tables.workers, *served}):
-        present = tables.workers.get(worker)
-        if worker in alone:
-            state = "serves, without --cluster"
-        elif worker in apart:
-            state = "not connected to this database"
-        elif present is None:
-            state = "away"
-        else:
-            state = "gives up its partitions" if present.draining else "serves"
+    typer.echo(plural(count, "partition"))
+    owners = {owner.worker for owner in tables.owners.values() if not owner.free}
+    for worker in sorted({*tables.workers, *owners}):
         own = [str(each) for each, owner in sorted(tables.owners.items()) if owner.worker == worker and not owner.free]
-        typer.echo(f"{worker}  {state}  {len(own)}: {', '.join(own) or '-'}")
-    free = [str(each) for each in range(count) if (owner := tables.owners.get(each)) is None or owner.free]
-    if free:
-        typer.echo(f"nobody serves {', '.join(free)}")
+        typer.echo(f"{worker}  {_state(tables, worker)}  {len(own)}: {', '.join(own) or '-'}")
+    left = [str(each) for each in range(count) if (owner := tables.owners.get(each)) is None or not owner.serves]
+    if left:
+        typer.echo(f"nobody serves {', '.join(left)}")
     if tables.workers and all(present.draining for present in tables.workers.values()):
         typer.echo("no worker takes partitions, because all of them were drained: start the process of one again")
     for partition, worker in sorted(tables.wishes.items()):
         typer.echo(f"partition {partition} is to be on {worker}")
 
 
+def _state(tables: "Tables", worker: str) -> str:
+    """What a worker does, as far as its machine and the database can say."""
+    from ..postgres.processes import is_known_dead
+
+    owned = [owner for owner in tables.owners.values() if owner.worker == worker and not owner.free]
+    present = tables.workers.get(worker)
+    processes = {owner.process for owner in owned} | ({present.process} if present else set())
+    if all(is_known_dead(process) for process in processes):
+        return "has ended"
+    if worker in tables.apart():
+        return "not connected to this database"
+    if owned and not any(owner.renewed for owner in owned):
+        return "is stopped or cut off: it does not renew its lease"
+    if any(owner.alone for owner in owned):
+        return "serves, without --cluster"
+    if present is None:
+        return "away"
+    return "gives up its partitions" if present.draining else "serves"
+
+
 def drain(worker: WORKER, journal: JOURNAL) -> None:
     """Have a worker give up its partitions to the others, and take none until it is started again."""
-    with _connected(journal) as (connection, _):
+    with _connected(journal, to_change=True) as (connection, _):
         _require_worker(connection, worker)
         connection.execute("UPDATE workers SET draining = true WHERE worker = %s", [worker])
 
@@ -68,7 +78,7 @@ def move(
     """Move a partition to a worker, where it stays as long as that worker is there."""
     from dynhull_server.failure import fail
 
-    with _connected(journal) as (connection, count):
+    with _connected(journal, to_change=True) as (connection, count):
         if partition >= count:
             fail(f"PARTITION is {partition}: there are {count}, from 0 to {count - 1}")
         connection.execute("DELETE FROM wishes WHERE partition = %s", [partition])
@@ -131,22 +141,27 @@ def _require_worker(connection: "Connection", worker: str) -> None:
 
 
 @contextmanager
-def _connected(journal: str) -> Iterator[tuple["Connection", int]]:
-    """A transaction on the tables of a cluster, and the number of partitions; others hear of what has changed."""
+def _connected(journal: str, *, to_change: bool = False) -> Iterator[tuple["Connection", int]]:
+    """A transaction on the tables of a cluster, and the number of partitions; others hear of what has changed.
+
+    Of a database that has only been served without --cluster, there is nothing to change.
+    """
     from dynhull_server.failure import code_of, fail, text_of
     from dynhull_server.storage.port import StorageError
 
     from ..postgres.database import Database, as_storage_errors
     from ..postgres.ownership import CHANNEL
     from ..postgres.schema import partitions_of
+    from .board import is_of_cluster
 
     try:
         database = Database(journal)
         with closing(database.connect("dynhull cluster")) as connection, as_storage_errors(), connection.transaction():
-            there = connection.execute("SELECT to_regclass('cluster') IS NOT NULL").fetchone()
-            if there != (True,):
+            partitions = partitions_of(connection, database)
+            if partitions is None or (to_change and not is_of_cluster(connection)):
                 raise StorageError(f"{database} is that of no cluster: start one with `dynhull serve --cluster`")
-            yield connection, partitions_of(connection, database) or 0
-            connection.execute(f"NOTIFY {CHANNEL}".encode())
+            yield connection, partitions
+            if to_change:
+                connection.execute(f"NOTIFY {CHANNEL}".encode())
     except (StorageError, OSError, ValueError) as error:
         fail(text_of(error), code_of(error))

@@ -53,7 +53,10 @@ APART = (
 )
 # What a worker says that has nothing to do.
 ALONE = "nothing to serve: a server without --cluster has it, until that is stopped"
-LEFT_OUT = "nothing to serve: each partition has another worker"
+LEFT_OUT = (
+    "nothing to serve: each partition has another worker, and this one takes over what becomes free; a new database "
+    "gets more of them with --partitions"
+)
 # Seconds that gateways get to receive what their calls have ended with, before another worker may have the partition.
 LAST_STATUSES = 0.03
 
@@ -312,7 +315,8 @@ class _Collector(Collector):
     def collect(self) -> Iterator[Metric]:
         """The metrics of each partition, and how many there are."""
         served = dict(self._served)
-        yield GaugeMetricFamily("dynhull_partitions", "Partitions that the process serves.", value=len(served))
+        entitled = sum(each.entitled for each in served.values())
+        yield GaugeMetricFamily("dynhull_partitions", "Partitions that the process serves.", value=entitled)
         yield GaugeMetricFamily(
             "dynhull_clock_difference_seconds",
             "Seconds by which the clock of the machine is ahead of that of the database, at the least.",
