@@ -26,9 +26,16 @@ METRICS_SECONDS = 5.0
 
 # Processes are forked from one that has imported what they run: this takes seconds, which a restart does not have.
 PROCESSES = multiprocessing.get_context("forkserver")
-PROCESSES.set_forkserver_preload([child.__name__])
+IMPORTED = [child.__name__]
+# What workers and gateways on a database run besides; what is not installed is left out.
+ON_DATABASE = "dynhull_cluster.machines.member", "dynhull_cluster.machines.public"
 
 log = logging.getLogger(__name__)
+
+
+def prepare(*, on_database: bool) -> None:
+    """Have the process that forks others import what they will run; before the first is started."""
+    PROCESSES.set_forkserver_preload([*IMPORTED, *(ON_DATABASE if on_database else ())])
 
 
 class StartFailedError(Exception):

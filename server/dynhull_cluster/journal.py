@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from .postgres.database import Database
 
 
-def storage_of(settings: Settings, partition: int = 0) -> Storage | None:
-    """What keeps the hulls of a worker in a database; None if the settings name none.
+def storage_of(settings: Settings) -> Storage | None:
+    """What keeps the hulls of a server of one process in a database; None if the settings name none.
 
     Raises:
         ValueError: the address is invalid, or the package for PostgreSQL is missing.
@@ -25,8 +25,6 @@ def storage_of(settings: Settings, partition: int = 0) -> Storage | None:
         database,
         end_process,
         settings.durability,
-        partition=partition,
-        partitions=settings.workers or 1,
         address=f"{settings.host}:{settings.port}",
     )
 

@@ -28,7 +28,7 @@ from dynhull_server.storage.sqlite.disk import Disk
 from dynhull_server.storage.sqlite.folder import Folder
 from dynhull_server.storage.worker_folders import divide, worker_folder, write_manifest
 
-from .child_process import ChildProcess, StartFailedError
+from .child_process import ChildProcess, StartFailedError, prepare
 from .machines.entrance import checked_certificate, require_own_address
 from .metrics import registry_of
 from .sockets import socket_folder
@@ -45,6 +45,7 @@ def run(settings: Settings) -> None:
     """Serve with several processes, then return; what prevents that ends the process."""
     logs.configure(settings.log_level, settings.log_format, "supervisor")
     warn_of_service_links()
+    prepare(on_database=settings.journal is not None)
     try:
         asyncio.run(_serve(settings))
     except StartFailedError as error:  # that process has said why

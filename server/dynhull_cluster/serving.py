@@ -1,4 +1,4 @@
-"""What each process of a server serves: a worker or a gateway, of one machine or of a cluster."""
+"""What each process of a server serves: a worker or a gateway, on a folder or on a database."""
 
 import asyncio
 from pathlib import Path
@@ -35,20 +35,22 @@ async def serving(settings: Settings, begin: dict[str, Any]) -> Serving:
         begin: the first message of the supervisor.
 
     Raises:
-        StorageError: the database of the cluster cannot be used.
+        StorageError: the database cannot be used.
         ValueError: the package for PostgreSQL is missing.
     """
     role, _, number = begin["process"].partition("-")
-    if settings.cluster:
+    if settings.journal is not None:
         database = database_of(settings)  # before what needs its package
-        from .machines.board import join
+        from .machines.board import join, partitions_of_new
         from .machines.member import Member
         from .machines.public import ClusterGateway
 
+        if not settings.cluster:  # nobody else reaches its workers
+            settings = settings.model_copy(update={"cluster_host": "127.0.0.1", "cluster_ca": None})
         if role == "worker":
             return Member(settings, f"{begin['site']}/{number}")
-        cluster = await asyncio.to_thread(join, database, settings.partitions)
-        return ClusterGateway(settings, database, cluster)
+        cluster = await asyncio.to_thread(join, database, partitions_of_new(settings))
+        return ClusterGateway(settings, database, cluster, begin["site"])
     sockets = Sockets(Path(begin["sockets"]))
     if role == "worker":
         return worker_server(settings, int(number), sockets)

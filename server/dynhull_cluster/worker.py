@@ -1,4 +1,4 @@
-"""A worker: the server of one process, reached through private sockets, on its own part of the data."""
+"""A worker: the server of one process, reached through private sockets, on its own part of a folder."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -15,7 +15,6 @@ from .callers import authenticator
 from .divisions.divisions import ServedDivisions
 from .divisions.peers import Peers, peer_handler
 from .frame_server import FrameServer
-from .journal import storage_of
 from .sockets import Sockets
 
 # Each gateway watches the health of each worker; all of them have one address.
@@ -23,12 +22,12 @@ HEALTH_CALLS = 1024
 
 
 def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
-    """The server of a worker."""
+    """The server of a worker on a folder, or in memory."""
     own = own_settings(settings).model_copy(update={"data": worker_folder(settings.data, number)})
     peers = Peers(sockets)
     divisions = ServedDivisions(settings, number, settings.workers or 1, peers)
     entrance = PrivateEntrance(number, sockets, peer_handler(divisions.receive), peers)
-    return Server(own, entrance, storage_of(settings, number), divisions)
+    return Server(own, entrance, divisions=divisions)
 
 
 def own_settings(settings: Settings) -> Settings:

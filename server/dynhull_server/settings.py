@@ -169,7 +169,8 @@ class Settings(BaseModel):
             raise ValueError("--gateways needs --workers or --cluster")
         if self.cluster and self.journal is None:
             raise ValueError("--cluster needs --journal: the servers share a database")
-        if self.cluster and self.peer_ping_interval < self.min_ping_interval:
+        in_database = self.journal is not None and (self.cluster or self.workers is not None)
+        if in_database and self.peer_ping_interval < self.min_ping_interval:
             raise ValueError("--peer-ping-interval must not be less than --min-ping-interval")
         if self.cluster_ca and not self.tls_cert:
             raise ValueError("--cluster-ca needs --tls-cert and --tls-key")

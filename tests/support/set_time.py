@@ -67,13 +67,13 @@ def _install(file: str) -> None:
 
 
 if __name__ == "__main__":
-    from dynhull_cluster import child, child_process
+    from dynhull_cluster import child_process
 
     os.environ[FILE] = sys.argv[1]
     _install(sys.argv[1])
     # Workers are forked from a process that imports this file.
     os.environ["PYTHONPATH"] = str(Path(__file__).parent)
-    child_process.PROCESSES.set_forkserver_preload([child.__name__, "set_time"])
+    child_process.IMPORTED.append("set_time")
     sys.argv = sys.argv[2:]
     runpy.run_path(sys.argv[0], run_name="__main__")
 elif FILE in os.environ:

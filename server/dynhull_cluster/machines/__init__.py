@@ -1,4 +1,4 @@
-"""Workers and gateways on several machines, which find each other through the tables of PostgreSQL.
+"""Workers and gateways that share a database, and find each other through its tables: of several machines, or of one.
 
 There is no coordinator. Each process reads the same small tables (`board`), and from them each worker works out by the
 same rule which partitions it should have (`claims`): it takes those that are free, and lets go of those that another

@@ -17,6 +17,7 @@ from ..callers import PROOF, Metadata
 from ..ways import OPTIONS, PATIENCE, F, keep_alive, pings
 from .board import Owner, Tables
 from .entrance import proof_of
+from .joining import server_of
 
 # Seconds to connect to an owner.
 CONNECT_SECONDS = 2.0
@@ -57,12 +58,14 @@ class Addresses:
         secret: what processes of the cluster know each other by.
         ca: the certificate that has signed those of the workers; None where they have none.
         ping_interval: seconds between questions whether an owner is still there.
+        server: the server whose owners are called, and no others; empty for those of all.
     """
 
     takeover = PATIENCE
 
-    def __init__(self, secret: str, ca: Path | None, ping_interval: float) -> None:
+    def __init__(self, secret: str, ca: Path | None, ping_interval: float, server: str = "") -> None:
         self._secret = secret
+        self._server = server
         self._ping_interval = ping_interval
         self._options = [*OPTIONS, *pings(ping_interval)]
         self._tls = None if ca is None else peer_context(ca)
@@ -77,7 +80,7 @@ class Addresses:
         One that is not connected to the database is not called: it may be the owner in the one that this is a copy of.
         """
         for partition, owner in tables.owners.items():
-            place = _place_of(owner)
+            place = None if self._server not in ("", server_of(owner.worker)) else _place_of(owner)
             if place is None or not owner.connected or self._known.get(partition) == place:
                 continue
             self._known[partition] = place

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import psycopg
 
+from dynhull_server.settings import Settings
 from dynhull_server.state.errors import words
 from dynhull_server.storage.port import StorageError
 
@@ -50,7 +51,7 @@ OWNERS = (
     f"{IS_CONNECTED}, until > clock_timestamp() FROM owners"
 ).encode()
 WORKERS = (
-    f"SELECT worker, draining, process FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
+    f"SELECT worker, draining, process, host FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
     "ORDER BY worker"
 ).encode()
 WISHES = b"SELECT partition, worker FROM wishes"
@@ -98,6 +99,7 @@ class Worker(NamedTuple):
 
     draining: bool
     process: str
+    host: str = ""
 
 
 class Heir(NamedTuple):
@@ -140,6 +142,11 @@ class Cluster(NamedTuple):
 
     partitions: int
     secret: str
+
+
+def partitions_of_new(settings: Settings) -> int:
+    """The number of partitions that a new database gets: without --cluster, one for each worker."""
+    return settings.partitions if settings.cluster else settings.workers or 1
 
 
 def join(database: Database, partitions: int) -> Cluster:

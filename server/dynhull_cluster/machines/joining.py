@@ -1,4 +1,7 @@
-"""Whether a machine may join a cluster: its clock is right, and the others reach it as it reaches them.
+"""Whether a server may have a part of a database: its clock is right, and all reach each other, or it is alone.
+
+A server without --cluster is a cluster of its own processes. It has no address for others, so it begins when nobody
+else serves the database, and nobody else joins it.
 
 The clock of the database is the one that machines have in common. It is compared because a partition that moves goes on
 with the clock of its new machine: one that is ahead would expire what the others keep.
@@ -9,10 +12,10 @@ import time
 from contextlib import closing
 
 from dynhull_server.settings import is_loopback
-from dynhull_server.storage.port import StorageError
+from dynhull_server.storage.port import LockedError, StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors
-from ..postgres.processes import shares_loopback, this_process
+from ..postgres.processes import is_known_dead, shares_loopback, this_process
 from ..postgres.schema import hold
 
 # Seconds between looks whether a worker out of reach is there.
@@ -33,15 +36,16 @@ OTHERS = (
 
 
 def admit(database: Database, worker: str, host: str, limit: float) -> None:
-    """Put a worker into the tables of a cluster, if all workers that are present can reach each other.
+    """Put a worker into the tables of a cluster, if all servers that are present can reach each other.
 
     Args:
         database: the database, which is prepared.
         worker: the worker.
-        host: where it listens for the others.
+        host: where it listens for other servers; empty for a server without --cluster.
         limit: how many seconds the clock of this machine may be off.
 
     Raises:
+        LockedError: another server is there, and one of the two is without --cluster.
         StorageError: the clock is wrong, workers are out of reach, or the database cannot be used.
     """
     seen: dict[str, str] = {}
@@ -50,8 +54,23 @@ def admit(database: Database, worker: str, host: str, limit: float) -> None:
         while apart := _admit(connection, database, worker, host):
             for other, (where, when) in apart.items():
                 if seen.setdefault(other, when) != when:  # it has not died in between
+                    if not (host and where):
+                        raise served_by(database, other)
                     raise StorageError(_out_of_reach(other, where, host))
             time.sleep(LOOK)
+
+
+def served_by(database: Database, worker: str) -> LockedError:
+    """The error of a server that would have nothing to serve, because another one has the database."""
+    return LockedError(
+        f"{database} is served by {worker}: stop that server first, choose another database, or start both with "
+        "--cluster, so that they share it"
+    )
+
+
+def server_of(worker: str) -> str:
+    """The server that a worker is one of, by their names."""
+    return worker.rpartition("/")[0]
 
 
 def clock_difference(before: float, there: float, after: float) -> float:
@@ -88,11 +107,18 @@ def _admit(connection: Connection, database: Database, worker: str, host: str) -
         apart = {
             other: (where, when)
             for other, process, where, when in connection.execute(OTHERS, [worker]).fetchall()
-            if not shares_loopback(process) and (_is_only_here(host) or (where and _is_only_here(where)))
+            if server_of(other) != server_of(worker) and not _may_share(host, where, process)
         }
         if not apart:
             connection.execute(RENEW, [worker, False, this_process(), host])
     return apart
+
+
+def _may_share(host: str, where: str, process: str) -> bool:
+    """Whether two servers can share a database, the other of which has a process, or whether that one has ended."""
+    if not (host and where):
+        return is_known_dead(process)
+    return shares_loopback(process) or not (_is_only_here(host) or _is_only_here(where))
 
 
 def _is_only_here(host: str) -> bool:

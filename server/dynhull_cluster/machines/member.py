@@ -1,4 +1,4 @@
-"""A worker of a cluster: a process that owns some of the partitions, each with a server and ports of its own.
+"""A worker on a database: a process that owns some of the partitions, each with a server and ports of its own.
 
 It looks at the tables, takes what it should have and is free, and lets go of what another worker should have, once that
 has read it. A partition is moved only while all of them are served, so that one at a time is away.
@@ -36,10 +36,10 @@ from ..postgres.storage import PostgresStorage
 from ..worker import own_settings
 from .addresses import Addresses
 from .ahead import FAILURES, Ahead, Served
-from .board import Board, Cluster, Tables, join
+from .board import Board, Cluster, Tables, join, partitions_of_new
 from .claims import shares
 from .entrance import PartitionEntrance
-from .joining import admit, require_right_clock
+from .joining import admit, require_right_clock, served_by, server_of
 
 # Seconds before a partition that could not be taken is tried again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
@@ -79,7 +79,8 @@ class Member:
         self._settings = settings
         self._worker = worker
         self._database = database_of(settings)
-        self._board = Board(self._database, self._decide, worker, settings.cluster_host)
+        self._host = settings.cluster_host if settings.cluster else ""
+        self._board = Board(self._database, self._decide, worker, self._host)
         self._supervisor = Supervisor(Clock(), self._turn_health, end_process)
         self._cluster = Cluster(0, "")
         self._addresses = Addresses("", None, settings.peer_ping_interval)
@@ -102,19 +103,20 @@ class Member:
             StorageError: the database cannot be used, or the machine may not join.
         """
         settings = self._settings
-        self._cluster = await asyncio.to_thread(join, self._database, settings.partitions)
-        await asyncio.to_thread(
-            admit, self._database, self._worker, settings.cluster_host, settings.max_clock_difference
-        )
-        self._addresses = Addresses(self._cluster.secret, settings.cluster_ca, settings.peer_ping_interval)
+        self._cluster = await asyncio.to_thread(join, self._database, partitions_of_new(settings))
+        await asyncio.to_thread(admit, self._database, self._worker, self._host, settings.max_clock_difference)
+        only = "" if settings.cluster else server_of(self._worker)
+        self._addresses = Addresses(self._cluster.secret, settings.cluster_ca, settings.peer_ping_interval, only)
         self._peers = Peers(self._addresses)
         self._supervisor.every(0.0, "board", self._board.run)
         await self._looked.wait()
         apart = self._board.tables.apart().items()
         if owners := sorted(worker for worker, process in apart if not is_known_dead(process)):
             log.warning(APART, extra={"owners": ", ".join(owners)})
-        while self._busy:  # what was free
-            await asyncio.wait(self._busy.values())
+        await self._settle()  # what was free
+        if not settings.cluster:
+            await self._succeed()
+            await self._settle()
         log.info("serving", extra={"worker": self._worker, "partitions": len(self._served)})
 
     async def drain(self) -> None:
@@ -137,10 +139,41 @@ class Member:
         if self._looked.is_set():
             await self._board.leave()
 
+    async def _settle(self) -> None:
+        """Wait until all that has begun is done."""
+        while self._busy:
+            await asyncio.wait(self._busy.values())
+
+    async def _succeed(self) -> None:
+        """Wait until no other server has partitions. Raises LockedError if one renews its lease."""
+        seen: dict[int, str] = {}
+        while others := [
+            (number, owner)
+            for number, owner in self._board.tables.owners.items()
+            if not self._is_free(number) and not self._is_neighbour(owner.worker)
+        ]:
+            for number, owner in others:
+                if seen.setdefault(number, owner.until) != owner.until:
+                    raise served_by(self._database, owner.worker)
+            self._settled.clear()
+            await self._settled.wait()
+
+    def _is_neighbour(self, worker: str) -> bool:
+        """Whether a worker shares partitions with this one: without --cluster, only those of the same server do."""
+        if server_of(worker) == server_of(self._worker):
+            return True
+        present = self._board.tables.workers.get(worker)
+        return self._settings.cluster and (present is None or present.host != "")
+
+    def _is_of_neighbour(self, holder: str) -> bool:
+        """Whether a partition is held by another worker that this one may take it over from."""
+        return holder != self._worker and self._is_neighbour(holder)
+
     def _others(self) -> list[str]:
         """The other workers that can take partitions."""
         workers = self._board.tables.workers
-        return [name for name, each in workers.items() if not each.draining and name != self._worker]
+        can = (name for name, each in workers.items() if not each.draining and name != self._worker)
+        return [name for name in can if self._is_neighbour(name)]
 
     def _decide(self, tables: Tables) -> None:
         """Begin to take, to read ahead and to let go, after each look at the tables."""
@@ -168,7 +201,7 @@ class Member:
             if self._is_free(number):
                 if self._may_try(TAKE, number):
                     self._begin(number, self._take(number))
-            elif not self._ahead and holders[number] != self._worker and self._may_try(READ_AHEAD, number):
+            elif not self._ahead and self._is_of_neighbour(holders[number]) and self._may_try(READ_AHEAD, number):
                 self._read_ahead(number)
         if all(holders) and all(tables.owners[each].address for each in range(count)) and not self._busy:
             to_go = (each for each in self._served if wanted[each] not in ("", self._worker))

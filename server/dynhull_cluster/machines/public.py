@@ -15,10 +15,12 @@ class ClusterGateway(Gateway):
         settings: the settings.
         database: the database.
         cluster: the cluster.
+        server: the server that it is a gateway of; without --cluster, it calls the workers of no other one.
     """
 
-    def __init__(self, settings: Settings, database: Database, cluster: Cluster) -> None:
-        addresses = Addresses(cluster.secret, settings.cluster_ca, settings.peer_ping_interval)
+    def __init__(self, settings: Settings, database: Database, cluster: Cluster, server: str) -> None:
+        only = "" if settings.cluster else server
+        addresses = Addresses(cluster.secret, settings.cluster_ca, settings.peer_ping_interval, only)
         self._board = Board(database, addresses.learn)
         super().__init__(settings, cluster.partitions, addresses)
 

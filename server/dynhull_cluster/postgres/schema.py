@@ -201,7 +201,8 @@ def prepare(connection: Connection, database: Database, partitions: int) -> None
                 put_totals(connection, partition, Totals())
         return
     if present != partitions:
-        raise StorageError(f"{database} is divided among {_servers(present)}: {_remedy(present)}")
+        remedy = f"start the server with --workers {present}, or with --cluster"
+        raise StorageError(f"{database} is divided among {present} workers: {remedy}")
     (version,) = _one(connection, "SELECT format FROM format")
     if version == FORMAT:
         return
@@ -224,16 +225,6 @@ def _end_owners(connection: Connection, database: Database, version: int) -> Non
     # Who was only slow is one no longer; what it commits at this moment is waited for.
     connection.execute("SELECT epoch FROM owners FOR UPDATE")
     connection.execute("UPDATE owners SET epoch = epoch + 1")
-
-
-def _servers(partitions: int) -> str:
-    return "one process" if partitions == 1 else f"{partitions} workers"
-
-
-def _remedy(partitions: int) -> str:
-    if partitions == 1:
-        return "start the server without --workers"
-    return f"start the server with --workers {partitions}, or with --cluster"
 
 
 def _has_tables(connection: Connection) -> bool:
