@@ -26,10 +26,12 @@ class CallErrors:
 
     Args:
         connection: the connection of the call.
+        method: its method.
     """
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: Connection, method: str) -> None:
         self._connection = connection
+        self._method = method
 
     def __enter__(self) -> Self:
         task = asyncio.current_task()
@@ -48,7 +50,7 @@ class CallErrors:
             if self._connection.closed:  # else the task was cancelled before, while it ran
                 raise client_is_closed() from None
         elif isinstance(error, grpc.RpcError):
-            raise self._connection.error_of(error) from None
+            raise self._connection.error_of(error, self._method) from None
 
 
 class AsyncConnection(Connection):
@@ -73,7 +75,7 @@ class AsyncConnection(Connection):
         while True:
             method = getattr(self.stub, call.method)
             try:
-                with CallErrors(self):
+                with CallErrors(self, call.method):
                     begun = self.begin(method, call.request, attempts.timeout())
                     response = [part async for part in begun] if call.in_parts else await begun
                 return call.decode(response)
@@ -124,26 +126,32 @@ class AsyncConnection(Connection):
                 state = self._channel.get_state(try_to_connect=True)
 
     async def converse(
-        self, method: Any, requests: AsyncIterator[Any], hear: Callable[[Any], Awaitable[bool]]
+        self, method: str, requests: AsyncIterator[Any], hear: Callable[[Any], Awaitable[bool]]
     ) -> DynhullError:
         """Make a call with many requests and responses, until it ends.
 
         Args:
-            method: the method of the stub.
+            method: the method.
             requests: the requests.
             hear: called with each response; returns whether the call goes on.
 
         Returns:
             What ended the call.
         """
+        said: list[grpc.aio.AioRpcError] = []
         try:
-            with CallErrors(self):
-                call = self.begin(method, None, None)
+            with CallErrors(self, method):
+                call = self.begin(getattr(self.stub, method), None, None)
+                call.add_done_callback(lambda ended: said.append(_status(ended)))
                 sending = asyncio.create_task(_send(call, requests))
                 try:
                     async for response in call:  # `read` leaves out responses that are there when a write has failed
                         if not await hear(response):
                             break
+                except grpc.aio.AioRpcError:
+                    if said:  # gRPC may have forgotten it since, for that of a write that failed
+                        raise said[0] from None
+                    raise
                 finally:
                     call.cancel()
                     await end(sending)  # a task of gRPC's own may wait for ever for a call that has ended
@@ -157,6 +165,23 @@ class AsyncConnection(Connection):
         for each in list(self._others):
             each.close()
         await self._channel.close()
+
+
+def _status(call: Any) -> grpc.aio.AioRpcError:
+    """The status that a call has when it ends."""
+    code, before, after, details = (
+        _now(each()) for each in (call.code, call.initial_metadata, call.trailing_metadata, call.details)
+    )
+    return grpc.aio.AioRpcError(code, before, after, details)
+
+
+def _now(coroutine: Coroutine[Any, Any, Any]) -> Any:
+    """The result of a coroutine that does not wait, because its call has ended."""
+    try:
+        coroutine.send(None)
+    except StopIteration as result:
+        return result.value
+    raise AssertionError("a call that has ended has a status")
 
 
 async def end(task: asyncio.Task[Any]) -> None:

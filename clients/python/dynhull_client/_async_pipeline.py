@@ -149,7 +149,7 @@ class AsyncPipeline:
             return self._questions.refusal is None
 
         requests = self._requests(self._connections)
-        lost = await self._connection.converse(self._connection.stub.Query, requests, hear)
+        lost = await self._connection.converse("Query", requests, hear)
         return self._questions.refusal or lost
 
     def _settle(self, answered: Answered) -> None:

@@ -62,7 +62,7 @@ class AsyncFollower(AsyncIterator[Happening]):
                 self._arrived.extend(self._place.take(reading.result()))
             except grpc.RpcError as failure:
                 self._call = None
-                self._arrived.extend(self._place.end(self._connection.error_of(failure)))
+                self._arrived.extend(self._place.end(self._connection.error_of(failure, self._place.method)))
             except asyncio.CancelledError:
                 if not self._closed.is_set():
                     self._call = None

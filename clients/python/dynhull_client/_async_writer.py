@@ -188,7 +188,7 @@ class AsyncWriter:
             return not window.failure
 
         requests = self._requests(window, self._connections)
-        return await self._connection.converse(self._connection.stub.Stream, requests, hear)
+        return await self._connection.converse("Stream", requests, hear)
 
     async def _requests(
         self, window: Window[asyncio.Future[Applied]], connection: int

@@ -115,9 +115,9 @@ class Connection:
         """Whether it is closed."""
         return bool(self._closed.is_set())
 
-    def error_of(self, call: grpc.Call | grpc.RpcError) -> DynhullError:
-        """The error that a finished call ended with."""
-        return error_of(call, self._proxy)
+    def error_of(self, call: grpc.Call | grpc.RpcError, method: str) -> DynhullError:
+        """The error that a finished call of a method ended with."""
+        return error_of(call, method, self._proxy)
 
     def _open(self) -> None:
         require_grpc()
@@ -214,9 +214,9 @@ class BlockingConnection(Connection):
                 hold(begun := self.begin(method.future, call.request, attempts.timeout()))
                 return call.decode(begun.result())
             except grpc.FutureCancelledError:
-                raise self.error_of(begun) from None
+                raise self.error_of(begun, call.method) from None
             except grpc.RpcError as failure:
-                call, pause = attempts.after(call, self.error_of(failure))
+                call, pause = attempts.after(call, self.error_of(failure, call.method))
             self.pause(pause, ended)
 
     def parts(self, call: Call[Result]) -> Iterator[Result]:

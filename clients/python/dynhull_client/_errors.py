@@ -8,6 +8,7 @@ import grpc
 from google.rpc.error_details_pb2 import ErrorInfo
 from grpc_status import rpc_status
 
+import dynhull
 from dynhull_proto.v1.hull_service_pb2 import ReadError
 
 DOMAIN = "dynhull.v1"
@@ -103,6 +104,10 @@ class RestoredError(DynhullError):
     def uid(self) -> str | None:
         """The present uid of the hull."""
         return self.metadata.get("uid")
+
+
+class MethodUnknownError(DynhullError, NotImplementedError):
+    """The server is older than this client, and does not know the call; nothing has changed."""
 
 
 class HullEmptyError(DynhullError, ValueError):
@@ -202,6 +207,7 @@ BY_REASON: Mapping[str, type[DynhullError]] = {
     "KEY_REPEATED": DuplicateKeyError,
     "LIMIT_EXCEEDED": LimitExceededError,
     "MALFORMED_MESSAGE": InvalidRequestError,
+    "METHOD_UNKNOWN": MethodUnknownError,
     "OUTCOME_UNKNOWN": OutcomeUnknownError,
     "PERMISSION_DENIED": PermissionDeniedError,
     "POINT_MISSING": PointMissingError,
@@ -221,6 +227,7 @@ BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {
     grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceededError,
     grpc.StatusCode.UNAUTHENTICATED: UnauthenticatedError,
     grpc.StatusCode.UNAVAILABLE: UnavailableError,
+    grpc.StatusCode.UNIMPLEMENTED: MethodUnknownError,
 }
 
 CODES: Mapping[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
@@ -236,10 +243,12 @@ CANCELLED_HERE = "Locally cancelled by application!", "Channel closed!"
 CANCELLED_UNBEGUN = "CANCELLED"
 # What gRPC says of calls for which there is no connection.
 NOT_CONNECTED = "failed to connect to all addresses", "DNS resolution failed"
+# What gRPC says of an answer that is not one of gRPC; of the status 404 with the code of an unknown method.
+NOT_GRPC = "Received http2 header with status: "
 
 
-def error_of(call: grpc.Call | grpc.RpcError, proxy: str | None = None) -> DynhullError:
-    """The error that a finished call ended with; it names the proxy, if gRPC asks one for connections."""
+def error_of(call: grpc.Call | grpc.RpcError, method: str, proxy: str | None = None) -> DynhullError:
+    """The error that a finished call of a method ended with; it names the proxy, if gRPC asks one for connections."""
     if call.code() == grpc.StatusCode.INTERNAL and call.details() == ENDED_IN_A_WRITE:
         # The code stays: to those who send again, it means that the message itself may be the cause.
         return UnavailableError("the connection was lost while a message was sent", grpc.StatusCode.INTERNAL, "", {})
@@ -253,6 +262,10 @@ def error_of(call: grpc.Call | grpc.RpcError, proxy: str | None = None) -> Dynhu
     message = call.details()
     if proxy is not None and message is not None and message.startswith(NOT_CONNECTED):
         message += f" (through the proxy {proxy})"
+    if call.code() == grpc.StatusCode.UNIMPLEMENTED:
+        if message is not None and message.startswith(NOT_GRPC):
+            return DynhullError(f"no gRPC server answers at this address: {message}", call.code(), "", {})
+        message = _unknown(method)
     return _error(call.code(), message, () if status is None else status.details)
 
 
@@ -264,6 +277,13 @@ def not_sent(error: DynhullError) -> bool:
 def error_of_read(error: ReadError) -> DynhullError:
     """The error that a read of a Query call was answered with."""
     return _error(CODES.get(error.code, grpc.StatusCode.UNKNOWN), error.message, error.details)
+
+
+def _unknown(method: str) -> str:
+    return (
+        f"the server does not know the call {method}: it is older than its client, dynhull {dynhull.__version__}; "
+        "upgrade the server first"
+    )
 
 
 def _error(code: grpc.StatusCode, message: str | None, details: Iterable[Any]) -> DynhullError:

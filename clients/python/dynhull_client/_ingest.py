@@ -129,4 +129,4 @@ class Ingest:
         try:
             return self._call.result()
         except (grpc.RpcError, grpc.FutureCancelledError):
-            raise self._connection.error_of(self._call) from None
+            raise self._connection.error_of(self._call, "Ingest") from None

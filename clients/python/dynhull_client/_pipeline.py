@@ -175,7 +175,7 @@ class Pipeline:
         except DynhullError as error:
             return error
         except grpc.RpcError as failure:
-            return self._connection.error_of(failure)
+            return self._connection.error_of(failure, "Query")
         return DynhullError("the server ended the call", call.code(), "", {})
 
     def _settle(self, answered: Answered) -> None:

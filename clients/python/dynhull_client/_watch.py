@@ -55,7 +55,7 @@ class Follower(Iterator[Happening]):
                     raise StopIteration from None
                 self._call = None
                 self._home.end()
-                self._arrived.extend(self._place.end(self._connection.error_of(failure)))
+                self._arrived.extend(self._place.end(self._connection.error_of(failure, self._place.method)))
         return self._arrived.popleft()
 
     def close(self) -> None:

@@ -16,6 +16,7 @@ from ._calls import Known, Writing
 from ._errors import (
     DynhullError,
     HullNotFoundError,
+    MethodUnknownError,
     PermissionDeniedError,
     ProducerInUseError,
     RestoredError,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 # These refuse the writer, not one of its batches.
 FATAL = (
     HullNotFoundError,
+    MethodUnknownError,
     PermissionDeniedError,
     ProducerInUseError,
     RestoredError,

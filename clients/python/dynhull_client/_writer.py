@@ -254,7 +254,7 @@ class Writer:
         except DynhullError as error:
             return error
         except grpc.RpcError as failure:
-            return self._connection.error_of(failure)
+            return self._connection.error_of(failure, "Stream")
         return DynhullError("the server ended the stream", call.code(), "", {})
 
     def _requests(self, window: Window[Future[Applied]], connection: int) -> Iterator[pb.StreamRequest]:

@@ -113,7 +113,7 @@ class MethodUnknownError(RefusedError):
     """The method does not exist."""
 
     def __init__(self) -> None:
-        super().__init__("there is no such method")
+        super().__init__("there is no such method in this version of the server")
 
 
 class PartRefusedError(Exception):
