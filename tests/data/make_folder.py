@@ -10,9 +10,10 @@ inside, positions in quarantine, and hulls over shards.
 
 import json
 import shutil
+import sqlite3
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from datetime import UTC, datetime, timedelta
 from itertools import islice
 from pathlib import Path
@@ -59,8 +60,10 @@ def insert_and_delete(client, producer, first, last):
 
 
 def snapshots(data, hull="fleet"):
-    """The number of snapshots of a hull in the report of `dynhull check`."""
-    return next(line for line in ran("check", data).splitlines() if line.startswith(f"{hull}:")).count(",") - 1
+    """The number of snapshots of hulls with such a name."""
+    with closing(sqlite3.connect(f"file:{data / FILES[0]}?mode=ro", uri=True)) as database:
+        found = "SELECT count(*) FROM snapshots JOIN hulls ON hull = hulls.id WHERE name LIKE ?"
+        return database.execute(found, [hull]).fetchone()[0]
 
 
 def fill(data, address, client):
@@ -127,7 +130,7 @@ def fill_divided(data, client):
         points = np.random.default_rng(sequence).normal(size=(8, 2))
         client.apply("many", insert=points, delete=points[:3], producer="ship", sequence=sequence)
         if sequence == 30:
-            while not snapshots(data, "many#1"):
+            while not snapshots(data, "many#%.1"):
                 client.count("many", [[0, 0]])  # a shard takes its snapshot when the root says that all is decided
     for second in range(0, 90, 10):
         keys = [f"cow é{i}" for i in range(second // 10, 20)]

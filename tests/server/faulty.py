@@ -32,11 +32,11 @@ def no_disk() -> OSError:
 
 
 class Faulty(SQLiteStorage):
-    def commit(self, changes):
+    def commit(self, changes, now):
         fails("thread", SystemExit())
         while (FAULTS / "hang").exists():
             time.sleep(0.05)
-        super().commit(changes)
+        super().commit(changes, now)
         fails("commit", no_disk())
 
     def settle(self):

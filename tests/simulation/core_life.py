@@ -170,8 +170,10 @@ class CoreServer:
             self.core.restore(row, HullState(limits, row.settings, kept, now=0.0), len(kept.records))
         fences = storage.read_fences([row.number for row in contents.fences])
         self.core.restore_fences([each for each in fences if each is not None])
-        turns = NoThreads()
-        self._commits = GroupCommit(storage, threads or turns, Clock(), lambda _: None, lambda _: None)  # type: ignore[arg-type]
+        turns: Any = NoThreads()
+        self._commits = GroupCommit(
+            storage, threads or turns, Clock(), lambda: self._time.now(), lambda _: None, lambda _: None
+        )
         self._events: deque[Event] = deque()
         self._stepping = False
         self._clock = StoppedClock(schedule.random.uniform(0, 10))

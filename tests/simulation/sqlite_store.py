@@ -93,12 +93,12 @@ class SQLiteLives(FaultyStorage):
         """Have the next life find the last backup, if there is one."""
         self._restores = True
 
-    def commit(self, changes: Sequence[Any]) -> None:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> None:
         """Keep the changes."""
         self.give_way()
         self._pending = changes
         try:
-            self._inner.commit(changes)
+            self._inner.commit(changes, now)
         finally:
             self._pending = ()
         self.give_way()

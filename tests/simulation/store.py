@@ -40,7 +40,7 @@ class FaultyStorage:
             (fault["at"], fault["nth"] + more): fault["kind"] for fault in faults for more in range(fault["calls"])
         }
         self._calls: Counter[str] = Counter()
-        self._undecided: tuple[Sequence[Any], bool] | None = None
+        self._undecided: tuple[Sequence[Any], int, bool] | None = None
 
     def _fault(self, place: str) -> str | None:
         if self.dead:
@@ -70,40 +70,40 @@ class FaultyStorage:
         """Have the next life find the last copy, if there is one, in place of what is there."""
         raise NotImplementedError("only folders are copied")
 
-    def commit(self, changes: Sequence[Any]) -> None:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> None:
         """Keep the changes, and fail before, instead or afterwards."""
         self.give_way()
         kind = self._fault("commit")
         self._decide()
         match kind:
             case None:
-                self._keep(changes)
+                self._keep(changes, now)
             case "nothing":
                 raise NotCommittedError("the commit fails, as planned")
             case "full":
                 raise NotCommittedError("the disk is full, as planned", full=True)
             case "later lost" | "later ghost":
-                self._undecided = changes, kind == "later ghost"
+                self._undecided = changes, now, kind == "later ghost"
                 raise OSError("the commit fails, as planned")
             case _:
                 if kind.startswith("ghost"):
-                    self._keep(changes)
+                    self._keep(changes, now)
                 raise (MemoryError if kind.endswith("memory") else OSError)("the commit fails, as planned")
         self.give_way()
 
-    def _keep(self, changes: Sequence[Any]) -> None:
+    def _keep(self, changes: Sequence[Any], now: int) -> None:
         self._model.landed(changes)
         try:
-            self._inner.commit(changes)
+            self._inner.commit(changes, now)
         except Exception as error:
             raise self._model.finds(f"the storage was asked for the impossible: {changes}: {error!r}") from error
 
     def _decide(self) -> None:
         if self._undecided is not None:
-            changes, kept = self._undecided
+            changes, now, kept = self._undecided
             self._undecided = None
             if kept:
-                self._keep(changes)
+                self._keep(changes, now)
 
     def settle(self) -> None:
         """Decide what was left undecided."""

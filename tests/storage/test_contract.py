@@ -202,6 +202,54 @@ def test_what_was_committed_comes_back(opened):
         assert opened.contents.notes == []
 
 
+NOW, HOUR = 1_800_000_000_000_000, 3_600_000_000
+
+
+def test_batches_know_their_commits(opened):
+    """What is committed together has one number; later numbers are greater. Times never go back, whatever clocks do."""
+    assert opened.contents.committed == 0
+    opened.create(1)
+    opened.create(2)
+    both = [Append(1, records(1, 2)), Append(2, [record(1)])]
+    for changes, now in ((both, NOW), ([Append(1, [record(3)])], NOW - HOUR), ([Append(2, [record(2)])], NOW + HOUR)):
+        opened.storage.commit(changes, now)
+    opened.reopen()  # another process, whose clock is behind
+    assert opened.contents.committed == NOW + HOUR
+    opened.storage.commit([Append(1, [record(4)]), Append(2, [record(3)])], NOW - HOUR)
+    opened.storage.commit([Append(1, [record(5, cause="expiry")])], NOW + HOUR + 1)
+    for _ in range(2):
+        first, second = (opened.storage.read(number).records for number in (1, 2))
+        numbers, times = zip(*(each.committed for each in first), strict=True)
+        assert times == (NOW, NOW, NOW, NOW + HOUR, NOW + HOUR + 1)
+        assert numbers[0] == numbers[1] < numbers[2] < numbers[3] < numbers[4]
+        assert [each.committed for each in second] == [
+            (numbers[0], NOW),
+            (second[1].committed.number, NOW + HOUR),
+            (numbers[3], NOW + HOUR),
+        ]
+        assert numbers[2] < second[1].committed.number < numbers[3]
+        assert [each.cause for each in first] == [None] * 4 + ["expiry"]
+        opened.reopen()
+
+
+def test_a_snapshot_knows_the_commit_of_its_revision(opened):
+    """Also where the batch is dropped: when the last revision of a hull that rests was committed is not forgotten."""
+    opened.create(1)
+    for revision in range(1, 5):
+        opened.storage.commit([Append(1, [record(revision)])], NOW + revision)
+    for revision in (2, 4, 4):
+        opened.snapshot(1, revision, points(3))
+    for _ in range(2):
+        kept = opened.storage.read(1)
+        assert (kept.revision, kept.records, kept.committed.time) == (4, [], NOW + 4)
+        opened.reopen()
+    opened.storage.commit([Append(1, [record(5)])], NOW)
+    opened.snapshot(1, 4, points(3))
+    kept = opened.storage.read(1)
+    assert kept.committed.time == NOW + 4 == kept.records[0].committed.time
+    assert kept.committed.number < kept.records[0].committed.number
+
+
 def test_a_hull_is_read_as_it_was(opened):
     opened.create(1)
     for revision in range(1, 6):

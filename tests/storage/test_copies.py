@@ -78,6 +78,11 @@ def served(folder, last, number=1):
     return contents
 
 
+def commits(storage):
+    """The commit of each revision."""
+    return [[each.committed for each in storage.read(number).records] for number in (1, 2)]
+
+
 @pytest.fixture
 def paths(tmp_path):
     return [tmp_path / name for name in ("data", "copy", "new")]
@@ -88,6 +93,7 @@ def test_backup_beside_a_server_and_restore(paths):
     storage, _ = opened(data)
     fill(storage, 5)
     fill(storage, 3, "a/b", 2)
+    before = commits(storage)
     done("backup", copy, "--data", data, says=f"{copy}: 2 hulls")
     append(storage, 6, 6)
     refused("backup", copy, "--data", data, says=f"{copy} is not empty")
@@ -97,6 +103,11 @@ def test_backup_beside_a_server_and_restore(paths):
     assert served(new, 5).notes == []
     assert served(copy, 3, 2).notes == []
     storage.close()
+    for folder in (copy, new):
+        storage, contents = opened(folder)
+        assert commits(storage) == before
+        assert contents.committed == max(each.time for records in before for each in records)
+        storage.close()
 
 
 def test_every_copy_has_uids_of_its_own(paths, tmp_path):

@@ -25,7 +25,7 @@ from dynhull_server.state.records import (
     Window,
 )
 from dynhull_server.storage.rows import chunks, hull_rows
-from dynhull_server.storage.rows.encoding import decode, encode
+from dynhull_server.storage.rows.encoding import CAUSES, decode, encode
 
 times = st.integers(-(2**53), 2**53) | st.sampled_from([NO_TIME, FOREVER])
 counts = st.integers(0, 5)
@@ -103,6 +103,7 @@ def records(draw):
             draw(st.none() | times),
             draw(centers),
             draw(st.booleans()),
+            cause=draw(st.sampled_from([None, *CAUSES])),
         )
         for i, each in enumerate(rows)
     ]

@@ -5,7 +5,7 @@ import random
 from typing import Any
 
 import pytest
-from folders import append, appended, events, fence_row, no_progress, record, same
+from folders import append, appended, committed_at, events, fence_row, no_progress, record, same
 from live_engine import LIMITS
 from postgresql import query
 
@@ -223,9 +223,12 @@ def test_the_batches_are_those_that_the_owner_has_committed(url):
     reader.adopt([1])
     append(owner, 10, 12)
     owner.close()
-    heir.open(no_progress)
+    assert heir.open(no_progress).committed == committed_at(12)
     reader.adopt([1])
     same(reader.hulls[1], heir.read(1))
+    assert [each.committed.time for each in reader.hulls[1].records] == [*map(committed_at, range(1, 13))]
+    heir.commit([Append(1, [record(13)])], committed_at(0))  # its clock is behind
+    assert heir.read(1).records[-1].committed.time == committed_at(12)
     heir.close()
 
 

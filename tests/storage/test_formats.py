@@ -83,7 +83,8 @@ def query(folder, sql, access=Access.READ):
 
 
 def rows_not_migrated(folder):
-    return [query(folder, f"SELECT rowid, * FROM {table}") for table in ("batches", "snapshots", "chunks")]
+    of_batches = query(folder, "SELECT rowid, hull, first, last, checksum, payload FROM batches")
+    return [of_batches, *(query(folder, f"SELECT rowid, * FROM {table}") for table in ("snapshots", "chunks"))]
 
 
 def last_sequences(kept):
@@ -239,7 +240,7 @@ def test_a_folder_of_format_4_has_every_fence(folder, name):
         assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
 
 
-# Formats 6 to 9, written by tests/data/make_folder.py
+# Formats 6 to 10, written by tests/data/make_folder.py
 
 
 def as_told(event):
@@ -248,7 +249,7 @@ def as_told(event):
     return [event.sequence, event.type.name.lower(), event.hull, key, position, event.distance]
 
 
-@pytest.mark.parametrize("version", ["format6", "format7", "format8", "format9"])
+@pytest.mark.parametrize("version", ["format6", "format7", "format8", "format9", "format10"])
 @pytest.mark.parametrize("name", ["stopped", "killed"])
 def test_a_folder_with_events_has_every_event(folder, name, version):
     """Those of rows for one fence each, and of shared ones; the next ones share rows, and are dropped one by one."""
@@ -284,7 +285,7 @@ def test_a_folder_with_events_has_every_event(folder, name, version):
     storage.close()
 
 
-@pytest.mark.parametrize("version", ["format8", "format9"])
+@pytest.mark.parametrize("version", ["format8", "format9", "format10"])
 @pytest.mark.parametrize("name", ["stopped", "killed"])
 def test_a_folder_with_a_quarantine_has_every_position(folder, name, version):
     """In a snapshot and, after a kill, in batches after it; a byte that flips there is noticed."""
@@ -316,14 +317,15 @@ def test_a_folder_with_a_quarantine_has_every_position(folder, name, version):
     assert line.endswith("DAMAGED")
 
 
-# Format 9, written by tests/data/make_folder.py
+# Formats 9 and 10, written by tests/data/make_folder.py
 
 
+@pytest.mark.parametrize("version", ["format9", "format10"])
 @pytest.mark.parametrize("name", ["stopped", "killed"])
-def test_a_folder_with_hulls_over_shards_has_every_point(folder, name, tmp_path):
+def test_a_folder_with_hulls_over_shards_has_every_point(folder, name, version, tmp_path):
     """Roots and shards with snapshots and, after a kill, batches after these; the hulls go on."""
-    shutil.copytree(OLD_FOLDERS / "format9" / name, folder)
-    expected = json.loads((OLD_FOLDERS / "format9" / f"{name}-divided.json").read_text())
+    shutil.copytree(OLD_FOLDERS / version / name, folder)
+    expected = json.loads((OLD_FOLDERS / version / f"{name}-divided.json").read_text())
     for hull, told in expected.items():
         done = dynhull("export", hull, tmp_path / f"{hull}.csv", "--data", folder)
         assert done.exit_code == 0, done.stderr
@@ -344,3 +346,35 @@ def test_a_folder_with_hulls_over_shards_has_every_point(folder, name, tmp_path)
         assert client.apply("many", insert=[[50, 50]]).revision == expected["many"]["revision"] + 1
         assert all(client.verify(hull).equal for hull in expected)
     assert query(folder, "PRAGMA user_version") == [(FORMAT,)]
+
+
+# What no format before 11 has: commits
+
+NOW = 1_800_000_000_000_000
+
+
+@pytest.mark.parametrize("version", [1, 2, 3, 4, 6, 7, 8, 9, 10])
+def test_batches_of_older_formats_have_no_commit_and_later_ones_have(folder, tmp_path, version):
+    """Migrated at the start of a server, and with a copy; the tables are those of a new folder."""
+    old = OLD_FOLDERS / f"format{version}" / "killed"
+    shutil.copytree(old, folder)
+    copy = tmp_path / "copy"
+    assert dynhull("restore", folder, "--data", copy).exit_code == 0
+    fresh = tmp_path / "fresh"
+    opened(fresh)[0].close()
+    for migrated in (folder, copy):
+        storage, contents = opened(migrated)
+        assert contents.committed == 0
+        fleet = next(row.number for row in contents.hulls if row.name == "fleet")
+        before = storage.read(fleet)
+        assert {(each.committed, each.cause) for each in before.records} == {(None, None)}
+        first = before.last_revision + 1
+        storage.commit([Append(fleet, [Record(first, before.records[-1].rows, cause="batch")])], NOW)
+        storage.close()
+        storage, contents = opened(migrated)
+        *older, last = storage.read(fleet).records
+        assert (last.committed.time, last.cause, contents.committed) == (NOW, "batch", NOW)
+        assert {(each.committed, each.cause) for each in older} == {(None, None)}
+        storage.close()
+        schema = "SELECT name, sql FROM sqlite_schema ORDER BY name"
+        assert query(migrated, schema) == query(fresh, schema)

@@ -35,6 +35,7 @@ WRITERS = "FROM pg_stat_activity WHERE application_name LIKE 'dynhull writer%%' 
 TAKEN_AND_LEFT = "UPDATE owners SET epoch = epoch + 1, until = '-infinity', process = ''"
 TAKEN_AND_SILENT = "UPDATE owners SET epoch = epoch + 1, until = %s, process = ''"
 LAST = 6  # revision of the hull
+NOW = 1_800_000_000_000_000
 
 
 def on(url, lost=None, **more):
@@ -73,6 +74,10 @@ def url(postgres, template):
 DAMAGE = {
     "a batch": "UPDATE batches SET payload = set_byte(payload, 30, get_byte(payload, 30) # 1) WHERE first = 4",
     "a missing batch": "DELETE FROM batches WHERE first = 5",
+    "a later commit": "UPDATE batches SET commit_number = commit_number + 1 WHERE first = 5",
+    "another time": "UPDATE batches SET committed = committed + 1 WHERE first = 5",
+    "no commit": "UPDATE batches SET commit_number = NULL, committed = NULL WHERE first = 5",
+    "no time": "UPDATE batches SET committed = NULL WHERE first = 5",
     "an exchanged batch": "UPDATE batches SET first = 11 - first, last = 11 - last WHERE first > 4",
     "the hull": "UPDATE hulls SET name = 'fleeu'",
     "the missing hull": "DELETE FROM hulls",
@@ -83,6 +88,7 @@ DAMAGE = {
     "a consumer": "UPDATE consumers SET acknowledged = acknowledged + 1",
     "a delay": "UPDATE delays SET checksum = checksum # 4",
     "both totals": "UPDATE totals SET batches = batches + 1",
+    "the time of the last commit": "UPDATE totals SET committed = committed + 1",
     "the missing totals": "DELETE FROM totals",
 }
 
@@ -320,12 +326,13 @@ def test_databases_that_cannot_be_used_are_named(postgres, tmp_path):
         on(url).open(no_progress)
 
 
-def test_a_database_of_format_8_has_everything_and_goes_on(postgres, tmp_path):
-    """The folder beside it, and a batch of a server: as the version before hulls over shards left it."""
-    url = postgres.new_database()
-    query(url, (OLD_FOLDERS / "format8" / "database.sql").read_text())
-    assert query(url, "SELECT format FROM dynhull.format") == [(8,)]
-    expected, there = folders.opened(shutil.copytree(OLD_FOLDERS / "format8" / "stopped", tmp_path / "folder"))
+@pytest.mark.parametrize("version", [8, 10])
+def test_a_database_of_an_older_format_has_everything_and_goes_on(postgres, tmp_path, version):
+    """The folder beside it, and a batch of a server. New batches know their commits; the others stay as they are."""
+    url, folder = postgres.new_database(), OLD_FOLDERS / f"format{version}"
+    query(url, (folder / "database.sql").read_text())
+    assert query(url, "SELECT format FROM dynhull.format") == [(version,)]
+    expected, there = folders.opened(shutil.copytree(folder / "stopped", tmp_path / "folder"))
     for life in range(2):
         storage, contents = opened(url)
         with closing(storage):
@@ -337,11 +344,14 @@ def test_a_database_of_format_8_has_everything_and_goes_on(postgres, tmp_path):
                 found.records = found.records[: len(kept.records)]
                 same(found, kept)
                 assert len(added) == (1 + life if row.name == "fleet" else 0)
+                assert {each.committed for each in (*kept.records, *added[:1])} <= {None}
+                assert [each.committed.time for each in added[1:]] == [NOW] * len(added[1:])
             for row in there.fences:
                 assert storage.read_events(row.number, 0, 1000) == expected.read_events(row.number, 0, 1000)
             fleet = next(row for row in there.hulls if row.name == "fleet")
             last = storage.read(fleet.number).last_revision + 1
-            storage.commit([Append(fleet.number, [record(last)])])
+            storage.commit([Append(fleet.number, [record(last)])], NOW - life)
+        assert (contents.committed, life) in [(0, 0), (NOW, 1)]
     expected.close()
 
 
@@ -361,6 +371,9 @@ def test_what_is_served_in_an_older_format_is_not_migrated(url, monkeypatch):
             on(url).open(no_progress)
         append(storage, LAST + 1, LAST + 1)
         query(url, "UPDATE owners SET until = clock_timestamp()")  # it was not renewed in time
+        # What format 9 did not have.
+        query(url, "ALTER TABLE batches DROP COLUMN commit_number, DROP COLUMN committed")
+        query(url, "ALTER TABLE totals DROP COLUMN committed")
         join(Database(url), 1)
         assert query(url, "SELECT format FROM format") == [(FORMAT,)]
         with pytest.raises(TakenOverError):

@@ -185,7 +185,7 @@ def test_a_foreign_value_in_any_column_is_refused_or_repaired_with_a_note(folder
     with closing(sqlite3.connect(folder / DATABASE)) as database:
         columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})")]
     damaged = 0
-    for i, (column, value) in enumerate(product(columns, (2**62, "x", b"\0"))):
+    for i, (column, value) in enumerate(product(columns, (2**62, "x", b"\0", None))):
         copy = tmp_path / str(i)
         shutil.copytree(folder, copy)
         change = f"UPDATE {table} SET {column} = ? WHERE rowid = (SELECT min(rowid) FROM {table})"

@@ -86,11 +86,12 @@ class StoredRootLog:
         if decision.replaced is not None:
             tallies = {shard: _tally(effect) for shard, effect in decision.effects.items()}
             shares = Shares(tallies, division=decision.division)
-            return [Record(decision.revision, self._rows([decision.replaced]), clock=decision.clock, shares=shares)]
+            rows = self._rows([decision.replaced])
+            return [Record(decision.revision, rows, clock=decision.clock, shares=shares, cause=decision.cause)]
         tallies = {shard: _tally(decision.effects[shard]) for shard in sorted(decision.shards)}
         left = self._rows([effect.left for effect in effects if effect.left is not None])
         if decision.cause == "expiry":
-            return [Record(decision.revision, left, clock=decision.clock, shares=Shares(tallies, expiry=True))]
+            return [_expiry(decision.revision, left, decision.clock, tallies)]
         changed = self._rows([effect.changed for effect in effects if effect.changed is not None])
         record = Record(
             decision.revision,
@@ -100,10 +101,11 @@ class StoredRootLog:
             decision.clock,
             may_skip=decision.may_skip,
             shares=Shares(tallies),
+            cause=decision.cause,
         )
         if not any(effect.expired for effect in effects):
             return [record]
-        return [Record(decision.revision - 1, left, clock=decision.clock, shares=Shares({}, expiry=True)), record]
+        return [_expiry(decision.revision - 1, left, decision.clock, {}), record]
 
     def _rows(self, changes: Sequence[Change]) -> Rows:
         """The vertices that have come and gone."""
@@ -152,7 +154,8 @@ class StoredShardLog:
     def begin(self, epoch: int, decided: int) -> None:
         """Begin an epoch, and drop the steps after `decided`."""
         changes, revision, step, clock = self._without(decided + 1)
-        mark = Record(revision + 1, _nothing(self._row.settings), EPOCHS, epoch, clock, may_skip=True)
+        nothing = _nothing(self._row.settings)
+        mark = Record(revision + 1, nothing, EPOCHS, epoch, clock, may_skip=True, cause="epoch")
         self._commit([*changes, Append(self._row.number, [mark])])
         if changes:
             self._kept = None
@@ -225,6 +228,10 @@ def _decided(state: HullState) -> Decided:
     counts, number = state.counts, max(steps.values())
     more = counts.revision, counts.cause, counts.clock, state.producers, state.skipping
     return Decided(number, *more, steps, state.division)
+
+
+def _expiry(revision: int, left: Rows, clock: int | None, tallies: dict[int, Tally]) -> Record:
+    return Record(revision, left, clock=clock, shares=Shares(tallies, expiry=True), cause="expiry")
 
 
 def _tally(effect: Effect) -> Tally:

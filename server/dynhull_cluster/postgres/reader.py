@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from psycopg.pq import TransactionStatus
 
 from dynhull_server.storage.port import StorageError
-from dynhull_server.storage.rows.tables import COLUMNS, TOTALS_COLUMNS
+from dynhull_server.storage.rows.tables import COLUMNS, FORMAT, TOTALS_COLUMNS
 
 from .database import Connection, as_storage_errors
 
@@ -29,7 +29,12 @@ class PostgresReader:
     Args:
         connection: the connection.
         partition: the partition.
+
+    Attributes:
+        version: the format of the rows.
     """
+
+    version = FORMAT
 
     def __init__(self, connection: Connection, partition: int) -> None:
         self._connection = connection

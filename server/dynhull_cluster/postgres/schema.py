@@ -13,9 +13,12 @@ from psycopg.sql import Identifier
 
 from dynhull_server.storage.port import FormatError, LockedError, StorageError
 from dynhull_server.storage.refusals import Meaning
+from dynhull_server.storage.rows.encoding import checksum
 from dynhull_server.storage.rows.tables import (
     COLUMNS,
+    COMMITS_SINCE,
     FORMAT,
+    OPTIONAL,
     TOTALS_COLUMNS,
     Insert,
     Remove,
@@ -32,6 +35,10 @@ FIRST_FORMAT = 8
 MIGRATIONS: dict[int, Sequence[str]] = {
     8: (),  # it had no hulls over shards
     9: (),  # the number of their shards did not change
+    10: (  # it was not stored when batches were committed
+        "ALTER TABLE batches ADD COLUMN commit_number bigint, ADD COLUMN committed bigint",
+        "ALTER TABLE totals ADD COLUMN committed bigint NOT NULL DEFAULT 0",
+    ),
 }
 # The number of an advisory lock, held while tables are created, migrated, or filled from a folder: "dynhull".
 PREPARING = 0x64796E68756C6C
@@ -56,7 +63,9 @@ Query = tuple[bytes, Sequence[Any]]
 
 
 def _columns(columns: Sequence[str]) -> str:
-    return ", ".join(f"{column} {TYPES.get(column, INTEGER)} NOT NULL" for column in columns)
+    return ", ".join(
+        f"{column} {TYPES.get(column, INTEGER)}{'' if column in OPTIONAL else ' NOT NULL'}" for column in columns
+    )
 
 
 def _tables() -> Iterator[str]:
@@ -210,7 +219,20 @@ def prepare(connection: Connection, database: Database, partitions: int) -> None
     for before in range(version, FORMAT):
         for sql in MIGRATIONS[before]:
             connection.execute(sql.encode())
+    if version < COMMITS_SINCE:
+        _renew_checksums(connection)
     connection.execute("UPDATE format SET format = %s", [FORMAT])
+
+
+def _renew_checksums(connection: Connection) -> None:
+    """Have the checksums of the totals include the time, which formats before had not; one that is wrong stays so."""
+    *columns, _ = TOTALS_COLUMNS
+    sql = f"SELECT partition, copy, checksum, {', '.join(columns)} FROM totals".encode()  # noqa: S608  (ours)
+    for partition, copy, stored, *values in connection.execute(sql).fetchall():
+        *before, _ = values
+        if checksum(b"", *before) == stored:
+            renewed = [checksum(b"", *values), partition, copy]
+            connection.execute("UPDATE totals SET checksum = %s WHERE partition = %s AND copy = %s", renewed)
 
 
 def _end_owners(connection: Connection, database: Database, version: int) -> None:

@@ -195,7 +195,8 @@ class PostgresStorage(RowStorage):
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
         told = [f"{self._place}: {note}" for note in notes]
-        return Contents(rows, self._ledger.totals.next_number, told, fences)
+        totals = self._ledger.totals
+        return Contents(rows, totals.next_number, told, fences, totals.committed)
 
     def close(self) -> None:
         """Make all commits durable, and let another server own the partition."""
@@ -206,9 +207,9 @@ class PostgresStorage(RowStorage):
 
     # Committing
 
-    def commit(self, changes: Sequence[Change | Step]) -> None:
+    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> None:
         """Commit all of the changes or none."""
-        self._write(self._group(changes))
+        self._write(self._group(changes, now))
 
     def settle(self) -> None:
         """Decide the outcome of the last commit, as described at the top of this file."""

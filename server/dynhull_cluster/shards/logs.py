@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from dynhull_server.state.hull_state import Cause
-from dynhull_server.state.records import Division, Kept, Record
+from dynhull_server.state.records import Cause, Division, Kept, Record
 
 from .messages import Change, Effect
 

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, assert_never
+from typing import Any, assert_never
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from dynhull_server.state.batch import NO_POINTS, Applied
 from dynhull_server.state.errors import RefusedError
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.producers import Producers
-from dynhull_server.state.records import Contents, Division, HullSettings
+from dynhull_server.state.records import Cause, Contents, Division, HullSettings
 from dynhull_server.state.sample import sample
 
 from . import messages as say
@@ -22,9 +22,6 @@ from .parts import merged
 from .placement import SLOTS, Piece, Place, pieces
 from .planning import Plan, Planner
 from .requests import Expire, Read, Request, Reshard, Write
-
-if TYPE_CHECKING:
-    from dynhull_server.state.hull_state import Cause
 
 Round = dict[Place, say.Request]
 Effects = Mapping[int, say.Effect]
@@ -422,7 +419,7 @@ class Root:
         decision = Decision(
             filled.number,
             self.revision + 1,
-            "batch",
+            "division",
             self.clock,
             frozenset(shard for shard, number in enumerate(filled.numbers) if number),
             effects={shard: say.Effect(filled.numbers[shard], each) for shard, each in enumerate(filled.totals)},

@@ -165,11 +165,12 @@ class Shard:
                 expiry = contents.expire(step.clock)
                 if expiry is not None:
                     expired, left = expiry.points, self._follow(contents)
-                    records.append(Record(step.number, expiry, clock=contents.clock))
+                    records.append(Record(step.number, expiry, clock=contents.clock, cause="expiry"))
             if part is not None:
                 applied = contents.apply(part, step.number)
                 changed = self._follow(contents)
-                records.append(Record(step.number, contents.rows(part, applied), clock=contents.clock))
+                rows = contents.rows(part, applied)
+                records.append(Record(step.number, rows, clock=contents.clock, cause="batch"))
         except RefusedError as error:
             return Effect(step.number, _totals(contents), error=error)
         if records:

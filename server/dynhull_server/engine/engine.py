@@ -186,11 +186,15 @@ class Engine:
         self._loaded.clear()
         shards = [row for row in contents.hulls if row.settings.shard is not None]
         await self.run(self._turns, partial(self._restore_fences, contents))
-        self._time = ServerTime(clock, self._core.latest_time)
+        latest = self._core.latest_time
+        self._time = ServerTime(clock, latest)
+        # A window does not follow the last commit: the clock that it was made by may have been wrong.
+        self._commit_time = ServerTime(clock, max(latest or 0, contents.committed))
         self._commits = GroupCommit(
             self._storage,
             threads,
             clock,
+            self._commit_time.now,
             lambda error: self._from_thread(partial(self._commit_reported, error)),
             lambda error: self._from_thread(partial(self._supervisor.died, "commits", error)),
         )
@@ -577,7 +581,7 @@ class Engine:
 
     def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
         if trip is None:  # the storage is immediate
-            self._storage.commit(changes)
+            self._storage.commit(changes, self._commit_time.now())
             return
 
         def done(error: Exception | None, unknown: bool) -> None:

@@ -65,6 +65,7 @@ class GroupCommit:
         storage: keeps the changes.
         threads: creates the thread.
         clock: the time.
+        time: the time that commits have, in microseconds since 1970.
         report: called in the thread with the error of a failed commit, and with None after a successful one.
         died: called in the thread with the error that ends it unexpectedly.
 
@@ -77,12 +78,14 @@ class GroupCommit:
         storage: Storage,
         threads: Threads,
         clock: Clock,
+        time: Callable[[], int],
         report: Callable[[BaseException | None], None],
         died: Callable[[BaseException], None],
     ) -> None:
         self._storage = storage
         self._report = report
         self._clock = clock
+        self._time = time
         self._undecided = False
         self.since: float | None = None
         self._inbox: Inbox[_Waiting] = threads.inbox()
@@ -154,7 +157,7 @@ class GroupCommit:
         if not group:
             return
         try:
-            self._storage.commit([change for each in group for change in each.changes])
+            self._storage.commit([change for each in group for change in each.changes], self._time())
         except NotCommittedError as error:
             if len(group) == 1:
                 group[0].done(error, False)

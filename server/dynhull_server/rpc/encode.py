@@ -20,10 +20,11 @@ from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import NO_POINTS, Applied
 from ..state.contents.keyed import Found
 from ..state.fences.faults import FenceFault
-from ..state.hull_state import Cause, Counts, VertexKeys
+from ..state.hull_state import Counts, VertexKeys
 from ..state.records import (
     FOREVER,
     NO_TIME,
+    Cause,
     Center,
     Contents,
     Frame,
@@ -46,6 +47,8 @@ CAUSES: dict[Cause | None, batch_pb2.Cause] = {
     "batch": batch_pb2.CAUSE_BATCH,
     "expiry": batch_pb2.CAUSE_EXPIRY,
     "recenter": batch_pb2.CAUSE_RECENTER,
+    "quarantine": batch_pb2.CAUSE_BATCH,
+    "division": batch_pb2.CAUSE_BATCH,
 }
 
 FRAMES: dict[Frame, hull_pb2.Frame] = {"plane": hull_pb2.FRAME_PLANE, "geographic": hull_pb2.FRAME_GEOGRAPHIC}

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,13 +20,11 @@ from .history import History
 from .limits import Limits
 from .outline import GlobeOutline, Outline
 from .producers import Producers
-from .records import Center, Contents, Expiry, HullSettings, Kept, QuarantineRules, Record
+from .records import Cause, Center, Contents, Expiry, HullSettings, Kept, QuarantineRules, Record
 
 if TYPE_CHECKING:
     from .contents.live import AnyHull
     from .events import WriteBatch
-
-Cause = Literal["batch", "expiry", "recenter"]
 
 
 @dataclass(slots=True)
@@ -223,11 +221,14 @@ class HullState:
         if gone:
             applied.expired = gone
         chosen = self.center if self._follow_center() else None
-        self._applied(applied.points, "batch", hull_changed=applied.hull_changed)
+        cause = contents.cause(batch)
+        self._applied(applied.points, cause, hull_changed=applied.hull_changed)
         if records is not None:
             rows = contents.rows(batch, applied)
             numbered = write.producer, write.sequence
-            records.append(Record(applied.revision, rows, *numbered, contents.clock, chosen, may_skip=write.may_skip))
+            records.append(
+                Record(applied.revision, rows, *numbered, contents.clock, chosen, may_skip=write.may_skip, cause=cause)
+            )
         self.torn = False
         return applied
 
@@ -242,7 +243,7 @@ class HullState:
         if rows is not None:
             self._applied(len(self.hull), "expiry", hull_changed=self.hull.changes != changes)
             if records is not None:
-                records.append(Record(self.counts.revision, rows, clock=self.contents.clock))
+                records.append(Record(self.counts.revision, rows, clock=self.contents.clock, cause="expiry"))
         self.torn = False
         return 0 if rows is None else rows.points
 
@@ -260,7 +261,8 @@ class HullState:
         hull_changed = self.hull.changes != changes
         self._applied(len(self.hull), "recenter", hull_changed=hull_changed)
         if records is not None:
-            records.append(Record(self.counts.revision, rows, clock=self.contents.clock, center=self.center))
+            clock, center = self.contents.clock, self.center
+            records.append(Record(self.counts.revision, rows, clock=clock, center=center, cause="recenter"))
         return hull_changed
 
     def _follow_center(self) -> bool:
@@ -379,6 +381,8 @@ def _last_cause(kept: Kept) -> Cause | None:
     if not kept.records:
         return None
     last = kept.records[-1]
+    if last.cause is not None:
+        return last.cause
     if last.shares is not None:
         return "expiry" if last.shares.expiry else "batch"
     if last.center is not None and not len(last.rows):

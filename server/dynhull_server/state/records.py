@@ -1,7 +1,7 @@
 """The data that the storage keeps: hulls, and the batches applied to them."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,9 @@ Identity = Literal["multiset", "str", "int"]
 Clock = Literal["server", "data"]
 Condition = Literal["absent", "present"]
 Frame = Literal["plane", "geographic"]
+# What makes a revision: a batch of a client, points that leave because of the time, a call of Recenter or about the
+# quarantine, another division of a hull over shards; or, in the log of a shard, that its root has begun an epoch.
+Cause = Literal["batch", "expiry", "recenter", "quarantine", "division", "epoch"]
 Center = tuple[float, float]  # longitude and latitude in degrees
 Keys = PackedKeys | npt.NDArray[np.uint64]
 Times = npt.NDArray[np.int64]  # microseconds since 1970
@@ -275,6 +278,20 @@ class Shares:
     division: Division | None = None
 
 
+class Committed(NamedTuple):
+    """The commit of a revision.
+
+    Attributes:
+        number: the number of the commit in its partition: those of later commits are greater, and what has the same was
+            committed together.
+        time: the time by the server's clock, in microseconds since 1970; never less than that of an earlier commit of
+            the partition.
+    """
+
+    number: int
+    time: int
+
+
 @dataclass(slots=True)
 class Record:
     """One revision of a hull.
@@ -288,6 +305,8 @@ class Record:
         center: the centre of a geographic hull, where this revision sets or moves it before its rows; otherwise None.
         may_skip: whether numbers of the producer may be skipped.
         shares: for the root of a hull over shards, otherwise None.
+        cause: what made it; None where formats before 11 did not say.
+        committed: its commit, once it is read from a storage; None for one of formats before 11.
     """
 
     revision: int
@@ -298,6 +317,8 @@ class Record:
     center: Center | None = None
     may_skip: bool = False
     shares: Shares | None = None
+    cause: Cause | None = None
+    committed: Committed | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,6 +384,7 @@ class Kept:
         rules: the rules of the quarantine at that revision; None for those of the settings.
         tallies: what the root of a hull over shards knows of its shards at that revision.
         division: how its points are divided at that revision; None for as at its creation.
+        committed: the commit of that revision; None where it is not known, and before it is read from a storage.
     """
 
     revision: int = 0
@@ -375,6 +397,7 @@ class Kept:
     rules: QuarantineRules | None = None
     tallies: dict[int, Tally] = field(default_factory=dict)
     division: Division | None = None
+    committed: Committed | None = field(default=None, compare=False)
 
     @property
     def last_revision(self) -> int:

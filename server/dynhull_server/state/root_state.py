@@ -5,9 +5,9 @@ It follows what its shards have done, and decides nothing.
 
 from collections.abc import Sequence
 
-from .hull_state import Cause, Counts, HullState
+from .hull_state import Counts, HullState
 from .limits import Limits
-from .records import HullSettings, Kept, Record, Tally
+from .records import Cause, HullSettings, Kept, Record, Tally
 
 
 class RootState(HullState):
@@ -75,8 +75,8 @@ class RootState(HullState):
                     self._producers = self._new_producers({}, frozenset(), now)
                 self._producers.applied(record.producer, record.sequence, "", now, may_skip=record.may_skip)
                 self._producers.forget_beyond(self._max_producers)
-            cause: Cause = "expiry" if record.shares.expiry else "batch"
-            self._applied(0, cause, hull_changed=self.hull.changes != changes)
+            assert record.cause is not None  # its log has written it
+            self._applied(0, record.cause, hull_changed=self.hull.changes != changes)
             if records is not None:
                 records.append(record)
         self.torn = False

@@ -18,7 +18,7 @@ from ..state.fences.records import (
     PutConsumer,
     PutDelays,
 )
-from ..state.records import Append, Create, Delete, HullRow, Kept, Record
+from ..state.records import Append, Committed, Create, Delete, HullRow, Kept, Record
 from .port import NEWEST, Contents, DamagedError, NotCommittedError, Progress, Step
 
 KEPT_SNAPSHOTS = 2
@@ -72,6 +72,7 @@ class MemoryStorage:
         self._hulls: dict[int, _Hull] = {}
         self._fences: dict[int, KeptFence] = {}
         self._next_number = 1
+        self._commit = Committed(0, 0)
         self._turn = Lock()  # commits and reads run in different threads
 
     def open(self, progress: Progress) -> Contents:
@@ -79,12 +80,13 @@ class MemoryStorage:
         progress(0, len(self._hulls))
         rows = sorted((hull.row for hull in self._hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._fences.values()), key=lambda row: row.name)
-        return Contents(rows, self._next_number, [], fences)
+        return Contents(rows, self._next_number, [], fences, self._commit.time)
 
-    def commit(self, changes: Sequence[Change | Step]) -> None:
+    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> None:
         """Keep the changes."""
         with self._turn:
             self._examine(changes)
+            self._commit = Committed(self._commit.number + 1, max(self._commit.time, now))
             for change in changes:
                 self._carry_out(change)
 
@@ -292,7 +294,7 @@ class MemoryStorage:
     def _append(self, change: Append) -> None:
         hull = self._hulls[change.number]
         hull.last = change.records[-1].revision
-        hull.records += change.records
+        hull.records += [replace(record, committed=self._commit) for record in change.records]
 
     def _change(self, fence: KeptFence, change: PutDelays | DropEvents | PutConsumer | DropConsumer) -> None:
         match change:
@@ -317,6 +319,10 @@ class MemoryStorage:
         hull = self._hulls.get(snapshot.number)
         if hull is None:  # deleted meanwhile
             return
+        revision = snapshot.kept.revision
+        commits = {each.kept.revision: each.kept.committed for each in hull.snapshots}
+        commits |= {each.revision: each.committed for each in hull.records}
+        snapshot = _Snapshot(snapshot.number, replace(snapshot.kept, committed=commits.get(revision)))
         snapshots = sorted([*hull.snapshots, snapshot], key=lambda each: each.kept.revision)
         hull.snapshots = snapshots[-KEPT_SNAPSHOTS:]
         if len(hull.snapshots) == KEPT_SNAPSHOTS:

@@ -77,12 +77,14 @@ class Contents:
         next_number: a number greater than that of any hull or fence ever created.
         notes: messages about what was lost or repaired.
         fences: the fences, ordered by name.
+        committed: the time of the last commit, in microseconds since 1970; 0 for none.
     """
 
     hulls: list[HullRow]
     next_number: int
     notes: list[str]
     fences: list[FenceRow] = field(default_factory=list)
+    committed: int = 0
 
 
 class Storage(Protocol):
@@ -107,10 +109,16 @@ class Storage(Protocol):
             DamagedError: acknowledged batches are lost, and it is uncertain which.
         """
 
-    def commit(self, changes: Sequence["Change | Step"]) -> None:
+    def commit(self, changes: Sequence["Change | Step"], now: int = 0) -> None:
         """Commit all of the changes or none, with the configured durability.
 
-        Changes apply in order. A step of a deleted hull changes nothing.
+        Changes apply in order. A step of a deleted hull changes nothing. The records keep the number of the commit, and
+        its time.
+
+        Args:
+            changes: the changes.
+            now: the time of the commit, in microseconds since 1970; an earlier one than that of the last commit counts
+                as that.
 
         Raises:
             NotCommittedError: none was committed, and none will be found later. Also if a hull or fence to create

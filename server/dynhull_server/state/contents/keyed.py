@@ -19,6 +19,7 @@ from ..frames import Globe
 from ..records import (
     FOREVER,
     NO_TIME,
+    Cause,
     Center,
     Contents,
     Expiry,
@@ -254,6 +255,10 @@ class Keyed:
     def rows(self, admitted: Admitted, _: Applied) -> KeyRows:
         """The keys of an applied batch, without those that are too old."""
         return admitted.rows
+
+    def cause(self, admitted: Admitted) -> Cause:
+        """What makes the revision of a batch: a client that changes positions, or what is held of them."""
+        return "batch" if admitted.request is None else "quarantine"
 
     def recenter(self, center: Center | None) -> KeyRows:
         """Move the centre of a geographic hull, or raise MisfitError. Returns no rows. O(n log n)."""

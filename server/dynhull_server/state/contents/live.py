@@ -8,7 +8,7 @@ from dynhull.arrays import Points
 
 from ..batch import NO_POINTS, Applied
 from ..frames import Globe
-from ..records import Center, Contents, Expiry, Record, Rows
+from ..records import Cause, Center, Contents, Expiry, Record, Rows
 
 AnyHull = DynamicHull | KeyedHull | WindowHull | GeoHull | GeoKeyedHull | GeoWindowHull
 AnyKeyedHull = KeyedHull | GeoKeyedHull
@@ -65,6 +65,9 @@ class LiveContents(Protocol):
 
     def rows(self, admitted: Any, applied: Applied) -> Rows:
         """The rows of an applied batch that `replay` needs."""
+
+    def cause(self, admitted: Any) -> Cause:
+        """What makes the revision of a batch."""
 
     def recenter(self, center: Center | None) -> Rows:
         """Move the centre of a geographic hull; None for the mean direction of its points. Returns no rows.

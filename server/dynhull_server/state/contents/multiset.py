@@ -10,7 +10,7 @@ from dynhull import DynamicHull, GeoHull, MissingPointError
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import LimitExceededError, MisfitError, PointMissingError
 from ..frames import Globe
-from ..records import Center, Contents, Expiry, PointRows, Record
+from ..records import Cause, Center, Contents, Expiry, PointRows, Record
 from .live import REPLAYED_TOGETHER
 from .places import move_center, require_batch
 
@@ -72,6 +72,10 @@ class Multiset:
     def rows(self, batch: Batch, applied: Applied) -> PointRows:
         """The points of an applied batch."""
         return PointRows(batch.inserts, batch.deletes, applied.missing > 0)
+
+    def cause(self, _: Batch) -> Cause:
+        """What makes the revision of a batch."""
+        return "batch"
 
     def recenter(self, center: Center | None) -> PointRows:
         """Move the centre of a geographic hull, or raise MisfitError. Returns no rows. O(n log n)."""

@@ -17,7 +17,7 @@ from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, LimitExceededError, MisfitError
 from ..frames import Globe
 from ..numbers import as_numbers
-from ..records import Center, Contents, Expiry, HullSettings, PointRows, Record, Rows, Times
+from ..records import Cause, Center, Contents, Expiry, HullSettings, PointRows, Record, Rows, Times
 from .live import REPLAYED_TOGETHER
 from .multiset import NO_KEYS, apply_points, missing_point
 from .places import move_center, require_batch
@@ -142,6 +142,10 @@ class Windowed:
         """The points of an applied batch, with the times of the inserts."""
         batch = admitted.batch
         return PointRows(batch.inserts, batch.deletes, applied.missing > 0, admitted.times)
+
+    def cause(self, _: Admitted) -> Cause:
+        """What makes the revision of a batch."""
+        return "batch"
 
     def recenter(self, center: Center | None) -> PointRows:
         """Move the centre of a geographic hull, or raise MisfitError. Returns no rows. O(n log n)."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynhull.keys import PackedKeys
 
-from ...state.records import Contents, Division, Kept, Keys, QuarantineRules, Tally, Times
+from ...state.records import Committed, Contents, Division, Kept, Keys, QuarantineRules, Tally, Times
 from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
 from .held_rows import held_bytes, held_starts, joined_held, take_held
 
@@ -89,11 +89,13 @@ def state(kept: Kept) -> bytes:
         found["tallies"] = {str(shard): astuple(tally) for shard, tally in kept.tallies.items()}
     if kept.division is not None:
         found["division"] = asdict(kept.division)
+    if kept.committed is not None:
+        found["committed"] = kept.committed
     return json.dumps(found).encode()
 
 
 def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
-    """The producers, the clock and the centre of a state, and the function that decodes its chunks."""
+    """A snapshot without its contents and revision, and the function that decodes its chunks."""
     found = json.loads(data or "{}")
     producers = found.get("producers")
     if not isinstance(producers, dict):
@@ -106,6 +108,8 @@ def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
     kept.tallies = {int(shard): Tally(*numbers) for shard, numbers in found.get("tallies", {}).items()}
     if "division" in found:
         kept.division = Division(**found["division"])
+    if "committed" in found:
+        kept.committed = Committed(*found["committed"])
     return kept, _decoded
 
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 from ...state.records import EPOCHS, STEPS, HullRow, Record
 from ..port import DamagedError, StorageError
-from .encoding import checksum, decode, weight
+from .batch_rows import batch_records, commit_columns, is_whole
+from .encoding import weight
 from .ledger import DropNewest, DropSnapshot, HullRows, Ledger
 from .reading import read_hull, snapshot_state
 from .tables import Reader
@@ -148,11 +149,12 @@ def _last_revision(reader: Reader, hull: HullRows, step: int, shard: int) -> int
 
 
 def _records(reader: Reader, hull: HullRows, place: int) -> list[Record]:
-    (row,) = reader.some("batches", "first, last, checksum, payload", array("q", [place]))
-    first, last, stored, payload = row
-    if checksum(payload, hull.row.number, first, last) != stored:
+    columns = f"first, last, checksum, payload, {commit_columns(reader.version)}"
+    (row,) = reader.some("batches", columns, array("q", [place]))
+    first, last, stored, payload, *commit = row
+    if not is_whole(stored, payload, hull.row.number, first, last, *commit):
         raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
-    return list(decode(payload, first))
+    return list(batch_records(payload, first, *commit))
 
 
 def _step_of_snapshot(reader: Reader, hull: HullRows, revision: int) -> int:

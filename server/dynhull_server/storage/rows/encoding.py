@@ -1,9 +1,9 @@
 """Records as bytes, and the checksums of rows.
 
 A payload is a sequence of records: a header, the name of the producer, the hull's clock, its centre, the columns of
-the rows, and what the root of a hull over shards knows of these. What is optional has a flag in the header. Records of
-the formats 1 and 2 have no flags but LENIENT. Before format 5 the further flags were the upper byte of the
-length of the name, which was always 0.
+the rows, what the root of a hull over shards knows of these, and what made the revision. What is optional has a flag in
+the header. Records of the formats 1 and 2 have no flags but LENIENT. Before format 5 the further flags were the upper
+byte of the length of the name, which was always 0.
 """
 
 import struct
@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ...state.records import Condition, Division, Expiry, KeyRows, PointRows, Record, Rows, Shares, Tally
+from ...state.records import Cause, Condition, Division, Expiry, KeyRows, PointRows, Record, Rows, Shares, Tally
 from .columns import Cursor, key_bytes, point_bytes, time_bytes
 from .held_rows import change_bytes, take_change
 
@@ -26,14 +26,24 @@ SHARES = struct.Struct("<?H")
 TALLY = struct.Struct("<HQQQ")
 # The number of shards from then on, and the generation of this division.
 DIVISION = struct.Struct("<HQ")
-MOST_NUMBERS = 7  # in the key of a row
+MOST_NUMBERS = 8  # in the key of a row
 NUMBERS = [struct.Struct(f"<{count}q") for count in range(MOST_NUMBERS + 1)]
 
 HAS_CENTER, MAY_SKIP = 1, 2  # further flags
 HAS_HELD = 4  # since format 8
 HAS_SHARES = 8  # since format 9
 HAS_DIVISION = 16  # since format 10
-FURTHER = HAS_CENTER | MAY_SKIP | HAS_HELD | HAS_SHARES | HAS_DIVISION
+HAS_CAUSE = 32  # since format 11
+FURTHER = HAS_CENTER | MAY_SKIP | HAS_HELD | HAS_SHARES | HAS_DIVISION | HAS_CAUSE
+CAUSES: dict[Cause, bytes] = {
+    "batch": b"\1",
+    "expiry": b"\2",
+    "recenter": b"\3",
+    "quarantine": b"\4",
+    "division": b"\5",
+    "epoch": b"\6",
+}
+CAUSE_OF = {code: cause for cause, code in CAUSES.items()}
 LENIENT, HAS_TIMES, HAS_DEADLINES, HAS_CLOCK = 1, 2, 4, 8
 KINDS = 48  # the flags with the kind of the rows
 POINTS, STRINGS, INTEGERS, EXPIRY = 0, 16, 32, 48
@@ -61,6 +71,9 @@ def encode(records: Iterable[Record]) -> bytes:
             if record.shares.division is not None:
                 further |= HAS_DIVISION
                 columns.append(DIVISION.pack(record.shares.division.shards, record.shares.division.generation))
+        if record.cause is not None:
+            further |= HAS_CAUSE
+            columns.append(CAUSES[record.cause])
         if record.clock is not None:
             flags |= HAS_CLOCK
             columns.insert(0, TIME.pack(record.clock))
@@ -84,7 +97,8 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
                 raise ValueError("points without keys are in quarantine")
             rows.held = take_change(cursor, strings=flags & KINDS == STRINGS)
         shares = _shares(cursor, divides=bool(further & HAS_DIVISION)) if further & HAS_SHARES else None
-        yield Record(revision, rows, producer, sequence, clock, center, bool(further & MAY_SKIP), shares)
+        cause = _cause(cursor) if further & HAS_CAUSE else None
+        yield Record(revision, rows, producer, sequence, clock, center, bool(further & MAY_SKIP), shares, cause)
         revision += 1
 
 
@@ -157,6 +171,13 @@ def _shares(cursor: Cursor, *, divides: bool) -> Shares:
     found = [TALLY.unpack(cursor.take(TALLY.size)) for _ in range(count)]
     division = Division(*DIVISION.unpack(cursor.take(DIVISION.size))) if divides else None
     return Shares({shard: Tally(*numbers) for shard, *numbers in found}, expiry, division)
+
+
+def _cause(cursor: Cursor) -> Cause:
+    code = bytes(cursor.take(1))
+    if code not in CAUSE_OF:
+        raise ValueError(f"a record has the unknown cause {code.hex()}")
+    return CAUSE_OF[code]
 
 
 def _time(cursor: Cursor) -> int:

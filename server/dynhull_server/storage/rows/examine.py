@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..port import Progress
+from .batch_rows import commit_columns, is_whole
 from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
 from .hull_rows import found_hulls, values
@@ -182,10 +183,10 @@ class _Examination:
 
     def _batches(self) -> None:
         column = "payload" if self._contents else "NULL"
-        columns = f"rowid, hull, first, last, checksum, {column}"
+        columns = f"rowid, hull, first, last, checksum, {column}, {commit_columns(self._version)}"
         newest = MISSING
         hulls, dead = self._hulls, self._ledger.dead["batches"]
-        for place, number, first, last, stored, payload in self._counted("batches", columns):
+        for place, number, first, last, stored, payload, *commit in self._counted("batches", columns):
             newest = place
             scanned = hulls.get(number)
             if scanned is None:
@@ -194,7 +195,7 @@ class _Examination:
                     self._next_number = max(self._next_number, number + 1)
                 continue
             try:
-                whole = not self._contents or checksum(payload, number, first, last) == stored
+                whole = not self._contents or is_whole(stored, payload, number, first, last, *commit)
                 each = weight(stored, number, first, last)
             except (TypeError, struct.error):
                 self._findings.blame(scanned.rows, "a row of batches is damaged", fatal=True)

@@ -99,6 +99,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     8: ("id, name, uid, created, settings, checksum", _of_format_3),
     9: ("id, name, uid, created, settings, checksum", _of_format_3),
     10: ("id, name, uid, created, settings, checksum", _of_format_3),
+    11: ("id, name, uid, created, settings, checksum", _of_format_3),
 }
 
 

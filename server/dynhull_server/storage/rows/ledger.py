@@ -8,8 +8,9 @@ from itertools import count
 from typing import Self
 
 from ...state.changes import Change
-from ...state.records import Append, Create, Delete, HullRow
+from ...state.records import Append, Committed, Create, Delete, HullRow
 from ..port import NotCommittedError
+from .batch_rows import batch_checksum
 from .encoding import checksum, encode, weight
 from .event_directory import EventDirectory
 from .fence_ledger import FenceChanges, FenceStep, Staged
@@ -236,14 +237,20 @@ class Group:
 
     The ledger does not change before `adopt`, so no reader sees uncommitted rows.
 
+    Args:
+        ledger: the rows so far.
+        changes: the changes, in order.
+        now: the time in microseconds since 1970; one before the last commit counts as the time of that.
+
     Attributes:
         statements: the changes of rows.
         before, totals: the totals before and after them.
     """
 
-    def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep]) -> None:
+    def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep], now: int = 0) -> None:
         self._ledger = ledger
         self.before = self.totals = ledger.totals
+        self._commit = Committed(self.before.commits + 1, max(self.before.committed, now))
         # The hulls it concerns, after the changes so far.
         self._now: dict[int, _Now] = {}
         self._effects: list[Callable[[], object]] = []
@@ -255,7 +262,8 @@ class Group:
         fences.finish()
         next_number = max(self.totals.next_number, fences.next_number)
         self.totals = self.totals.plus(0, 0, fences.sum, fences.rows)
-        self.totals = self.totals._replace(commits=self.totals.commits + 1, next_number=next_number)
+        number, time = self._commit
+        self.totals = self.totals._replace(commits=number, next_number=next_number, committed=time)
 
     def adopt(self) -> None:
         """Update the ledger, after the commit."""
@@ -333,12 +341,12 @@ class Group:
             )
         payload = encode(change.records)
         keys = change.number, first, last
-        stored = checksum(payload, *keys)
+        stored = batch_checksum(payload, *keys, *self._commit)
         each = weight(stored, *keys)
         place = next(self._ledger.batch_ids)
         now.batches, now.sum, now.last = now.batches + 1, now.sum + each, last
         self.totals = self.totals.plus(0, 1, each)
-        self.statements.append(Insert("batches", (place, *keys, stored, payload)))
+        self.statements.append(Insert("batches", (place, *keys, stored, payload, *self._commit)))
         self._effects.append(lambda: now.rows.append(first, last, place, each))
 
     def _delete(self, number: int) -> None:

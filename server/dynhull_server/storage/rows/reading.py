@@ -6,14 +6,13 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
-from ...state.records import Kept, Record
+from ...state.records import Committed, Kept, Record
 from ..port import DamagedError
+from .batch_rows import batch_records, commit_columns, is_whole
 from .chunks import joined, state_from
-from .encoding import checksum, decode
+from .encoding import checksum
 from .ledger import HullRows, Snapshot
 from .tables import Reader, UnreadableError
-
-BATCH_COLUMNS = "first, last, checksum, payload"
 
 
 def read_hull(reader: Reader, hull: HullRows, until: int) -> Kept:
@@ -31,7 +30,7 @@ def read_hull(reader: Reader, hull: HullRows, until: int) -> Kept:
         raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
     with _as_damage(hull):
         kept = _newest_snapshot(reader, hull, until)
-        rows = reader.some("batches", BATCH_COLUMNS, hull.between(kept.revision, until))
+        rows = _rows(reader, hull.between(kept.revision, until))
         _add_records(kept, hull, rows, until)
     return kept
 
@@ -44,7 +43,7 @@ def read_records(reader: Reader, hull: HullRows, after: int) -> list[Record]:
     """
     kept = Kept(revision=after)
     with _as_damage(hull):
-        rows = reader.some("batches", BATCH_COLUMNS, hull.between(after, hull.last))
+        rows = _rows(reader, hull.between(after, hull.last))
         _add_records(kept, hull, rows, hull.last)
     return kept.records
 
@@ -56,7 +55,7 @@ def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
         DamagedError: a row is damaged or missing.
     """
     ids = array("q", (place for hull in hulls if not hull.snapshots for place in hull.ids))
-    rows = reader.some("batches", BATCH_COLUMNS, ids)
+    rows = _rows(reader, ids)
     for hull in hulls:
         if hull.snapshots:
             yield read_hull(reader, hull, hull.last)
@@ -65,6 +64,24 @@ def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
         with _as_damage(hull):
             _add_records(kept, hull, islice(rows, len(hull.ids)), hull.last)
         yield kept
+
+
+def commit_of(reader: Reader, hull: HullRows, revision: int) -> Committed | None:
+    """The commit of a revision; None where it is not known, because the row is damaged, or of an earlier format."""
+    for first, last, stored, payload, *commit in _rows(reader, hull.between(revision - 1, revision)):
+        if first <= revision <= last and None not in commit:
+            whole = is_whole(stored, payload, hull.row.number, first, last, *commit)
+            return Committed(*commit) if whole else None
+    for snapshot in hull.snapshots:
+        if snapshot.revision == revision:
+            kept = snapshot_state(reader, hull.row.number, snapshot)
+            return None if kept is None else kept.committed
+    return None
+
+
+def _rows(reader: Reader, places: "array[int]") -> Iterator[tuple[Any, ...]]:
+    """Of rows of batches, the revisions, the checksum, the payload and the commit."""
+    return reader.some("batches", f"first, last, checksum, payload, {commit_columns(reader.version)}", places)
 
 
 @contextmanager
@@ -124,10 +141,10 @@ def _snapshot(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
 def _add_records(kept: Kept, hull: HullRows, rows: Iterable[tuple[Any, ...]], until: int) -> None:
     """Add the revisions after the snapshot, up to `until` or the last one; `rows` are those that have them."""
     expected = kept.revision
-    for first, last, stored, payload in rows:
-        if checksum(payload, hull.row.number, first, last) != stored:
+    for first, last, stored, payload, *commit in rows:
+        if not is_whole(stored, payload, hull.row.number, first, last, *commit):
             raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
-        for record in decode(payload, first):
+        for record in batch_records(payload, first, *commit):
             if not kept.revision < record.revision <= until:
                 continue
             expected += 1

@@ -4,13 +4,14 @@ from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from threading import Lock
 from typing import Protocol, TypeVar
 
 from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.records import FenceEvent, Inside, KeptFence
-from ...state.records import HullRow, Kept, Record
+from ...state.records import Committed, HullRow, Kept, Record
 from ..port import NEWEST, DamagedError, NotCommittedError, Step, StorageError
 from . import chunks
 from .divided import newest_rows
@@ -31,7 +32,7 @@ from .ledger import (
     Ledger,
     Snapshot,
 )
-from .reading import read_each, read_hull, read_records
+from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader
 
@@ -78,12 +79,12 @@ class RowStorage(ABC):
         """What of many events can be written before the changes."""
         return staging(changes, lambda: next(self._ledger.event_ids))
 
-    def _group(self, changes: Sequence[Change | Step]) -> Group:
+    def _group(self, changes: Sequence[Change | Step], now: int) -> Group:
         """The statements of a commit, and what it does to the ledger."""
         if self._unsettled:
             raise StorageError("the outcome of the previous commit is not known yet")
         try:
-            return Group(self._ledger, changes)  # type: ignore[arg-type]  # all steps come from this class
+            return Group(self._ledger, changes, now)  # type: ignore[arg-type]  # all steps come from this class
         except NotCommittedError:
             raise
         except Exception as error:  # a value that does not fit a column, or no memory
@@ -183,10 +184,19 @@ class RowStorage(ABC):
         try:
             for i, (place, cut) in enumerate(zip(ids, cuts, strict=True)):
                 yield Chunk(place, snapshot.id, i, chunks.chunk(contents, cut))
-            yield Finish(number, snapshot, chunks.state(kept))
+            commit = self._commit_of(number, kept.revision)
+            yield Finish(number, snapshot, chunks.state(replace(kept, committed=commit)))
         finally:
             del self._under_way[snapshot.id]
         yield from self._trim(number)
+
+    def _commit_of(self, number: int, revision: int) -> Committed | None:
+        """The commit of a revision, None where it is not known."""
+        with self._reading(lambda ledger: [hull.copy() for hull in [ledger.hulls.get(number)] if hull]) as (
+            reader,
+            found,
+        ):
+            return next((commit_of(reader, hull, revision) for hull in found), None)
 
     def _trim(self, number: int) -> Iterator[Step]:
         while (hull := self._ledger.hulls.get(number)) and len(hull.snapshots) > KEPT:

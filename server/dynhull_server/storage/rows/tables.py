@@ -8,14 +8,15 @@ from ..port import StorageError
 if TYPE_CHECKING:
     from array import array
 
-# The present format of rows, and the first ones with fences, delayed events, and events of many fences in a row.
-FORMAT = 10
-FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE = 4, 6, 7
+# The present format of rows, and the first ones with fences, delayed events, events of many fences in a row, and the
+# commits of batches.
+FORMAT = 11
+FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE, COMMITS_SINCE = 4, 6, 7, 11
 
 # The columns of each table in the present format; the first is the number of the row.
 COLUMNS = {
     "hulls": ("id", "name", "uid", "created", "settings", "checksum"),
-    "batches": ("rowid", "hull", "first", "last", "checksum", "payload"),
+    "batches": ("rowid", "hull", "first", "last", "checksum", "payload", "commit_number", "committed"),
     "snapshots": ("id", "hull", "revision", "chunks", "state", "checksum"),
     "chunks": ("rowid", "snapshot", "number", "checksum", "points"),
     "fences": ("id", "name", "uid", "created", "config", "checksum"),
@@ -25,7 +26,9 @@ COLUMNS = {
     "delays": ("rowid", "fence", "checksum", "payload"),
     "starts": ("rowid", "fence", "first", "checksum"),
 }
-TOTALS_COLUMNS = ("commits", "hulls", "batches", "sum", "next_number", "mode", "fence_rows", "checksum")
+# Those that may be NULL: rows of earlier formats do not have them.
+OPTIONAL = frozenset({"commit_number", "committed"})
+TOTALS_COLUMNS = ("commits", "hulls", "batches", "sum", "next_number", "mode", "fence_rows", "committed", "checksum")
 
 # The fence, and the first and last sequence, of a row with the events of many fences. A row that a format up to 6 has
 # written has events of one fence, and another encoding.
@@ -62,14 +65,19 @@ Statement = Insert | Remove | Replace
 
 
 class Reader(Protocol):
-    """Reads rows of the present format, as of one moment.
+    """Reads rows, as of one moment.
 
     The columns that a method is given are SQL expressions which every database understands.
+
+    Attributes:
+        version: the format of the rows.
 
     Raises:
         UnreadableError: the database is damaged.
         StorageError: it cannot be read at present.
     """
+
+    version: int
 
     def count(self, table: str) -> int:
         """The number of rows of a table."""

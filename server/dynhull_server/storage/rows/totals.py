@@ -18,7 +18,7 @@ class Totals(NamedTuple):
     """The totals of all valid rows.
 
     Attributes:
-        commits: the number of earlier commits; it only grows.
+        commits: the number of earlier commits, which is that of the last one; it only grows.
         hulls: the number of hulls.
         batches: the number of rows of batches, without those of deleted hulls.
         sum: the sum of the checksums of the hulls and of the weights of all other rows.
@@ -26,6 +26,7 @@ class Totals(NamedTuple):
         mode: STOPPED or one of MODES. In the database file itself it is STOPPED only if the log has no acknowledged
             commits.
         fence_rows: the number of rows of fences: their own, and those of events, consumers and who is inside.
+        committed: the time of the last commit, in microseconds since 1970; it never goes back.
     """
 
     commits: int = 0
@@ -35,6 +36,7 @@ class Totals(NamedTuple):
     next_number: int = 1
     mode: int = STOPPED
     fence_rows: int = 0
+    committed: int = 0
 
     def plus(self, hulls: int, batches: int, checksums: int, fence_rows: int = 0) -> Self:
         """The totals after adding rows or, with negative numbers, removing them."""
@@ -47,6 +49,7 @@ class Totals(NamedTuple):
             self.next_number,
             self.mode,
             self.fence_rows + fence_rows,
+            self.committed,
         )
 
     @property
@@ -58,7 +61,7 @@ class Totals(NamedTuple):
 def totals_from(rows: Sequence[Sequence[Any]]) -> tuple[Totals | None, bool]:
     """The totals of all copies found, None if they are damaged; and whether both copies are intact."""
     whole = set()
-    for *values, stored in rows:  # up to format 3 without fences
+    for *values, stored in rows:  # up to format 3 without fences, up to format 10 without a time
         if all(type(value) is int for value in values) and checksum(b"", *values) == stored:
             whole.add(Totals(*values))
     both = len(rows) == COPIES and all(row == rows[0] for row in rows)

@@ -96,7 +96,7 @@ def check(path: Path, progress: Progress) -> Report:
         report = _report(findings, opened.notes)
         if report.fatal:
             return report
-        fences = check_fences(SQLiteReader(opened.connection), findings.ledger)
+        fences = check_fences(opened.reader, findings.ledger)
         return replace(report, fences=fences)
 
 
@@ -168,7 +168,7 @@ def _together(paths: Sequence[Path], *, accept_loss: bool = False) -> Iterator["
         with ExitStack() as stack:
             sources = [stack.enter_context(_opened(path, accept_loss=accept_loss)) for path in paths]
             ledgers = [load(each.connection, each.version) for each in sources]
-            parts = [Part(SQLiteReader(each.connection), ledger) for each, ledger in zip(sources, ledgers, strict=True)]
+            parts = [Part(each.reader, ledger) for each, ledger in zip(sources, ledgers, strict=True)]
             if len(parts) == 1:
                 before = divided.revisions(ledgers[0])
             try:
@@ -199,7 +199,7 @@ def reading(path: Path, progress: Progress) -> Iterator[tuple[SQLiteReader, Find
         if findings.fatal:
             raise DamagedError(f"{path}: {'; '.join(findings.fatal)}: restore a backup")
         findings.notes[:0] = opened.notes
-        yield SQLiteReader(opened.connection), findings
+        yield opened.reader, findings
 
 
 def write(source: str, target: Path, rows: Iterable[Insert], totals: Totals) -> Findings:
@@ -268,6 +268,11 @@ class _Opened:
     version: int
     notes: list[str]
     own: Totals | None
+
+    @property
+    def reader(self) -> SQLiteReader:
+        """Reads its rows."""
+        return SQLiteReader(self.connection, self.version)
 
 
 @dataclass(frozen=True, slots=True)
@@ -368,7 +373,7 @@ def _finish(
     if findings.fatal:
         raise DamagedError(f"the data is damaged and was not copied: {'; '.join(findings.fatal)}")
     ledger = findings.ledger
-    _change(connection, ledger, _leading_back(connection, ledger, lasts))
+    _change(connection, ledger, _leading_back(SQLiteReader(connection, opened.version), ledger, lasts))
     if opened.version < FORMAT:
         migrate(connection, opened.version, ledger, findings.starts)
     _change(connection, ledger, renewing(ledger, incarnation))
@@ -380,9 +385,8 @@ def _finish(
     return _report(findings, opened.notes)
 
 
-def _leading_back(connection: sqlite3.Connection, ledger: Ledger, lasts: Mapping[int, int]) -> Iterator[AnyStep]:
+def _leading_back(reader: SQLiteReader, ledger: Ledger, lasts: Mapping[int, int]) -> Iterator[AnyStep]:
     """What drops that which hulls have beyond their last revisions."""
-    reader = SQLiteReader(connection)
     for number, last in lasts.items():
         yield from dropping(reader, ledger.hulls[number], last)
 

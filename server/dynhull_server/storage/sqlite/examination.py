@@ -53,7 +53,7 @@ def examine(connection: sqlite3.Connection, version: int, own: Totals | None, pr
         if not _has_tables(connection, version, findings):
             return findings
         _check_structure(connection, version, findings)
-        examine_rows(SQLiteReader(connection), version, findings, progress)
+        examine_rows(SQLiteReader(connection, version), version, findings, progress)
         if own is not None and own.commits > findings.ledger.totals.commits:
             findings.fatal.append(
                 "log and database do not belong together: the database has later commits than its log"
@@ -75,7 +75,7 @@ def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
     """
     findings = Findings()
     if _has_tables(connection, version, findings):
-        examine_rows(SQLiteReader(connection), version, findings, lambda *_: None, contents=False)
+        examine_rows(SQLiteReader(connection, version), version, findings, lambda *_: None, contents=False)
     if findings.fatal:
         raise DamagedError("; ".join(findings.fatal))
     return findings.ledger

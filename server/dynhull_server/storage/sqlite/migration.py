@@ -7,7 +7,7 @@ from ..rows.fence_runs import Start
 from ..rows.hull_rows import values
 from ..rows.ledger import Ledger
 from ..rows.totals import Totals
-from .schema import FENCE_TABLES, INSERT, SCHEMAS, TABLES, renew_totals, stamp
+from .schema import ADD_COMMITS, FENCE_TABLES, INSERT, SCHEMAS, TABLES, renew_totals, stamp
 
 
 def make_tables(connection: sqlite3.Connection) -> None:
@@ -34,6 +34,8 @@ def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger, starts
         connection.execute("DROP TABLE totals")
     for table in ("totals", *(table for table in FENCE_TABLES if table not in SCHEMAS[version])):
         connection.execute(TABLES[table])
+    for sql in ADD_COMMITS:
+        connection.execute(sql)
     connection.execute("DROP TABLE hulls")
     connection.execute(TABLES["hulls"])
     connection.executemany(INSERT["hulls"], (values(hull.row) for hull in ledger.hulls.values()))

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from threading import Condition
 from typing import TYPE_CHECKING, Any
 
-from ..rows.tables import UnreadableError
+from ..rows.tables import FORMAT, UnreadableError
 
 if TYPE_CHECKING:
     from array import array
@@ -29,10 +29,15 @@ class SQLiteReader:
 
     Args:
         connection: the connection.
+        version: the format of the rows.
+
+    Attributes:
+        version: the same.
     """
 
-    def __init__(self, connection: sqlite3.Connection) -> None:
+    def __init__(self, connection: sqlite3.Connection, version: int = FORMAT) -> None:
         self._connection = connection
+        self.version = version
 
     def begin(self) -> None:
         """Begin a read transaction, and fix the commit it reads."""

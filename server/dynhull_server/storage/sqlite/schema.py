@@ -17,7 +17,7 @@ TABLES = {
     last INTEGER NOT NULL,
     checksum INTEGER NOT NULL,
     payload BLOB NOT NULL
-)""",
+, commit_number INTEGER, committed INTEGER)""",  # as it reads after ADD COLUMN
     "snapshots": """CREATE TABLE snapshots (
     id INTEGER PRIMARY KEY,
     hull INTEGER NOT NULL,
@@ -49,6 +49,7 @@ TABLES = {
     next_number INTEGER NOT NULL,
     mode INTEGER NOT NULL,
     fence_rows INTEGER NOT NULL,
+    committed INTEGER NOT NULL,
     checksum INTEGER NOT NULL
 )""",
     "fences": """CREATE TABLE fences (
@@ -94,12 +95,39 @@ TABLES = {
 }
 FENCE_TABLES = ("fences", "events", "insides", "consumers", "delays", "starts")
 
+# What migrates batches from formats that did not store their commits.
+ADD_COMMITS = (
+    "ALTER TABLE batches ADD COLUMN commit_number INTEGER",
+    "ALTER TABLE batches ADD COLUMN committed INTEGER",
+)
+
+# Up to format 10 it was not stored when batches were committed.
+FORMAT_10 = TABLES | {
+    "batches": """CREATE TABLE batches (
+    hull INTEGER NOT NULL,
+    first INTEGER NOT NULL,
+    last INTEGER NOT NULL,
+    checksum INTEGER NOT NULL,
+    payload BLOB NOT NULL
+)""",
+    "totals": """CREATE TABLE totals (
+    id INTEGER PRIMARY KEY,
+    commits INTEGER NOT NULL,
+    hulls INTEGER NOT NULL,
+    batches INTEGER NOT NULL,
+    sum INTEGER NOT NULL,
+    next_number INTEGER NOT NULL,
+    mode INTEGER NOT NULL,
+    fence_rows INTEGER NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
+}
 # Up to format 6 the rows of events said where the events of a fence begin.
-FORMAT_6 = {table: sql for table, sql in TABLES.items() if table != "starts"}
+FORMAT_6 = {table: sql for table, sql in FORMAT_10.items() if table != "starts"}
 # Format 5 had no fences whose events are delayed.
 FORMAT_5 = {table: sql for table, sql in FORMAT_6.items() if table != "delays"}
 # Format 3 had no fences.
-FORMAT_3 = {table: sql for table, sql in TABLES.items() if table not in FENCE_TABLES} | {
+FORMAT_3 = {table: sql for table, sql in FORMAT_10.items() if table not in FENCE_TABLES} | {
     "totals": """CREATE TABLE totals (
     id INTEGER PRIMARY KEY,
     commits INTEGER NOT NULL,
@@ -131,7 +159,7 @@ FORMAT_1 = {
     config BLOB NOT NULL
 )""",
     "sqlite_autoindex_hulls_1": None,
-    "batches": TABLES["batches"],
+    "batches": FORMAT_10["batches"],
     "batches_by_revision": "CREATE UNIQUE INDEX batches_by_revision ON batches (hull, first)",
     "snapshots": TABLES["snapshots"],
     "chunks": TABLES["chunks"],
@@ -144,9 +172,10 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     4: FORMAT_5,  # it had no centres in batches and snapshots, and no frames of hulls
     5: FORMAT_5,
     6: FORMAT_6,
-    7: TABLES,  # it wrote the events of a row in more bytes
-    8: TABLES,  # it had no hulls over shards
-    9: TABLES,  # the number of their shards did not change
+    7: FORMAT_10,  # it wrote the events of a row in more bytes
+    8: FORMAT_10,  # it had no hulls over shards
+    9: FORMAT_10,  # the number of their shards did not change
+    10: FORMAT_10,
     FORMAT: TABLES,
 }
 

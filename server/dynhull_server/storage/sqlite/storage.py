@@ -108,7 +108,8 @@ class SQLiteStorage(RowStorage):
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
         notes += [self._prefixed(note) for note in findings.notes]
-        return Contents(rows, self._ledger.totals.next_number, notes, fences)
+        totals = self._ledger.totals
+        return Contents(rows, totals.next_number, notes, fences, totals.committed)
 
     def close(self) -> None:
         """Release the folder."""
@@ -123,11 +124,11 @@ class SQLiteStorage(RowStorage):
     # Committing
 
     @_as_storage_errors()
-    def commit(self, changes: Sequence[Change | Step]) -> None:
+    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> None:
         """Commit all of the changes or none."""
         if self._gone is not None and not self._unsettled:
             raise NotCommittedError(_gone(self._gone))
-        self._write(self._group(changes))
+        self._write(self._group(changes, now))
 
     @_as_storage_errors()
     def settle(self) -> None:
