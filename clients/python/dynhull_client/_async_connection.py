@@ -94,7 +94,7 @@ class AsyncConnection(Connection):
             try:
                 messages = aiter(stream)
                 while True:
-                    with CallErrors(self):
+                    with CallErrors(self, call.method):
                         message = await anext(messages, None)
                     if message is None:
                         return

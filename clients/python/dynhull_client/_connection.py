@@ -233,7 +233,7 @@ class BlockingConnection(Connection):
                     yield call.decode(message)
                 return
             except grpc.RpcError as failure:
-                error = self.error_of(failure)
+                error = self.error_of(failure, call.method)
                 if begun:
                     raise error from None
                 call, pause = attempts.after(call, error)
