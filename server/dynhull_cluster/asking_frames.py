@@ -6,8 +6,9 @@ from google.rpc.status_pb2 import Status
 
 from dynhull_server.rpc.status import DrainingError, RelayedError, error_status
 
-from .frames import ANSWERS_PINGS, VERSION, Frames, Kind, pack_request
+from .frames import ANSWERS_PINGS, Frames, Kind, pack_request
 from .upstream import lost_status
+from .versions import NEWEST, UNSAID, Versions, own_versions
 
 NUMBERS = 2**32
 
@@ -18,6 +19,7 @@ class AskingFrames(Frames):
     Attributes:
         left: is done when nothing more can be asked: the worker has said goodbye, or the connection is lost.
         gone: set when the connection is lost, or has said goodbye to a worker that others have replaced.
+        theirs: which versions of the protocol the worker speaks.
         writable: set while the worker takes what is sent, and when nothing more can be asked.
     """
 
@@ -25,6 +27,7 @@ class AskingFrames(Frames):
         super().__init__()
         self.left: asyncio.Future[None] = self._loop.create_future()
         self.gone = asyncio.Event()
+        self.theirs = UNSAID
         self.writable = asyncio.Event()
         self.writable.set()
         self._leaving = False
@@ -40,12 +43,13 @@ class AskingFrames(Frames):
 
     async def greet(self, greeting: bytes) -> None:
         """Prove to be a gateway. Raises RelayedError if the other end does not accept that."""
-        answer = self._waiting[VERSION] = self._loop.create_future()
-        self.send(VERSION, Kind.GREETING, greeting)
+        answer = self._waiting[NEWEST] = self._loop.create_future()
+        self.send(0, Kind.VERSIONS, own_versions().text.encode())
+        self.send(NEWEST, Kind.GREETING, greeting)
         try:
             self._answers_pings = await answer == ANSWERS_PINGS
         finally:
-            del self._waiting[VERSION]
+            del self._waiting[NEWEST]
 
     def ping(self, seconds: float) -> None:
         """Ask the worker whether it is there, now and at this interval; without an answer, the connection is lost."""
@@ -95,6 +99,9 @@ class AskingFrames(Frames):
             self._refuse_after(number)
             return
         if kind is Kind.PONG:
+            return
+        if kind is Kind.VERSIONS:
+            self.theirs = Versions.of(rest.decode())
             return
         answer = self._waiting.get(number)
         if answer is None or answer.done():

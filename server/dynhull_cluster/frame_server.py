@@ -23,7 +23,8 @@ from dynhull_server.rpc.methods import RunHandler
 from dynhull_server.rpc.runs import Run, run_of_requests
 
 from .callers import KEY, OWNER
-from .frames import ANSWERS_PINGS, VERSION, Frames, Kind, unpack_request
+from .frames import ANSWERS_PINGS, Frames, Kind, unpack_request
+from .versions import NEWEST, UNSAID, Versions, own_versions
 
 DETAILS = "grpc-status-details-bin"
 # Seconds that the others get to receive their last answers and to close their connections.
@@ -123,7 +124,8 @@ class _Connection(Frames):
         self.leaving = False
         self._server = server
         self._greeting = server.greeting
-        self._version = 0 if server.greeting else VERSION  # without a greeting, both ends are of one program
+        self._version = 0 if server.greeting else NEWEST  # without a greeting, both ends are of one program
+        self._theirs = b""
         self._last = 0
         self._arrived: list[_Request] = []
         self._running: dict[int, asyncio.Task[None]] = {}
@@ -156,10 +158,17 @@ class _Connection(Frames):
             self._transport.resume_reading()
 
     def received(self, number: int, kind: Kind, rest: bytes) -> None:
-        if self._greeting:
+        if self._greeting and kind is Kind.VERSIONS:
+            self._theirs = rest
+        elif self._greeting:
             known = kind is Kind.GREETING and hmac.compare_digest(rest, self._greeting)
             if not known or self._server.leaving:
                 self.abort()
+                return
+            self.send(0, Kind.VERSIONS, own_versions().text.encode())
+            theirs = Versions.of(self._theirs.decode()) if self._theirs else UNSAID
+            if not own_versions().meet(theirs):
+                self.close()
                 return
             self._greeting = b""
             self._version = number

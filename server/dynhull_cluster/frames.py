@@ -13,9 +13,11 @@ taken. It answers these, and what came after them has not begun: it is for the n
 connection, once it has all answers; until then the worker refuses what comes through gRPC, so that nothing is lost on
 the way.
 
-Servers of two versions understand each other, while one after the other is replaced. The number of a greeting is the
-version of its sender's frames, and a worker has that for the number of its answer. One that does not know this sends 0,
-gets no goodbye, and takes the end of the connection for that of the worker. Frames of an unknown kind are passed over.
+Servers of two versions understand each other, while one after the other is replaced. Before the greeting, and before
+the answer to it, a frame says which versions of the protocol its sender speaks (`versions`); without one in common, the
+worker closes the connection. Frames of an unknown kind are passed over, and so is this one by earlier versions. For
+these, the number of a greeting is the newest version, which the answer has, too. One that does not know this sends 0,
+gets no goodbye, and takes the end of the connection for that of the worker.
 
 Between machines, who asks also pings, and takes a connection for lost on which nothing arrives until the next ping. The
 answer to a greeting says that a worker answers pings; one of an earlier version does not, and is not pinged.
@@ -31,8 +33,6 @@ LENGTHS = Struct("<HH")
 
 # A larger request goes through gRPC, so that it does not keep others waiting.
 MOST_BYTES = 2**18
-# The version of the frames: of those with a goodbye.
-VERSION = 1
 ANSWERS_PINGS = b"pings"
 
 
@@ -47,6 +47,7 @@ class Kind(IntEnum):
     GOODBYE = 5
     PING = 6
     PONG = 7
+    VERSIONS = 8
 
 
 KINDS = {each.value: each for each in Kind}

@@ -38,6 +38,7 @@ CALLS: dict[str, Callable[[HullClient], Any]] = {
     "GetHull": lambda client: client.get_hull("fleet"),
     "Apply": lambda client: client.apply("fleet", insert=[[1, 2]]),
     "GetFence": lambda client: client.get_fence("yard"),
+    "ReadPoints": lambda client: next(iter(client.read_points("fleet"))),
     "Watch": lambda client: next(iter(client.watch("fleet"))),
     "WatchFence": lambda client: next(iter(client.watch_fence("yard"))),
     "Stream": written,

@@ -10,11 +10,14 @@ from dynhull_cluster.frames import Frames
 from dynhull_cluster.machines import addresses
 from dynhull_cluster.machines.addresses import Addresses
 from dynhull_cluster.machines.board import Owner, Tables
+from dynhull_cluster.versions import UNSAID
 
 PARTITION = 3
 
 
 class Greeted(Frames):
+    theirs = UNSAID
+
     async def greet(self, greeting: bytes) -> None:
         assert greeting == b"3/north-1/0/secret"
 

@@ -13,10 +13,11 @@ from proxy import Proxy, proxy
 from worker_links import running
 
 from dynhull_cluster.frame_server import FrameServer
-from dynhull_cluster.frames import VERSION, Frames, Kind
+from dynhull_cluster.frames import Frames, Kind
 from dynhull_cluster.machines.addresses import Addresses
 from dynhull_cluster.machines.board import Owner, Tables
 from dynhull_cluster.machines.entrance import proof_of
+from dynhull_cluster.versions import NEWEST
 from dynhull_cluster.worker_link import WorkerLink
 from dynhull_server.rpc.status import RelayedError
 
@@ -77,7 +78,7 @@ class Earlier(Frames):
 
     def received(self, number: int, kind: Kind, _rest: bytes) -> None:
         if kind is Kind.GREETING:
-            self.send(VERSION, Kind.ANSWER)
+            self.send(NEWEST, Kind.ANSWER)
         else:
             self._loop.call_later(0.3, self.send, number, Kind.ANSWER, b"late")
 

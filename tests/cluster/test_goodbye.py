@@ -19,13 +19,13 @@ from dynhull_cluster.frames import (
     ANSWERS_PINGS,
     HEADER,
     MOST_BYTES,
-    VERSION,
     Frames,
     Kind,
     pack_request,
     unpack_request,
 )
 from dynhull_cluster.sockets import Sockets
+from dynhull_cluster.versions import NEWEST, own_versions
 from dynhull_cluster.worker_link import WorkerLink
 from dynhull_server.rpc.status import WorkerAwayError
 
@@ -209,6 +209,7 @@ class Letters:
         await self.server.listen_on(bound, None)
         asker = Asker(*await asyncio.open_connection("127.0.0.1", port))
         asker.send(version, Kind.GREETING, b"secret")
+        assert await asker.read() == (0, Kind.VERSIONS, own_versions().text.encode())
         assert await asker.read() == (version, Kind.ANSWER, ANSWERS_PINGS)
         asker.send(7, UNKNOWN_KIND, b"of a later version")
         asker.ask(1, b"first")
@@ -219,7 +220,7 @@ class Letters:
 def test_a_worker_says_goodbye_and_waits_until_everybody_has_left() -> None:
     async def run() -> None:
         letters = Letters()
-        asker = await letters.asker(VERSION)
+        asker = await letters.asker(NEWEST)
         letters.server.say_goodbye()
         assert await asker.read() == (1, Kind.GOODBYE, b"")
         asker.ask(2, b"second")

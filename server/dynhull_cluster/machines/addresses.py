@@ -14,6 +14,7 @@ from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import words
 
 from ..callers import PROOF, Metadata
+from ..versions import Versions, apart, own_versions
 from ..ways import OPTIONS, PATIENCE, F, keep_alive, pings
 from .board import Owner, Tables
 from .entrance import proof_of
@@ -45,7 +46,13 @@ class _Place(NamedTuple):
     frames_port: int
 
 
+class VersionsApartError(OSError):
+    """An owner and this server have no version of their protocol in common."""
+
+
 class _Greets(Protocol):
+    theirs: Versions
+
     async def greet(self, greeting: bytes) -> None: ...
 
     def ping(self, seconds: float) -> None: ...
@@ -106,24 +113,28 @@ class Addresses:
                 make, place.host, place.frames_port, ssl=self._tls, server_hostname=name
             )
             keep_alive(transport.get_extra_info("socket"))
+            greets = cast("_Greets", frames)
             try:
-                await cast("_Greets", frames).greet(proof_of(worker, place.worker, self._secret).encode())
+                await greets.greet(proof_of(worker, place.worker, self._secret).encode())
             except BaseException as error:
                 transport.abort()
+                if not own_versions().meet(greets.theirs):
+                    raise VersionsApartError(apart(place.worker, greets.theirs)) from None
                 if isinstance(error, RelayedError):
                     raise OSError("another one listens there now") from None
                 raise
         if self._at(worker) != place:
             transport.abort()
             raise OSError(f"partition {worker} has moved meanwhile")
-        cast("_Greets", frames).ping(self._ping_interval)
+        greets.ping(self._ping_interval)
         return frames
 
     def _note_failure(self, partition: int, error: OSError) -> None:
         """Say why the owner of a partition cannot be reached, once that is not for a moment."""
         now = asyncio.get_running_loop().time()
         failed = self._failed.setdefault(partition, _Failed(now))
-        if now > failed.since + NOTE_SECONDS and words(error) != failed.reason:
+        lasts = now > failed.since + NOTE_SECONDS or isinstance(error, VersionsApartError)
+        if lasts and words(error) != failed.reason:
             failed.reason = words(error)
             place = self._known[partition]
             address = f"{bracketed(place.host)}:{place.frames_port}"

@@ -22,7 +22,8 @@ from ..postgres.database import Connection, Database, as_storage_errors, storage
 from ..postgres.ownership import CHANNEL, IS_CONNECTED, LEASE
 from ..postgres.processes import is_known_dead, this_process
 from ..postgres.schema import hold, partitions_of, prepare
-from .joining import PRESENT, RENEW, clock_difference
+from ..versions import UNSAID, Versions, own_versions
+from .joining import BOARD, PRESENT, RENEW, VERSIONS, clock_difference, versions_of
 
 # Seconds between looks at the tables, and until a look that gets no answer is given up.
 LOOK, PATIENCE = 0.5, 10.0
@@ -39,6 +40,7 @@ TABLES = (
     "CREATE TABLE IF NOT EXISTS workers (worker text PRIMARY KEY, draining boolean, process text, seen timestamptz)",
     "ALTER TABLE workers ADD COLUMN IF NOT EXISTS process text NOT NULL DEFAULT ''",
     "ALTER TABLE workers ADD COLUMN IF NOT EXISTS host text NOT NULL DEFAULT ''",
+    "ALTER TABLE workers ADD COLUMN IF NOT EXISTS versions text NOT NULL DEFAULT ''",
     "CREATE TABLE IF NOT EXISTS heirs (partition integer PRIMARY KEY, worker text, process text, epoch bigint)",
     "CREATE TABLE IF NOT EXISTS wishes (partition integer PRIMARY KEY, worker text NOT NULL)",
 )
@@ -51,8 +53,8 @@ OWNERS = (
     f"{IS_CONNECTED}, until > clock_timestamp() FROM owners"
 ).encode()
 WORKERS = (
-    f"SELECT worker, draining, process, host FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
-    "ORDER BY worker"
+    f"SELECT worker, draining, process, host, {VERSIONS} FROM workers "  # noqa: S608  (ours)
+    f"WHERE seen > clock_timestamp() - interval '{PRESENT}s' ORDER BY worker"
 ).encode()
 WISHES = b"SELECT partition, worker FROM wishes"
 HEIRS = b"SELECT partition, worker, process, epoch FROM heirs"
@@ -100,6 +102,7 @@ class Worker(NamedTuple):
     draining: bool
     process: str
     host: str = ""
+    versions: Versions = UNSAID
 
 
 class Heir(NamedTuple):
@@ -128,8 +131,13 @@ class Tables(NamedTuple):
     def apart(self) -> dict[str, str]:
         """The workers that have partitions and are not connected to the database, each with its process."""
         owners = self.owners.values()
-        here = {each.worker for each in owners if each.connected}
+        here = {each.worker for each in owners if each.connected} | set(self.strangers())
         return {each.worker: each.process for each in owners if not each.free and each.worker not in here}
+
+    def strangers(self) -> dict[str, Versions]:
+        """The workers that are present and have no version of the protocol in common with this program."""
+        said = {worker: each.versions for worker, each in self.workers.items()}
+        return {worker: versions for worker, versions in said.items() if not own_versions().meet(versions)}
 
 
 class Cluster(NamedTuple):
@@ -311,7 +319,9 @@ class Board:
         renewed, leaving = self._renewed
         if self._worker and (now >= renewed + LOOK or leaving != self.leaving):
             before = time.time()
-            said = await connection.execute(RENEW, [self._worker, self.leaving, this_process(), self._host])
+            said = await connection.execute(
+                RENEW, [self._worker, self.leaving, this_process(), self._host, own_versions().text]
+            )
             ((there,),) = await said.fetchall()
             self.clock_difference = clock_difference(before, there, time.time())
             self._renewed = now, self.leaving
@@ -329,7 +339,7 @@ class Board:
 
     @asynccontextmanager
     async def _connected(self) -> AsyncIterator["psycopg.AsyncConnection[tuple[Any, ...]]"]:
-        connection = await self._database.connect_async(f"dynhull board {self._worker}".strip())
+        connection = await self._database.connect_async(f"{BOARD} {self._worker}".strip())
         try:
             await connection.execute(f"LISTEN {CHANNEL}".encode())
             yield connection
@@ -341,7 +351,10 @@ def _tables(rows: list[list[Any]]) -> Tables:
     owners, workers, wishes, heirs = rows
     return Tables(
         {partition: Owner(*rest) for partition, *rest in owners},
-        {worker: Worker(*rest) for worker, *rest in workers},
+        {
+            worker: Worker(draining, process, host, versions_of(*said))
+            for worker, draining, process, host, *said in workers
+        },
         dict(wishes),
         {partition: Heir(*rest) for partition, *rest in heirs},
     )

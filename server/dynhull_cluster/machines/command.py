@@ -25,6 +25,7 @@ ANYWHERE = "anywhere"
 
 def status(journal: JOURNAL) -> None:
     """Show the workers, and who serves which partitions."""
+    from ..versions import apart
     from .board import read
 
     with _connected(journal) as (connection, count):
@@ -37,6 +38,11 @@ def status(journal: JOURNAL) -> None:
     left = [str(each) for each in range(count) if (owner := tables.owners.get(each)) is None or not owner.serves]
     if left:
         typer.echo(f"nobody serves {', '.join(left)}")
+    for worker, versions in tables.strangers().items():
+        typer.echo(apart(worker, versions))
+    said = {str(each.versions) for each in tables.workers.values()}
+    if len(said) > 1:
+        typer.echo(f"the workers are of {' and '.join(sorted(said))}")
     if tables.workers and all(present.draining for present in tables.workers.values()):
         typer.echo("no worker takes partitions, because all of them were drained: start the process of one again")
     for partition, worker in sorted(tables.wishes.items()):

@@ -1,4 +1,4 @@
-"""Whether a server may have a part of a database: its clock is right, and all reach each other, or it is alone.
+"""Whether a server may have a part of a database: its clock is right, and all can serve together, or it is alone.
 
 A server without --cluster is a cluster of its own processes. It has no address for others, so it begins when nobody
 else serves the database, and nobody else joins it.
@@ -15,8 +15,10 @@ from dynhull_server.settings import is_loopback
 from dynhull_server.storage.port import LockedError, StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors
+from ..postgres.ownership import IS_CONNECTED
 from ..postgres.processes import is_known_dead, shares_loopback, this_process
 from ..postgres.schema import hold
+from ..versions import EARLIER, UNSAID, Versions, apart, own_versions
 
 # Seconds between looks whether a worker out of reach is there.
 LOOK = 0.25
@@ -24,19 +26,31 @@ LOOK = 0.25
 PRESENT = 5
 
 RENEW = (
-    b"INSERT INTO workers (worker, draining, process, host, seen) VALUES (%s, %s, %s, %s, clock_timestamp()) "
+    b"INSERT INTO workers (worker, draining, process, host, versions, seen) "
+    b"VALUES (%s, %s, %s, %s, %s, clock_timestamp()) "
     b"ON CONFLICT (worker) DO UPDATE SET seen = clock_timestamp(), process = excluded.process, host = excluded.host, "
+    b"versions = excluded.versions, "
     b"draining = excluded.draining OR (workers.draining AND workers.process = excluded.process) "
     b"RETURNING extract(epoch FROM clock_timestamp())::float8"
 )
+# How the connection of a worker to the tables is called, before its name.
+BOARD = "dynhull board"
+# What a worker of a row says of its versions; and if nothing, also not in a column that versions before do not have,
+# whether it is of those that own partitions without a lock. Its connection shows that the tables are no copy.
+VERSIONS = (
+    "coalesce(to_jsonb(workers) ->> 'versions', ''), CASE WHEN coalesce(to_jsonb(workers) ->> 'versions', '') <> '' "  # noqa: S608  (ours)
+    "THEN false ELSE EXISTS (SELECT FROM owners WHERE owners.worker = workers.worker AND until > '-infinity' "
+    f"AND address <> '' AND NOT {IS_CONNECTED}) AND EXISTS (SELECT FROM pg_stat_activity "
+    f"WHERE datname = current_database() AND application_name = left('{BOARD} ' || workers.worker, 63)) END"
+)
 OTHERS = (
-    f"SELECT worker, process, host, seen::text FROM workers WHERE seen > clock_timestamp() - interval '{PRESENT}s' "  # noqa: S608  (ours)
-    "AND worker <> %s ORDER BY worker"
+    f"SELECT worker, process, host, seen::text, {VERSIONS} FROM workers "  # noqa: S608  (ours)
+    f"WHERE seen > clock_timestamp() - interval '{PRESENT}s' AND worker <> %s ORDER BY worker"
 ).encode()
 
 
 def admit(database: Database, worker: str, host: str, limit: float) -> None:
-    """Put a worker into the tables of a cluster, if all servers that are present can reach each other.
+    """Put a worker into the tables of a cluster, if all servers that are present can reach and understand each other.
 
     Args:
         database: the database, which is prepared.
@@ -46,18 +60,21 @@ def admit(database: Database, worker: str, host: str, limit: float) -> None:
 
     Raises:
         LockedError: another server is there, and one of the two is without --cluster.
-        StorageError: the clock is wrong, workers are out of reach, or the database cannot be used.
+        StorageError: the clock is wrong, workers are out of reach or of other versions, or the database cannot be used.
     """
     seen: dict[str, str] = {}
     with as_storage_errors(), closing(database.connect("dynhull start")) as connection:
         require_right_clock(_measured(connection), limit)
-        while apart := _admit(connection, database, worker, host):
-            for other, (where, when) in apart.items():
+        while against := _admit(connection, database, worker, host):
+            for other, (reason, when) in against.items():
                 if seen.setdefault(other, when) != when:  # it has not died in between
-                    if not (host and where):
-                        raise served_by(database, other)
-                    raise StorageError(_out_of_reach(other, where, host))
+                    raise reason
             time.sleep(LOOK)
+
+
+def versions_of(said: str, earlier: bool) -> Versions:
+    """The versions of a worker, by what VERSIONS has found."""
+    return Versions.of(said) if said else EARLIER if earlier else UNSAID
 
 
 def served_by(database: Database, worker: str) -> LockedError:
@@ -100,25 +117,25 @@ def _measured(connection: Connection) -> float:
     return clock_difference(before, there, time.time())
 
 
-def _admit(connection: Connection, database: Database, worker: str, host: str) -> dict[str, tuple[str, str]]:
-    """Put the worker into the tables, unless some others are out of reach; their hosts, and when they were seen."""
+def _admit(connection: Connection, database: Database, worker: str, host: str) -> dict[str, tuple[StorageError, str]]:
+    """Put the worker into the tables, unless others speak against it: why, and when they were seen."""
+    against: dict[str, tuple[StorageError, str]] = {}
     with connection.transaction():
         hold(connection, database)  # two that join at once see each other
-        apart = {
-            other: (where, when)
-            for other, process, where, when in connection.execute(OTHERS, [worker]).fetchall()
-            if server_of(other) != server_of(worker) and not _may_share(host, where, process)
-        }
-        if not apart:
-            connection.execute(RENEW, [worker, False, this_process(), host])
-    return apart
-
-
-def _may_share(host: str, where: str, process: str) -> bool:
-    """Whether two servers can share a database, the other of which has a process, or whether that one has ended."""
-    if not (host and where):
-        return is_known_dead(process)
-    return shares_loopback(process) or not (_is_only_here(host) or _is_only_here(where))
+        for other, process, where, when, said, earlier in connection.execute(OTHERS, [worker]).fetchall():
+            versions = versions_of(said, earlier)
+            if server_of(other) == server_of(worker):
+                continue
+            if not (host and where):
+                if not is_known_dead(process):
+                    against[other] = served_by(database, other), when
+            elif not own_versions().meet(versions):
+                against[other] = StorageError(apart(other, versions)), when
+            elif not shares_loopback(process) and (_is_only_here(host) or _is_only_here(where)):
+                against[other] = StorageError(_out_of_reach(other, where, host)), when
+        if not against:
+            connection.execute(RENEW, [worker, False, this_process(), host, own_versions().text])
+    return against
 
 
 def _is_only_here(host: str) -> bool:

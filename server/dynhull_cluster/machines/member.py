@@ -33,6 +33,7 @@ from ..journal import database_of
 from ..metrics import merged
 from ..postgres.processes import is_known_dead
 from ..postgres.storage import PostgresStorage
+from ..versions import apart
 from ..worker import own_settings
 from .addresses import Addresses
 from .ahead import FAILURES, Ahead, Served
@@ -56,6 +57,10 @@ ALONE = "nothing to serve: a server without --cluster has it, until that is stop
 LEFT_OUT = (
     "nothing to serve: each partition has another worker, and this one takes over what becomes free; a new database "
     "gets more of them with --partitions"
+)
+# What a worker says of one of another version.
+STRANGER = (
+    "a worker is of another version: it gets no partitions from here, and what it has cannot be reached from here"
 )
 # Seconds that gateways get to receive what their calls have ended with, before another worker may have the partition.
 LAST_STATUSES = 0.03
@@ -90,6 +95,7 @@ class Member:
         self._ahead: dict[int, Ahead] = {}
         self._failed: dict[tuple[str, int], tuple[float, float]] = {}
         self._idle = ""
+        self._strangers: set[str] = set()
         self._looked = asyncio.Event()
         self._settled = asyncio.Event()
         self.address = settings.cluster_host
@@ -170,15 +176,16 @@ class Member:
         return holder != self._worker and self._is_neighbour(holder)
 
     def _others(self) -> list[str]:
-        """The other workers that can take partitions."""
-        workers = self._board.tables.workers
+        """The other workers that can take partitions, and that callers of this one could reach there."""
+        workers, strangers = self._board.tables.workers, self._board.tables.strangers()
         can = (name for name, each in workers.items() if not each.draining and name != self._worker)
-        return [name for name in can if self._is_neighbour(name)]
+        return [name for name in can if self._is_neighbour(name) and name not in strangers]
 
     def _decide(self, tables: Tables) -> None:
         """Begin to take, to read ahead and to let go, after each look at the tables."""
         self._addresses.learn(tables)
         self._watch_clock()
+        self._notice_strangers()
         count = self._cluster.partitions
         holders = self._board.holders(count)
         own = tables.workers.get(self._worker)
@@ -223,6 +230,13 @@ class Member:
         if idle and idle != self._idle:
             log.warning(idle, extra={"served_by": ", ".join(sorted(alone or set(wanted)))})
         self._idle = idle
+
+    def _notice_strangers(self) -> None:
+        """Say it once of each worker of another version, which joins though it would be refused here."""
+        strangers = self._board.tables.strangers()
+        for worker in strangers.keys() - self._strangers:
+            log.error(STRANGER, extra={"reason": apart(worker, strangers[worker])})
+        self._strangers = set(strangers)
 
     def _watch_clock(self) -> None:
         """Say it when the clock of this machine has become wrong, or right again; what it serves keeps its time."""
