@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster torture cluster ray kafka simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster torture cluster upgrade ray kafka simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -167,6 +167,12 @@ torture: .venv/.test .venv/.peers  ## FAULTS from SEED for each kind of server: 
 
 cluster: .venv/.test  ## all tests of several processes and machines; `make test` runs the cheaper ones
 	CLUSTER_CASES=all $(BIN)/pytest tests/cluster tests/robustness/cluster -n 4
+
+BASE ?= HEAD~
+CONTRACT = tests/client
+
+upgrade: .venv/.test  ## from BASE, an earlier commit: a cluster is upgraded beside callers, and the tests of the client run across the two versions
+	$(BIN)/python tests/robustness/cluster/earlier.py $(BASE) -- $(CONTRACT)
 
 ray: .venv/.test  ## all tests of Ray: Datasets, and as a launcher of servers; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray

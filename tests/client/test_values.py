@@ -71,6 +71,7 @@ EXPORTED = [
     "Located",
     "Measured",
     "Measures",
+    "MethodUnknownError",
     "OutcomeUnknownError",
     "PermissionDeniedError",
     "Phases",

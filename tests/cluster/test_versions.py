@@ -14,6 +14,7 @@ import pytest
 from command_line import dynhull
 from forked import COMMAND
 from logged_process import logged_process
+from pacing import pause
 from patience import PATIENCE, wait_until
 from postgresql import PostgreSQL, query
 from server_process import finished
@@ -45,14 +46,14 @@ JOIN = (
 
 @contextmanager
 def joined(url: str, worker: str, said: dict[str, Any]) -> Iterator[None]:
-    """A worker in the tables that says this of its versions."""
+    """A worker in the tables that says this of its versions, and renews its row."""
     left = Event()
 
     def renew() -> None:
         with psycopg.connect(url, autocommit=True, options="-c search_path=dynhull") as connection:
             while not left.is_set():
                 connection.execute(JOIN, [worker, json.dumps(said)])
-                left.wait(0.2)
+                pause(0.2)
             connection.execute("DELETE FROM workers WHERE worker = %s", [worker])
 
     renewing = Thread(target=renew)

@@ -42,11 +42,14 @@ CHANGES = {"move": 6, "join": 2, "leave": 2, "drain": 1, "restart": 1}
 class Machine:
     """A server of the cluster, and what it logs."""
 
-    def __init__(self, url: str, *options: str) -> None:
+    def __init__(self, url: str, *options: str, command: str = COMMAND) -> None:
         self._log = tempfile.NamedTemporaryFile("w+")  # noqa: SIM115  # it is closed in `stop`
-        command = [COMMAND, "serve", "--port", "0", "--journal", url, *OPTIONS, *options]
-        self.process = Process(command, stdout=subprocess.PIPE, stderr=self._log, text=True)
-        self.address = self.process.stdout.readline().split()[-1]
+        words = [command, "serve", "--port", "0", "--journal", url, *OPTIONS, *options]
+        self.process = Process(words, stdout=subprocess.PIPE, stderr=self._log, text=True)
+        if not (first := self.process.stdout.readline()):
+            self.process.wait(PATIENCE)
+            raise ChildProcessError(self.said())
+        self.address = first.split()[-1]
         self.drained = False
 
     def said(self) -> str:
@@ -67,20 +70,27 @@ class Machine:
 class Planned:
     """A cluster, its callers, and the changes."""
 
-    def __init__(self, url: str, seed: int, kinds: Sequence[type[Caller]], *, restarts: bool) -> None:
+    def __init__(
+        self, url: str, seed: int, kinds: Sequence[type[Caller]], *, restarts: bool, command: str = COMMAND
+    ) -> None:
         self._url = url
         self._restarts = restarts
         self._random = random.Random(seed)
         self._all: list[Machine] = []
-        self.machines = [self._started("--gateways", "2"), self._started()]
+        self.machines = [self._started("--gateways", "2", command=command), self._started(command=command)]
         self.counts: Counter[str] = Counter()
         self._settle()
-        self.callers = [kind(self.machines[0].address) for kind in kinds]
+        address = self._address()
+        self.callers = [kind(address) for kind in kinds]
         for caller in self.callers:
             caller.begin()
 
-    def _started(self, *options: str) -> Machine:
-        machine = Machine(self._url, *options)
+    def _address(self) -> str:
+        """What callers call."""
+        return self.machines[0].address
+
+    def _started(self, *options: str, command: str = COMMAND) -> Machine:
+        machine = Machine(self._url, *options, command=command)
         self._all.append(machine)
         return machine
 
@@ -169,7 +179,8 @@ class Planned:
         """End the callers. Returns what went wrong."""
         errors = []
         for caller in self.callers:
-            caller.finish()
+            if not caller.over.is_set():
+                caller.finish()
             errors += [f"{type(caller).__name__}, {each}" for each in caller.errors]
         errors += [line for machine in self._all for line in machine.complaints()]
         while self.machines:
