@@ -70,11 +70,13 @@ def rows(file: Path) -> object:
     return table.schema, table.to_pydict()
 
 
-def test_a_hull_over_shards_is_exported(client: HullClient, address: str, name: str, tmp_path: Path) -> None:
-    client.create_hull(name, shards=3)
+def test_a_hull_over_shards_is_exported(served: tuple[str, Path, list[str]], tmp_path: Path) -> None:
+    address, _, _ = served
     given = np.random.default_rng(1).integers(0, 9, (300, 2)).astype(float)
-    client.apply(name, insert=given)
-    done = dynhull("export", name, tmp_path / "points.csv", "--address", address)
+    with HullClient(address) as client:
+        client.create_hull("divided", shards=3)
+        client.apply("divided", insert=given)
+    done = dynhull("export", "divided", tmp_path / "points.csv", "--address", address)
     assert done.exit_code == 0, done.stderr
     exported = np.loadtxt(tmp_path / "points.csv", delimiter=",", skiprows=1)
     assert sorted(exported.tolist()) == sorted(given.tolist())

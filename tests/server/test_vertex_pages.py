@@ -2,12 +2,14 @@
 
 import asyncio
 from collections.abc import Iterator
+from pathlib import Path
 
 import grpc
 import numpy as np
 import pytest
 from live_engine import engine_in_memory, insert
 from refusal import refusal
+from server_process import server_process
 
 from dynhull_client import HullClient
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -132,13 +134,18 @@ def test_a_layer_and_the_reads_of_a_query_have_pages(client: HullClient, stub: H
     np.testing.assert_array_equal(xy(response.answers[0].get_hull.vertices), square[3:])
 
 
-def test_a_hull_over_shards_has_pages(client: HullClient, stub: HullServiceStub, name: str) -> None:
-    client.create_hull(name, shards=2)
-    client.apply(name, insert=parabola(9))
-    found = []
-    for page in pages(stub, name, 4):
-        found.append(xy(page.vertices))
-        client.apply(name, delete=found[-1])
+def test_a_hull_over_shards_has_pages(tmp_path: Path) -> None:
+    with (
+        server_process("--data", str(tmp_path)) as server,
+        HullClient(server.address) as client,
+        grpc.insecure_channel(server.address) as channel,
+    ):
+        client.create_hull("a", shards=2)
+        client.apply("a", insert=parabola(9))
+        found = []
+        for page in pages(HullServiceStub(channel), "a", 4):
+            found.append(xy(page.vertices))
+            client.apply("a", delete=found[-1])
     np.testing.assert_array_equal(np.concatenate(found), parabola(9))
 
 
