@@ -1,12 +1,15 @@
 """The programs of the tutorial, copied from its page and run as a reader would run them."""
 
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from server_process import PATIENCE, server_process
+from metrics import measured, scrape
+from patience import wait_until
+from server_process import PATIENCE
 
 
 def start(program: Path, *options: str) -> "subprocess.Popen[str]":
@@ -16,10 +19,13 @@ def start(program: Path, *options: str) -> "subprocess.Popen[str]":
 
 def test_the_fence_follows_the_fleet(take_program: Callable[[str, str], Path]) -> None:
     fly, fence = (take_program("tutorial", title) for title in ("fly.py", "fence.py"))
-    with server_process() as server:
+    with measured() as (server, metrics):
         fleet = start(fly, "--address", server.address, "--minutes", "90", "--pause", "0.02")
         assert fleet.stdout.read(3) == "\n00"  # the hull is there
+        fleet.send_signal(signal.SIGSTOP)  # it could be over before the other program has begun
         alarm = start(fence, "--address", server.address, "--events", "20")
+        wait_until(lambda: scrape(metrics)["dynhull_watchers"])
+        fleet.send_signal(signal.SIGCONT)
         printed, errors = alarm.communicate(timeout=PATIENCE)
         assert alarm.returncode == 0, errors
         assert re.search(r"the fence has \d+ corners at revision \d+", printed)
