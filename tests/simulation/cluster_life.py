@@ -96,7 +96,7 @@ class OwnedStorage:
         self._commits = self._site.commits
         return self._site.store.open(progress)
 
-    def commit(self, changes: Sequence[Any]) -> None:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> None:
         """Keep the changes, unless another server owns them, or the connection is lost before."""
         try:
             session = self._begun()
@@ -106,7 +106,7 @@ class OwnedStorage:
             raise NotCommittedError(str(error)) from error
         self._process.give_way()
         if session.open:
-            self._site.store.commit(changes)
+            self._site.store.commit(changes, now)
             self._site.commits += 1
             self._site.database.carry_out(session, "COMMIT", [])
         self._process.give_way()
