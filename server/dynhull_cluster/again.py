@@ -32,6 +32,16 @@ def may_repeat(method: str, message: bytes, status: Status) -> bool:
     return method in READS or (method in NUMBERED and _is_numbered(NUMBERED[method].FromString(message)))
 
 
+def has_not_begun(status: Status) -> bool:
+    """Whether a request has certainly not begun."""
+    return reason_of(status) in NOT_BEGUN
+
+
+def may_have_begun(method: str, status: Status) -> bool:
+    """Whether a request may have taken effect, though it has ended with this status."""
+    return method not in READS and status.code == grpc.StatusCode.UNAVAILABLE.value[0] and not reason_of(status)
+
+
 def _is_numbered(request: Any) -> bool:
     """Whether a batch has a number, by which a server knows that it has applied it."""
     return bool(request.producer and request.sequence)

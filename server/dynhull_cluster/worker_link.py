@@ -14,7 +14,7 @@ from grpc_health.v1 import health_pb2
 from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 
-from .again import READS, may_repeat
+from .again import READS, has_not_begun, may_have_begun, may_repeat
 from .asking_frames import AskingFrames
 from .callers import Metadata, metadata_of
 from .frames import MOST_BYTES
@@ -133,6 +133,7 @@ class WorkerLink:
         waiting: Callable[[], AbstractContextManager[None]],
     ) -> T:
         patience = Patience()
+        unknown: RelayedError | None = None
         while True:
             try:
                 with waiting():
@@ -141,6 +142,10 @@ class WorkerLink:
             except (WorkerAwayError, RelayedError) as error:
                 if begun():
                     raise
+                if isinstance(error, RelayedError) and may_have_begun(method, error.status):
+                    unknown = error
+                elif unknown is not None and patience.over and _has_not_begun(error):
+                    raise unknown from error  # an attempt before may have
                 await self.again(method, message, error, patience)
 
     async def again(
@@ -229,6 +234,10 @@ class Patience:
     async def wait(self, event: asyncio.Event, seconds: float = PATIENCE) -> None:
         """Wait for an event, no longer than this and no longer than the patience lasts."""
         await _until(event, min(seconds, self._until - asyncio.get_running_loop().time()))
+
+
+def _has_not_begun(error: WorkerAwayError | RelayedError) -> bool:
+    return isinstance(error, WorkerAwayError) or has_not_begun(error.status)
 
 
 async def _until(event: asyncio.Event, seconds: float = LOOK_SECONDS) -> None:

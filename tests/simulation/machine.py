@@ -40,7 +40,7 @@ class Loop(asyncio.AbstractEventLoop):
         self._timer_count = 0
         self._executor: Callable[[Callable[[], Any]], Future[Any]] | None = None
         schedule.actor("loop", lambda: self._ready, self._run)
-        schedule.actor("time", lambda: self._timers, self._pass)
+        schedule.actor("time", self._may_pass, self._pass)
 
     def _run(self) -> None:
         handle = self._ready.popleft()
@@ -50,6 +50,10 @@ class Loop(asyncio.AbstractEventLoop):
                 handle._run()
             finally:
                 asyncio._set_running_loop(None)
+
+    def _may_pass(self) -> object:
+        """Whether time may pass to the next timer."""
+        return self._timers
 
     def _pass(self) -> None:
         self.now = max(self.now, self._timers[0][0])
@@ -117,7 +121,7 @@ class Loop(asyncio.AbstractEventLoop):
         self.dead = True
         for task in self.tasks:
             task._log_destroy_pending = False  # type: ignore[attr-defined]
-            with suppress(Exception, Finding):
+            with suppress(Exception, Finding, BaseExceptionGroup):
                 task.get_coro().close()  # type: ignore[union-attr]
 
 

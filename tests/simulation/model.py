@@ -153,6 +153,7 @@ class Model:
         alive: the hulls there are, by name.
         faulty: whether anything has failed in this life.
         stopping: whether the server has begun to stop.
+        repeats: whether numbered batches that have no answer are sent again, before their callers.
         days: whether producers may have been forgotten.
         fences: the fences.
         numbers: the numbers of all hulls and fences.
@@ -168,7 +169,7 @@ class Model:
         self.numbers: set[int] = set()
         self.uids_ever: set[str] = set()
         self.commits = 0
-        self.faulty = self.stopping = self.days = False
+        self.faulty = self.stopping = self.days = self.repeats = False
         self.finding: str | None = None
         self._hulls: dict[int, Truth] = {}
         self._uids: dict[str, Truth] = {}
@@ -448,6 +449,10 @@ class Model:
     def applied(self, asked: Asked, attempt: int, applied: Applied, producer: str, sequence: int) -> None:
         """A batch has been acknowledged."""
         if applied.duplicate:
+            if self.repeats and attempt in self._places:
+                truth, revision = self._places[attempt]
+                self._answered(asked, (truth.row.number, revision))
+                return
             if attempt in self._places or not self._may_be_duplicate(asked.name, producer, sequence):
                 raise self.finds(f"batch {attempt} is called a duplicate")
             self._refused.add(attempt)

@@ -16,6 +16,7 @@ from typing import Any
 
 from .cluster_plan import Operation, Plan, random_cluster_plan
 from .globe import CENTERS, FAR, GLOBE
+from .link_plan import random_link_plan
 
 NAMES = ("a", "b", "c")
 # Hulls with keys, and of which type these are; and one of points in a window.
@@ -111,6 +112,8 @@ def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     if layer == "cluster":
         return random_cluster_plan(seed)
+    if layer == "links":
+        return random_link_plan(seed)
     draw = random.Random(seed)
     with_fences = draw.random() < WITH_FENCES
     with_times = with_fences or draw.random() < 0.5

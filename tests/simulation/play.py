@@ -13,6 +13,7 @@ from dynhull_server.storage.memory import MemoryStorage
 from .clients import Client, probe, probe_fence
 from .cluster_life import World
 from .core_life import CoreServer
+from .link_life import LinkedServer
 from .model import Finding, Model
 from .plan import Plan
 from .schedule import Schedule
@@ -23,7 +24,7 @@ from .store import FaultyStorage
 # How often a fence is made anew at the end of a life.
 ANEW = 0.3
 
-LAYERS = {"core": CoreServer, "shell": ShellServer, "sqlite": ShellServer}
+LAYERS = {"core": CoreServer, "shell": ShellServer, "sqlite": ShellServer, "links": LinkedServer}
 
 
 @dataclass(frozen=True, slots=True)

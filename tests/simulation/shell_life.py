@@ -74,11 +74,13 @@ class WatchedSupervisor(Supervisor):
 class ShellServer:
     """Drives an Engine."""
 
+    loop_type = Loop
+
     def __init__(self, limits: Limits, storage: FaultyStorage, model: Model, schedule: Schedule) -> None:
         self.model = model
         self.schedule = schedule
         self._storage = storage
-        self.loop = Loop(model, schedule)
+        self.loop = self.loop_type(model, schedule)
         self._threads = SimulatedThreads(model, schedule)
         self.loop.executor(self._threads.pool("to_thread", 4).submit)
         storage.give_way = self._threads.give_way
