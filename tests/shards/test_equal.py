@@ -10,6 +10,7 @@ from shards.workload import KINDS, LIMITS, Workload, same_effect
 
 from dynhull_cluster.shards.messages import CountOf, PositionsOf, SampleOf, StaticHull
 from dynhull_cluster.shards.requests import Expire, Read, Reshard, Write
+from dynhull_server.rpc.encode import CAUSES
 from dynhull_server.state.batch import NO_POINTS, KeyedBatch
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError
 from dynhull_server.state.events import WriteBatch
@@ -83,7 +84,7 @@ def compare(one, request, workload):
 def check(one, cluster):
     root = cluster.root
     assert (root.revision, root.points, root.clock) == (one.counts.revision, one.counts.points, one.counts.clock)
-    assert root.cause == one.counts.cause
+    assert CAUSES[root.cause] == CAUSES[one.counts.cause]
     assert np.array_equal(root.hull.vertices(), one.vertices())
     if root.distinct is not None:
         assert root.distinct == one.counts.distinct

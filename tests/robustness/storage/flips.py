@@ -18,7 +18,7 @@ import struct
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -72,6 +72,9 @@ FILE_HEADER_BYTES, PAGE_HEADER_BYTES = 100, 12
 TREE_PAGES = (2, 5, 10, 13)
 LOG_HEADER_BYTES, FRAME_HEADER_BYTES = 32, 24
 
+# The time by the server's clock, about.
+NOW = 1_800_000_000_000_000
+
 Acknowledged = dict[int, list[Record]]
 
 FENCE = 90
@@ -124,6 +127,16 @@ def no_progress(done: int, total: int) -> None:
     """Ignore the progress."""
 
 
+def commit(storage: SQLiteStorage, batches: Sequence[Append]) -> None:
+    """Commit batches, which know their commits from then on."""
+    storage.commit(batches, NOW + batches[0].records[0].revision)
+    for each in batches:
+        kept = storage.read(each.number).records[-len(each.records) :]
+        for record, stored in zip(each.records, kept, strict=True):
+            assert stored.committed is not None  # it is of the present format
+            record.committed = stored.committed
+
+
 class Builder:
     """Fills a folder, and remembers what was acknowledged."""
 
@@ -144,7 +157,7 @@ class Builder:
         for number, count in counts.items():
             revision = len(self.acknowledged[number])
             changes.append(Append(number, [record(number, revision + i + 1, points) for i in range(count)]))
-        self.storage.commit(changes)
+        commit(self.storage, changes)
         for change in changes:
             self.acknowledged[change.number] += change.records
 
@@ -305,7 +318,7 @@ def outcome(root: Path, acknowledged: Acknowledged, flip: Flip, scratch: Path) -
                     grown = min(numbers)
                     last = storage.read(grown).last_revision
                     new = record(grown, last + 1)
-                    storage.commit([Append(grown, [new])])
+                    commit(storage, [Append(grown, [new])])
                     expected[grown] = [*expected[grown][:last], new]
             finally:
                 storage.close()
@@ -343,7 +356,8 @@ def same(number: int, kept: Kept, records: list[Record]) -> bool:
     expected = Kept()
     if revision:
         contents = snapshot_contents(number, revision, len(kept.contents))
-        expected = Kept(revision, contents, {"a": revision}, clock=-revision)
+        committed = records[revision - 1].committed
+        expected = Kept(revision, contents, {"a": revision}, clock=-revision, committed=committed)
     expected.records = records[revision:]
     return equal(kept, expected)
 
