@@ -32,7 +32,7 @@ Require = Callable[[Rights, str, str], None]
 
 
 class Composed:
-    """The methods for which a gateway of several workers does more than it does for one.
+    """The methods for which a gateway of several workers does more than it does for one, which checks all itself.
 
     Args:
         relay: the workers.
@@ -67,6 +67,8 @@ class Composed:
         }
 
     def _common_link(self, kind: Any, names: Names, require: Require, message: bytes, call: Call) -> WorkerLink:
+        if len(self._relay.links) == 1:
+            return self._relay.links[0]
         found = list(names(kind.FromString(message)))
         try:
             return common_link(self._relay, found)
@@ -80,9 +82,13 @@ class Composed:
         method = f"{HULLS}/ListHulls" if field == "hulls" else f"{FENCE_CALLS}/ListFences"
         with call.cutoff():
             message = await call.receive()
-        _, _, size = decode.decode_page(request.FromString(message))
         call.finish()
-        pages = await _together(link.ask(method, call, message) for link in self._relay.links)
+        pages = await self._relay.found(
+            lambda: _together(link.ask(method, call, message) for link in self._relay.links)
+        )
+        if len(pages) == 1:
+            return pages[0]
+        _, _, size = decode.decode_page(request.FromString(message))  # each worker has accepted it
         parsed = [response.FromString(page) for page in pages]
         found = sorted((each for page in parsed for each in getattr(page, field)), key=lambda each: each.name)
         more = len(found) > size or any(page.next_page_token for page in parsed)
@@ -93,7 +99,7 @@ class Composed:
     async def _separate(self, call: Call) -> bytes:
         with call.cutoff():
             message = await call.receive()
-            return await self.separate(call, message)
+            return await self._relay.found(lambda: self.separate(call, message))
 
     async def separate(self, call: Call, message: bytes) -> bytes:
         """The answer to a request for the separation of two hulls.
@@ -131,6 +137,9 @@ class Composed:
         return call.serialize(response)
 
     async def _query(self, call: Call) -> None:
+        if len(self._relay.links) == 1:
+            await self._relay.write(f"{HULLS}/Query", call)
+            return
         with call.stream():
             merged = MergedQuery(call, self._relay, self.separate)
             try:

@@ -80,8 +80,7 @@ class Gateway:
         self._health = Health(
             Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
         )
-        watched = (WHOLE, SCRUB)
-        self._links = [WorkerLink(i, ways, watched, self._update_health) for i in range(workers)]
+        self._links = self._links_to(workers, ways)
         self._away_since: dict[int, float | None] = dict.fromkeys(range(workers))
         self._relay = Relay(self._links, settings.max_watch_lag)
         self._composed = Composed(self._relay, settings.max_fence_corners)
@@ -111,8 +110,7 @@ class Gateway:
         self._health.set(NOT_SERVING, WHOLE, *SERVICES, SCRUB)
         self._calls.ready()
         self._serving = True
-        for link in self._links:
-            self._supervisor.every(worker_link.LOOK_SECONDS, f"worker-{link.number}", link.run)
+        self._run_links()
         self._supervisor.every(1.0, "health", self._look)
         if self._tokens is not None:
             self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
@@ -122,6 +120,16 @@ class Gateway:
             async with asyncio.timeout(FIRST_SECONDS):
                 await self._all_well.wait()
         log.info("serving", extra={"address": self.address})
+
+    def divide(self, workers: int, ways: Ways) -> None:
+        """Have another number of workers from now on. Calls that wait for those before go to the new ones."""
+        before, self._links = self._links, self._links_to(workers, ways)
+        # They have half a minute to come, as workers that have served.
+        self._away_since = dict.fromkeys(range(workers), self._clock.monotonic())
+        self._relay.links = self._links
+        for link in before:
+            link.retire()
+        self._run_links()
 
     async def drain(self) -> None:
         """Refuse new calls, end waiting ones, and give the others the configured grace period to finish."""
@@ -140,6 +148,13 @@ class Gateway:
         if served:
             log.info("stopped")
 
+    def _links_to(self, workers: int, ways: Ways) -> list[WorkerLink]:
+        return [WorkerLink(number, ways, (WHOLE, SCRUB), self._update_health) for number in range(workers)]
+
+    def _run_links(self) -> None:
+        for link in self._links:
+            self._supervisor.every(worker_link.LOOK_SECONDS, f"worker-{link.number}", link.run)
+
     def _handlers(self, service: ServiceDescriptor) -> grpc.GenericRpcHandler:
         handlers = {}
         for method in service.methods:
@@ -154,7 +169,7 @@ class Gateway:
 
     def _work(self, service: ServiceDescriptor, method: MethodDescriptor) -> Work:
         path = f"/{service.full_name}/{method.name}"
-        if path in self._composed.works and len(self._links) > 1:
+        if path in self._composed.works:
             return self._composed.works[path]
         if path == WATCH:
             return self._watches.watch
@@ -164,9 +179,7 @@ class Gateway:
             return partial(self._relay.write, path)
         if method.server_streaming:
             return partial(self._relay.read, path)
-        route: Route = self._relay.route
-        if len(self._links) > 1:
-            route = self._composed.routes.get(path, route)
+        route: Route = self._composed.routes.get(path, self._relay.route)
         return partial(self._relay.ask, path, method.name in FINISHED, route)
 
     async def _look(self) -> None:

@@ -22,3 +22,8 @@ def partition_of(name: str) -> int:
 def worker_of(name: str, workers: int) -> int:
     """The number of the worker that has the hulls of this name, from 0 to less than the number of workers."""
     return partition_of(name) % workers
+
+
+def worker_of_shard(name: str, shard: int, workers: int) -> int:
+    """The number of the worker that has a shard of the hull of this name; neither must this change."""
+    return (worker_of(name, workers) + shard) % workers

@@ -1,9 +1,9 @@
 """What a gateway does with a call: it passes the bytes to the worker that has the name, and the answers back."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
+from typing import Any, TypeVar
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.calls import Call
@@ -13,8 +13,9 @@ from dynhull_server.state.errors import LimitExceededError
 from .callers import metadata_of
 from .placement import worker_of
 from .upstream import Upstream, one_request
-from .worker_link import Patience, WorkerLink
+from .worker_link import Patience, RetiredError, WorkerLink
 
+T = TypeVar("T")
 Route = Callable[[bytes, Call], WorkerLink]
 
 
@@ -24,6 +25,9 @@ class Relay:
     Args:
         links: the workers, by their numbers.
         max_watch_lag: the seconds that a caller may take to receive one message of a call that only answers.
+
+    Attributes:
+        links: the same; others when the names are divided among other workers.
     """
 
     def __init__(self, links: Sequence[WorkerLink], max_watch_lag: float) -> None:
@@ -52,11 +56,19 @@ class Relay:
         if not finish:
             with call.cutoff():
                 message = await call.receive()
-                return await route(message, call).ask(method, call, message)
+                return await self.found(lambda: route(message, call).ask(method, call, message))
         with call.cutoff():
             message = await call.receive()
         call.finish()
-        return await route(message, call).ask(method, call, message)
+        return await self.found(lambda: route(message, call).ask(method, call, message))
+
+    async def found(self, work: Callable[[], Awaitable[T]]) -> T:
+        """Do work that finds its workers; once more if names were divided among others before it has begun."""
+        while True:
+            try:
+                return await work()
+            except RetiredError:
+                continue
 
     async def read(self, method: str, call: Call) -> None:
         """A call with one request and many responses."""

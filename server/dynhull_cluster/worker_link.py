@@ -13,6 +13,7 @@ from grpc_health.v1 import health_pb2
 
 from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
+from dynhull_server.state.errors import StoppingError
 
 from .again import READS, has_not_begun, may_have_begun, may_repeat
 from .asking_frames import AskingFrames
@@ -29,6 +30,10 @@ UNKNOWN = health_pb2.HealthCheckResponse.UNKNOWN
 T = TypeVar("T")
 
 log = logging.getLogger(__name__)
+
+
+class RetiredError(WorkerAwayError):
+    """The names are divided among other workers now; the request has not reached the one that was asked."""
 
 
 class WorkerLink:
@@ -52,6 +57,7 @@ class WorkerLink:
         self._changed = changed
         self._connection: Connection | None = None
         self._leaving: dict[asyncio.Task[None], AskingFrames] = {}
+        self._retired = False
         self._closed = asyncio.Event()
         self._arrived = asyncio.Event()
         self._elsewhere = asyncio.Event()
@@ -64,9 +70,9 @@ class WorkerLink:
         return self._connection is not None and self._connection.frames.connected
 
     async def run(self) -> None:
-        """Connect, and connect again whenever the worker has ended."""
+        """Connect, and connect again whenever the worker has ended. Raises StoppingError after `retire`."""
         loop = asyncio.get_running_loop()
-        while True:
+        while not self._retired:
             self._elsewhere.clear()
             try:
                 frames = await self._ways.connect(self.number, AskingFrames)
@@ -93,6 +99,14 @@ class WorkerLink:
                 self._leaving[leaving] = frames
                 leaving.add_done_callback(self._leaving.pop)
                 self._changed()
+        raise StoppingError
+
+    def retire(self) -> None:
+        """Reach nobody from now on: other links have the names. What waits here is looked for there."""
+        self._retired = True
+        self._follow()
+        self._arrived.set()
+        self._again.set()
 
     async def close(self) -> None:
         """End what is left of former connections, after `run`."""
@@ -103,7 +117,7 @@ class WorkerLink:
 
     async def arrive(self, patience: "Patience") -> None:
         """Wait for a worker that is away, but not for ever. Raises WorkerAwayError if that was in vain."""
-        if self._connection is None:
+        if self._connection is None and not self._retired:
             await patience.wait(self._arrived)
         self._present()
 
@@ -160,7 +174,7 @@ class WorkerLink:
             patience: that of the request.
         """
         repeatable = isinstance(error, WorkerAwayError) or may_repeat(method, message, error.status)
-        if patience.over or not repeatable:
+        if patience.over or not repeatable or isinstance(error, RetiredError):
             raise error
         await patience.wait(self._again, LOOK_SECONDS)
 
@@ -186,6 +200,8 @@ class WorkerLink:
         return self._present().stream(method, (*caller, *self._ways.proof(self.number)))
 
     def _present(self) -> "Connection":
+        if self._retired:
+            raise RetiredError(self.number)
         if self._connection is None or not self._connection.frames.connected:
             raise WorkerAwayError(self.number)
         return self._connection

@@ -57,7 +57,8 @@ class Settings(BaseModel):
         16,
         ge=1,
         le=1024,
-        description="Number of parts of a new database of a cluster, which workers share; it cannot be changed later.",
+        description="Number of parts of a new database of a cluster, which workers share. It cannot be changed later, "
+        "except from one: see dynhull cluster split.",
     )
     cluster_host: str = Field(
         "127.0.0.1", description="Address of this machine at which the other servers of the cluster reach its workers."

@@ -26,7 +26,9 @@ class Greeted(Frames):
 
 
 def owned(port: int) -> Tables:
-    return Tables({PARTITION: Owner(1, "north-1/0", "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {})
+    return Tables(
+        {PARTITION: Owner(1, "north-1/0", "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}, PARTITION + 1
+    )
 
 
 async def reach(port: int) -> None:

@@ -29,7 +29,9 @@ CALL: Any = SimpleNamespace(owner="owner", caller=SimpleNamespace(key=""))
 def linked(port: int, ping_interval: float) -> AbstractAsyncContextManager[WorkerLink]:
     """A gateway's link to a worker behind a network."""
     ways = Addresses(SECRET, None, ping_interval)
-    ways.learn(Tables({PARTITION: Owner(1, WORKER, "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}))
+    ways.learn(
+        Tables({PARTITION: Owner(1, WORKER, "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}, PARTITION + 1)
+    )
     return running(WorkerLink(PARTITION, ways, (), lambda: None))
 
 

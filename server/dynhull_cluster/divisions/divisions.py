@@ -14,7 +14,7 @@ from dynhull_server.state.events import Expire, WriteBatch
 from dynhull_server.state.hull import Hull
 from dynhull_server.state.records import HullRow, HullSettings
 
-from ..placement import worker_of
+from ..placement import worker_of, worker_of_shard
 from ..shards import messages as say
 from ..shards.placement import Place
 from .letters import Answer, Greeted, Greeting, IsWanted, Letter, Wanted
@@ -201,8 +201,7 @@ class ServedDivisions:
         return reply
 
     def _worker_of(self, name: str, place: Place) -> int:
-        """The worker that has a shard. Part of the format of data folders: it must not change."""
-        return (worker_of(name, self._workers) + place.number) % self._workers
+        return worker_of_shard(name, place.number, self._workers)
 
     async def _send(self, worker: int, letter: Any) -> Any:
         """The answer to a letter. Raises PeerAwayError if the worker is away."""

@@ -31,6 +31,8 @@ LOOK, PATIENCE = 0.5, 10.0
 GAP = 2.0
 # Seconds that a worker which ends takes to say so.
 LAST_SECONDS = 1.0
+# What the name of a worker begins with that serves nothing, but divides the database (`split`).
+SPLITS = "split by "
 
 log = logging.getLogger(__name__)
 
@@ -58,12 +60,14 @@ WORKERS = (
 ).encode()
 WISHES = b"SELECT partition, worker FROM wishes"
 HEIRS = b"SELECT partition, worker, process, epoch FROM heirs"
+# Read last: who sees that an owner has let go, to divide the database, sees that it was divided.
+PARTITIONS = b"SELECT partitions FROM format"
 OFFER = (
     b"INSERT INTO heirs VALUES (%s, %s, %s, %s) ON CONFLICT (partition) "
     b"DO UPDATE SET worker = excluded.worker, process = excluded.process, epoch = excluded.epoch"
 )
 WITHDRAW = b"DELETE FROM heirs WHERE partition = %s AND worker = %s AND process = %s"
-ALL = OWNERS, WORKERS, WISHES, HEIRS
+ALL = OWNERS, WORKERS, WISHES, HEIRS, PARTITIONS
 GONE = (
     f"DELETE FROM workers WHERE seen < clock_timestamp() - interval '{20 * PRESENT}s'"  # noqa: S608  (ours)
 ).encode()
@@ -121,12 +125,14 @@ class Tables(NamedTuple):
         workers: the workers that are present.
         wishes: the workers that are to have some of the partitions.
         heirs: the workers that are ready to take some of the partitions.
+        partitions: the number of partitions.
     """
 
     owners: dict[int, Owner]
     workers: dict[str, Worker]
     wishes: dict[int, str]
     heirs: dict[int, Heir]
+    partitions: int
 
     def apart(self) -> dict[str, str]:
         """The workers that have partitions and are not connected to the database, each with its process."""
@@ -141,7 +147,7 @@ class Tables(NamedTuple):
 
 
 class Cluster(NamedTuple):
-    """What does not change while a cluster runs.
+    """What does not change while a cluster runs, unless the database is split (`split`).
 
     Attributes:
         partitions: the number of partitions.
@@ -194,7 +200,8 @@ def _secret(connection: Connection) -> str:
 def read(connection: Connection) -> Tables:
     """The tables now; of a database that was never that of a cluster, its owners."""
     if not is_of_cluster(connection):
-        return _tables([connection.execute(OWNERS).fetchall(), [], [], []])
+        owners, partitions = (connection.execute(sql).fetchall() for sql in (OWNERS, PARTITIONS))
+        return _tables([owners, [], [], [], partitions])
     return _tables([connection.execute(sql).fetchall() for sql in ALL])
 
 
@@ -219,7 +226,7 @@ class Board:
     """
 
     def __init__(self, database: Database, changed: Callable[[Tables], None], worker: str = "", host: str = "") -> None:
-        self.tables = Tables({}, {}, {}, {})
+        self.tables = Tables({}, {}, {}, {}, 0)
         self.leaving = False
         self.clock_difference = 0.0
         self._database = database
@@ -348,7 +355,7 @@ class Board:
 
 
 def _tables(rows: list[list[Any]]) -> Tables:
-    owners, workers, wishes, heirs = rows
+    owners, workers, wishes, heirs, ((partitions,),) = rows
     return Tables(
         {partition: Owner(*rest) for partition, *rest in owners},
         {
@@ -357,4 +364,5 @@ def _tables(rows: list[list[Any]]) -> Tables:
         },
         dict(wishes),
         {partition: Heir(*rest) for partition, *rest in heirs},
+        partitions,
     )

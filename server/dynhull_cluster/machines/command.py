@@ -93,6 +93,53 @@ def move(
             connection.execute("INSERT INTO wishes VALUES (%s, %s)", [partition, worker])
 
 
+def split(
+    partitions: Annotated[int, typer.Argument(min=2, max=1024, help="How many partitions the database is to have.")],
+    journal: JOURNAL,
+) -> None:
+    """Divide a database that one server has used first among several partitions, while a cluster serves it.
+
+    A database that `dynhull serve --journal` has made has a single partition, so of a cluster only one worker can have
+    anything. Start servers with --cluster, stop the one without, whose hulls they take at once, and split:
+
+        dynhull serve --cluster --journal postgresql://dynhull@db/hulls --port 50052
+        dynhull cluster split 8 --journal postgresql://dynhull@db/hulls
+
+    Callers wait meanwhile, for about as long as a start of a server takes; watches are resumed. Nothing is lost or
+    applied twice, and numbered batches go on. It cannot be undone, and the number cannot be changed again.
+
+    A name belongs to a partition by its part before the first "/". A fence and the hulls that it needs have to be in
+    the same partition: fences that would lie apart from theirs are listed, each with its consumers, and nothing is
+    changed. From then on a batch over several hulls is refused if they are in different partitions.
+
+    If the command is killed, the database has either one partition, which the workers take back, or all of them: run
+    it again.
+    """
+    from dynhull_server.failure import code_of, fail, text_of
+    from dynhull_server.storage.port import StorageError
+
+    from ..postgres.database import Database
+    from ..postgres.splitting import FencesApartError
+    from . import split as splitting
+
+    try:
+        done = splitting.split(Database(journal), partitions)
+    except FencesApartError as error:
+        for fence in error.fences:
+            typer.echo(fence, err=True)
+        fail(text_of(error))
+    except (StorageError, OSError, ValueError) as error:
+        fail(text_of(error), code_of(error))
+    if not done.hulls:
+        typer.echo(f"{done.database} has {partitions} partitions already")
+        return
+    hulls = (
+        f"{plural(sum(done.hulls), 'hull')} in {sum(map(bool, done.hulls))} of them, at most {max(done.hulls)} in one"
+    )
+    typer.echo(f"{done.database} has {partitions} partitions: {hulls}")
+    typer.echo(f"it was not served for {done.seconds:.1f} s, and until workers have read what they take")
+
+
 def scale(
     servers: Annotated[int, typer.Argument(min=0, help="How many servers Ray is to run, each with its own processes.")],
     journal: JOURNAL,
@@ -128,7 +175,7 @@ def scale(
         launcher.scale(0, [], {}, "")
 
 
-@group(status=status, drain=drain, move=move, scale=scale)
+@group(status=status, drain=drain, move=move, split=split, scale=scale)
 def cluster() -> None:
     """See which servers of a cluster serve what, and have them serve something else.
 

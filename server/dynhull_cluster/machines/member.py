@@ -37,7 +37,7 @@ from ..versions import apart
 from ..worker import own_settings
 from .addresses import Addresses
 from .ahead import FAILURES, Ahead, Served
-from .board import Board, Cluster, Tables, join, partitions_of_new
+from .board import SPLITS, Board, Cluster, Tables, join, partitions_of_new
 from .claims import shares
 from .entrance import PartitionEntrance
 from .joining import admit, require_right_clock, served_by, server_of
@@ -62,6 +62,8 @@ LEFT_OUT = (
 STRANGER = (
     "a worker is of another version: it gets no partitions from here, and what it has cannot be reached from here"
 )
+# The number of the work that concerns all partitions.
+ALL = -1
 # Seconds that gateways get to receive what their calls have ended with, before another worker may have the partition.
 LAST_STATUSES = 0.03
 
@@ -109,11 +111,8 @@ class Member:
             StorageError: the database cannot be used, or the machine may not join.
         """
         settings = self._settings
-        self._cluster = await asyncio.to_thread(join, self._database, partitions_of_new(settings))
+        self._join(await asyncio.to_thread(join, self._database, partitions_of_new(settings)))
         await asyncio.to_thread(admit, self._database, self._worker, self._host, settings.max_clock_difference)
-        only = "" if settings.cluster else server_of(self._worker)
-        self._addresses = Addresses(self._cluster.secret, settings.cluster_ca, settings.peer_ping_interval, only)
-        self._peers = Peers(self._addresses)
         self._supervisor.every(0.0, "board", self._board.run)
         await self._looked.wait()
         apart = self._board.tables.apart().items()
@@ -173,7 +172,7 @@ class Member:
 
     def _is_of_neighbour(self, holder: str) -> bool:
         """Whether a partition is held by another worker that this one may take it over from."""
-        return holder != self._worker and self._is_neighbour(holder)
+        return holder != self._worker and not holder.startswith(SPLITS) and self._is_neighbour(holder)
 
     def _others(self) -> list[str]:
         """The other workers that can take partitions, and that callers of this one could reach there."""
@@ -183,6 +182,11 @@ class Member:
 
     def _decide(self, tables: Tables) -> None:
         """Begin to take, to read ahead and to let go, after each look at the tables."""
+        if tables.partitions != self._cluster.partitions or ALL in self._busy:
+            if ALL not in self._busy:
+                self._begin(ALL, self._follow_split())
+                self._busy[ALL].add_done_callback(lambda _: self._decide(self._board.tables))
+            return
         self._addresses.learn(tables)
         self._watch_clock()
         self._notice_strangers()
@@ -197,7 +201,7 @@ class Member:
             if self._board.forsaken(number, wanted[number]) and len(workers) > 1:
                 left = [each for each in workers if each != wanted[number]]
                 wanted[number] = shares(expected, left, tables.wishes)[number]
-        if not leaving:
+        if not leaving and not any(each.startswith(SPLITS) for each in wanted):
             self._notice_idle(wanted)
         for number, ahead in self._ahead.items():
             if wanted[number] != self._worker:
@@ -341,6 +345,31 @@ class Member:
         served.server.set_machine_well(self._supervisor.reason is None)
         seconds = round(time.monotonic() - begun, 3)
         log.info("a partition is served", extra={"partition": number, "seconds": seconds})
+
+    async def _follow_split(self) -> None:
+        """Begin anew with the partitions of a database that was split, which nobody has had yet."""
+        others = [task for number, task in self._busy.items() if number != ALL]
+        await asyncio.gather(*(each.drop() for each in self._ahead.values()))
+        await asyncio.gather(*others, return_exceptions=True)
+        await asyncio.gather(*(server.drain() for server in self._served.values()))  # one that takes no part any more
+        self._served.clear()
+        try:
+            cluster = await asyncio.to_thread(join, self._database, self._cluster.partitions)
+        except StorageError as error:
+            log.warning("the cluster of a split database cannot be joined", extra={"reason": words(error)})
+            await asyncio.sleep(FIRST_PAUSE)
+            return
+        self._join(cluster)
+        self._failed.clear()
+        log.info("the database was split", extra={"partitions": cluster.partitions})
+
+    def _join(self, cluster: Cluster) -> None:
+        settings = self._settings
+        self._peers.close()
+        self._cluster = cluster
+        only = "" if settings.cluster else server_of(self._worker)
+        self._addresses = Addresses(cluster.secret, settings.cluster_ca, settings.peer_ping_interval, only)
+        self._peers = Peers(self._addresses)
 
     async def _let_go(self, number: int, worker: str) -> None:
         """Stop to serve a partition, so that another worker can take it."""

@@ -209,9 +209,7 @@ def prepare(connection: Connection, database: Database, partitions: int) -> None
             for partition in range(partitions):
                 put_totals(connection, partition, Totals())
         return
-    if present != partitions:
-        remedy = f"start the server with --workers {present}, or with --cluster"
-        raise StorageError(f"{database} is divided among {present} workers: {remedy}")
+    require_partitions(connection, database, partitions)
     (version,) = _one(connection, "SELECT format FROM format")
     if version == FORMAT:
         return
@@ -233,6 +231,14 @@ def _renew_checksums(connection: Connection) -> None:
         if checksum(b"", *before) == stored:
             renewed = [checksum(b"", *values), partition, copy]
             connection.execute("UPDATE totals SET checksum = %s WHERE partition = %s AND copy = %s", renewed)
+
+
+def require_partitions(connection: Connection, database: Database, partitions: int) -> None:
+    """Raise StorageError if the database, which has tables of dynhull, has another number of partitions."""
+    present = partitions_of(connection, database)
+    if present is not None and present != partitions:
+        remedy = f"start the server with --workers {present}, or with --cluster"
+        raise StorageError(f"{database} is divided among {present} workers: {remedy}")
 
 
 def _end_owners(connection: Connection, database: Database, version: int) -> None:

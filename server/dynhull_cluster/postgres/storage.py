@@ -40,7 +40,7 @@ from .database import Connection, Database, as_storage_errors, storage_error
 from .follower import Follower
 from .ownership import REQUIRE, Ownership, taken_over, writer_name
 from .reader import BegunReader, PostgresReader, Readers
-from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of
+from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of, require_partitions
 
 # With `off` commits survive the end of this process; a crash of PostgreSQL may lose those since the last `sync`.
 SYNCHRONOUS = {Durability.SYNC: "on", Durability.INTERVAL: "off", Durability.NONE: "off"}
@@ -162,6 +162,7 @@ class PostgresStorage(RowStorage):
             stack.callback(self._owner.release)
             self._owner.take(self.lapsed)
             connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
+            require_partitions(connection, self._database, self._partitions)  # an owner before may have split it
             return examined(connection, self._partition, progress)
 
     def _take_followed(self, follower: Follower) -> Findings:
