@@ -70,7 +70,8 @@ class Site:
     def look(self) -> None:
         """The gateway follows the owners."""
         self.told = self.database.told()
-        self.addresses.learn(Tables({partition: Owner(*rest) for partition, *rest in self.told}, {}, {}, {}))
+        owners = {partition: Owner(*rest) for partition, *rest in self.told}
+        self.addresses.learn(Tables(owners, {}, {}, {}, PARTITION + 1))
 
 
 def _store(memory: MemoryStorage, model: Model) -> FaultyStorage:

@@ -31,6 +31,7 @@ from ..postgres.reader import BegunReader
 from ..postgres.schema import PREPARING_SECONDS, partitions_of
 from ..postgres.splitting import require_together, split_rows
 from ..postgres.storage import IDLE_SECONDS
+from ..versions import apart, own_versions
 from .board import LOOK, OFFER, SPLITS, Owner, Worker, join, read
 from .joining import RENEW
 
@@ -154,8 +155,10 @@ def _take(database: Database, connection: Connection, owner: Ownership, worker: 
     begun = time.monotonic()
     lease, renewed = "", begun
     while True:
-        connection.execute(RENEW, [worker, False, this_process(), HOST])
+        connection.execute(RENEW, [worker, False, this_process(), HOST, own_versions().text])
         tables = read(connection)
+        if strangers := tables.strangers():
+            raise StorageError(apart(*min(strangers.items())))
         there = tables.owners.get(0)
         now = time.monotonic()
         if there is not None and there.until != lease:
