@@ -143,7 +143,11 @@ def test_a_gateway_says_that_an_owner_is_of_another_version(caplog: pytest.LogCa
         server = await asyncio.start_server(refuse, "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
         ways = Addresses(SECRET, None, 10.0)
-        ways.learn(Tables({PARTITION: Owner(1, WORKER, "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}))
+        ways.learn(
+            Tables(
+                {PARTITION: Owner(1, WORKER, "", f"127.0.0.1 1 {port}", "now", False, True)}, {}, {}, {}, PARTITION + 1
+            )
+        )
         for _ in range(2):
             with pytest.raises(OSError, match=APART.format(WORKER)):
                 await ways.connect(PARTITION, AskingFrames)

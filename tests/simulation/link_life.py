@@ -71,7 +71,7 @@ class LinkedServer(ShellServer):
         bound: Any = None
         await frames.listen_on(bound, None)
         ways = _Ways(SECRET, None, PING)
-        ways.learn(Tables({PARTITION: Owner(1, WORKER, "", "machine 1 1", "", False, True)}, {}, {}, {}))
+        ways.learn(Tables({PARTITION: Owner(1, WORKER, "", "machine 1 1", "", False, True)}, {}, {}, {}, PARTITION + 1))
         self._link = WorkerLink(PARTITION, ways, (), lambda: None)
         self.loop.create_task(self._link.run())
 
