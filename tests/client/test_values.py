@@ -93,6 +93,7 @@ EXPORTED = [
     "Sketch",
     "Snapshot",
     "StaleCopyError",
+    "Stored",
     "SubjectsInside",
     "Supported",
     "Tangents",
