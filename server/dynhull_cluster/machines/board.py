@@ -132,7 +132,7 @@ class Tables(NamedTuple):
     workers: dict[str, Worker]
     wishes: dict[int, str]
     heirs: dict[int, Heir]
-    partitions: int
+    partitions: int = 1
 
     def apart(self) -> dict[str, str]:
         """The workers that have partitions and are not connected to the database, each with its process."""
