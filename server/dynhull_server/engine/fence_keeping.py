@@ -122,7 +122,11 @@ class FenceKeeping:
         return min((each for each in ages if each), default=0)
 
     async def _keep(self, fence: Fence) -> None:
+        config = fence.row.config
         first = await self._first(fence)
+        if fence.row.config is not config:  # replaced meanwhile: the next round looks by the limits of now
+            self._engine.fences.stirred[fence] = None
+            return
         stored = fence.last - fence.unsaved
         if fence.unsaved >= max(LEAST_EVENTS, fence.inside) or (first > stored + 1 and fence.unsaved):
             await self._store(self._engine.fences.live(fence))
