@@ -25,6 +25,18 @@ def test_no_call_fails_by_an_attempt_to_connect_before_it(address: str, connect:
         assert client.create_hull(name).revision == 0  # not repeated where it may have been sent
 
 
+def test_no_watch_fails_by_an_attempt_to_connect_before_it(address: str, connect: type[HullClient], name: str) -> None:
+    with HullClient(address) as client:
+        client.create_hull(name, keyed="str")
+        client.create_fence(name, [[0, 0], [9, 0], [0, 9]], name)
+    for watch, options in (("watch", {}), ("watch_fence", {"progress_interval": 0.1})):
+        with proxy("") as way, connect(way.address) as late:
+            with pytest.raises(UnavailableError):
+                late.create_hull(name)
+            way.server = address
+            next(getattr(late, watch)(name, reconnect=False, **options))
+
+
 @pytest.mark.usefixtures("no_server")
 def test_this_machine_is_reached_without_a_proxy(address: str, connect: type[HullClient]) -> None:
     port = address.rpartition(":")[2]

@@ -934,9 +934,9 @@ def watch(
             there is a new hull of that name. It also waits for a hull that does not exist yet. Without it,
             HullNotFoundError ends the watch.
         reconnect: whether the watch continues after a lost connection, however long that takes, with the changes since
-            then, or with a snapshot if the server no longer has them. Until the first event it is tried again as
-            other reads are (`retries` of the client). Without it, UnavailableError ends the watch, as does
-            RevisionForgottenError if the server cannot continue from a copy.
+            then, or with a snapshot if the server no longer has them. Without it, UnavailableError ends the watch, as
+            does RevisionForgottenError if the server cannot continue from a copy. Until the first event it is tried
+            again as other reads are (`retries` of the client), in both cases.
         timeout: seconds after which the watch ends with DeadlineError; None for never.
     """
     request = pb.WatchRequest(

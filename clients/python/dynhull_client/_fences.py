@@ -254,7 +254,8 @@ def watch_fence(
             least one a day.
         progress_interval: seconds without an event after which an event "progress" is sent; None for never.
         reconnect: whether the watch continues after a lost connection, however long that takes, without loss or
-            repetition. The first connection must succeed. Without it, UnavailableError ends the watch.
+            repetition. Without it, UnavailableError ends the watch. Until it has begun it is tried again as other
+            reads are (`retries` of the client), in both cases.
         timeout: seconds after which the watch ends with DeadlineError; None for never.
     """
     if consumer is not None and after is not None:

@@ -60,11 +60,14 @@ class Place(ABC, Generic[Happening]):
     def _continue_later(self, error: DynhullError) -> None:
         """Prepare the next connection after this one was lost; raises any other error.
 
-        Until the watch has begun it is a call like others, with as many retries; afterwards it goes on for ever.
+        Until the watch has begun it is a call like others, with as many retries; afterwards it goes on for ever, unless
+        it is not to reconnect.
         """
+        again = self._reconnect
         if not self._begun:
             self._retries -= 1
-        if not self._reconnect or self._retries < 0 or error.code != grpc.StatusCode.UNAVAILABLE:
+            again = self._retries >= 0
+        if not again or error.code != grpc.StatusCode.UNAVAILABLE:
             raise error from None
         if not self.request.HasField("progress_interval"):  # reports the new connection even if nothing changes
             self.request.progress_interval.seconds = 1
