@@ -42,7 +42,8 @@ ERRORS = DynhullError, RuntimeError, StopAsyncIteration, StopIteration, NoneType
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    with server_process(complaints=None) as running, HullClient(running.address) as client:
+    many = ("--max-producers-per-caller", "100000")  # each writer without a name is one
+    with server_process(*many, complaints=None) as running, HullClient(running.address) as client:
         client.create_hull(HULL)
         client.apply(HULL, insert=SQUARE)
         client.create_hull(KEYED, keyed="int")
