@@ -77,9 +77,8 @@ async def require_allowed(call: Call, link: WorkerLink, method: str, request: Me
     try:
         with call.cutoff():
             await link.ask(method, call, request.SerializeToString())
-    except (
-        RelayedError
-    ) as refusal:  # rights come first, so what is not there any more may be read; the feed says the rest
+    except RelayedError as refusal:
+        # Rights come first, so what is not there any more may be read; the feed says the rest.
         if refusal.status.code != code_pb2.NOT_FOUND:
             raise
 

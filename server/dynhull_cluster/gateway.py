@@ -80,9 +80,8 @@ class Gateway:
         self._health = Health(
             Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
         )
-        self._links = self._links_to(workers, ways)
         self._away_since: dict[int, float | None] = dict.fromkeys(range(workers))
-        self._relay = Relay(self._links, settings.max_watch_lag)
+        self._relay = Relay(self._links_to(workers, ways), settings.max_watch_lag)
         self._composed = Composed(self._relay, settings.max_fence_corners)
         self._watches = SharedWatches(self._relay, metrics)
         self._fences = SharedFences(self._relay, metrics)
@@ -123,10 +122,9 @@ class Gateway:
 
     def divide(self, workers: int, ways: Ways) -> None:
         """Have another number of workers from now on. Calls that wait for those before go to the new ones."""
-        before, self._links = self._links, self._links_to(workers, ways)
+        before, self._relay.links = self._relay.links, self._links_to(workers, ways)
         # They have half a minute to come, as workers that have served.
         self._away_since = dict.fromkeys(range(workers), self._clock.monotonic())
-        self._relay.links = self._links
         for link in before:
             link.retire()
         self._run_links()
@@ -143,7 +141,7 @@ class Gateway:
         await self._server.stop(GOODBYES)
         await stopping
         await self._supervisor.stop()
-        for link in self._links:
+        for link in self._relay.links:
             await link.close()
         if served:
             log.info("stopped")
@@ -152,7 +150,7 @@ class Gateway:
         return [WorkerLink(number, ways, (WHOLE, SCRUB), self._update_health) for number in range(workers)]
 
     def _run_links(self) -> None:
-        for link in self._links:
+        for link in self._relay.links:
             self._supervisor.every(worker_link.LOOK_SECONDS, f"worker-{link.number}", link.run)
 
     def _handlers(self, service: ServiceDescriptor) -> grpc.GenericRpcHandler:
@@ -191,7 +189,7 @@ class Gateway:
             return
         well = self._supervisor.reason is None
         scrubbed = True
-        for link in self._links:
+        for link in self._relay.links:
             self._health.set(link.health[WHOLE] or NOT_SERVING, f"{WORKER}/{link.number}")
             well &= self._well(link)
             scrubbed &= link.health[SCRUB] != NOT_SERVING

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import typer
 
+from dynhull_cli.plural import plural
+
 from .exports import WRITERS, complete_file
 from .failure import fail
 from .progress import progress_bar
@@ -50,8 +52,7 @@ def write_export(file: Path, parts: Iterable[Contents], total: int, *, geographi
 
 def exported(file: Path, name: str, points: int, revision: int) -> None:
     """Print what was written."""
-    counted = "1 point" if points == 1 else f"{points:,} points"
-    typer.echo(f"{file}: {counted} of {name} at revision {revision}")
+    typer.echo(f"{file}: {plural(points, 'point')} of {name} at revision {revision}")
 
 
 def _contents(stored: "Stored") -> Contents:

@@ -154,7 +154,7 @@ class PostgresStorage(RowStorage):
             )
             stack.callback(self._readers.close)
             self._open = stack.pop_all()
-        return self._contents(findings.notes)
+        return self._contents([f"{self._place}: {note}" for note in findings.notes])
 
     def _examine(self, stack: ExitStack, progress: Progress) -> Findings:
         """Own the partition, and examine it."""
@@ -191,13 +191,6 @@ class PostgresStorage(RowStorage):
             connection.close()
             raise
         return connection
-
-    def _contents(self, notes: Sequence[str]) -> Contents:
-        rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
-        fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
-        told = [f"{self._place}: {note}" for note in notes]
-        totals = self._ledger.totals
-        return Contents(rows, totals.next_number, told, fences, totals.committed)
 
     def close(self) -> None:
         """Make all commits durable, and let another server own the partition."""

@@ -11,10 +11,9 @@ from dataclasses import dataclass, field
 
 from ...state.records import EPOCHS, STEPS, HullRow, Record
 from ..port import DamagedError, StorageError
-from .batch_rows import batch_records, commit_columns, is_whole
 from .encoding import weight
 from .ledger import DropNewest, DropSnapshot, HullRows, Ledger
-from .reading import read_hull, snapshot_state
+from .reading import batch_rows, read_hull, snapshot_state, whole_records
 from .tables import Reader
 
 
@@ -149,12 +148,8 @@ def _last_revision(reader: Reader, hull: HullRows, step: int, shard: int) -> int
 
 
 def _records(reader: Reader, hull: HullRows, place: int) -> list[Record]:
-    columns = f"first, last, checksum, payload, {commit_columns(reader.version)}"
-    (row,) = reader.some("batches", columns, array("q", [place]))
-    first, last, stored, payload, *commit = row
-    if not is_whole(stored, payload, hull.row.number, first, last, *commit):
-        raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
-    return list(batch_records(payload, first, *commit))
+    (row,) = batch_rows(reader, array("q", [place]))
+    return list(whole_records(hull, [row]))
 
 
 def _step_of_snapshot(reader: Reader, hull: HullRows, revision: int) -> int:

@@ -30,7 +30,7 @@ def read_hull(reader: Reader, hull: HullRows, until: int) -> Kept:
         raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
     with _as_damage(hull):
         kept = _newest_snapshot(reader, hull, until)
-        rows = _rows(reader, hull.between(kept.revision, until))
+        rows = batch_rows(reader, hull.between(kept.revision, until))
         _add_records(kept, hull, rows, until)
     return kept
 
@@ -43,7 +43,7 @@ def read_records(reader: Reader, hull: HullRows, after: int) -> list[Record]:
     """
     kept = Kept(revision=after)
     with _as_damage(hull):
-        rows = _rows(reader, hull.between(after, hull.last))
+        rows = batch_rows(reader, hull.between(after, hull.last))
         _add_records(kept, hull, rows, hull.last)
     return kept.records
 
@@ -55,7 +55,7 @@ def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
         DamagedError: a row is damaged or missing.
     """
     ids = array("q", (place for hull in hulls if not hull.snapshots for place in hull.ids))
-    rows = _rows(reader, ids)
+    rows = batch_rows(reader, ids)
     for hull in hulls:
         if hull.snapshots:
             yield read_hull(reader, hull, hull.last)
@@ -68,7 +68,7 @@ def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
 
 def commit_of(reader: Reader, hull: HullRows, revision: int) -> Committed | None:
     """The commit of a revision; None where it is not known, because the row is damaged, or of an earlier format."""
-    for first, last, stored, payload, *commit in _rows(reader, hull.between(revision - 1, revision)):
+    for first, last, stored, payload, *commit in batch_rows(reader, hull.between(revision - 1, revision)):
         if first <= revision <= last and None not in commit:
             whole = is_whole(stored, payload, hull.row.number, first, last, *commit)
             return Committed(*commit) if whole else None
@@ -79,9 +79,17 @@ def commit_of(reader: Reader, hull: HullRows, revision: int) -> Committed | None
     return None
 
 
-def _rows(reader: Reader, places: "array[int]") -> Iterator[tuple[Any, ...]]:
+def batch_rows(reader: Reader, places: "array[int]") -> Iterator[tuple[Any, ...]]:
     """Of rows of batches, the revisions, the checksum, the payload and the commit."""
     return reader.some("batches", f"first, last, checksum, payload, {commit_columns(reader.version)}", places)
+
+
+def whole_records(hull: HullRows, rows: Iterable[tuple[Any, ...]]) -> Iterator[Record]:
+    """The records in rows that `batch_rows` has read. Raises DamagedError for one that is damaged."""
+    for first, last, stored, payload, *commit in rows:
+        if not is_whole(stored, payload, hull.row.number, first, last, *commit):
+            raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
+        yield from batch_records(payload, first, *commit)
 
 
 @contextmanager
@@ -141,15 +149,12 @@ def _snapshot(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
 def _add_records(kept: Kept, hull: HullRows, rows: Iterable[tuple[Any, ...]], until: int) -> None:
     """Add the revisions after the snapshot, up to `until` or the last one; `rows` are those that have them."""
     expected = kept.revision
-    for first, last, stored, payload, *commit in rows:
-        if not is_whole(stored, payload, hull.row.number, first, last, *commit):
-            raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
-        for record in batch_records(payload, first, *commit):
-            if not kept.revision < record.revision <= until:
-                continue
-            expected += 1
-            if record.revision != expected:
-                raise DamagedError(f"hull {hull.row.name!r}: revision {expected} is missing: restore a backup")
-            kept.records.append(record)
+    for record in whole_records(hull, rows):
+        if not kept.revision < record.revision <= until:
+            continue
+        expected += 1
+        if record.revision != expected:
+            raise DamagedError(f"hull {hull.row.name!r}: revision {expected} is missing: restore a backup")
+        kept.records.append(record)
     if expected < min(until, hull.last):
         raise DamagedError(f"hull {hull.row.name!r}: revision {expected + 1} is missing: restore a backup")

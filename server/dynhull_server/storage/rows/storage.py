@@ -12,7 +12,7 @@ from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.records import FenceEvent, Inside, KeptFence
 from ...state.records import Committed, HullRow, Kept, Record
-from ..port import NEWEST, DamagedError, NotCommittedError, Step, StorageError
+from ..port import NEWEST, Contents, DamagedError, NotCommittedError, Step, StorageError
 from . import chunks
 from .divided import newest_rows
 from .encoding import weight
@@ -78,6 +78,13 @@ class RowStorage(ABC):
     def ahead(self, changes: Sequence[Change | Step]) -> tuple[Sequence[Step], Sequence[Change | Step]]:
         """What of many events can be written before the changes."""
         return staging(changes, lambda: next(self._ledger.event_ids))
+
+    def _contents(self, notes: list[str]) -> Contents:
+        """What was found, with messages about what was lost or repaired."""
+        rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
+        fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
+        totals = self._ledger.totals
+        return Contents(rows, totals.next_number, notes, fences, totals.committed)
 
     def _group(self, changes: Sequence[Change | Step], now: int) -> Group:
         """The statements of a commit, and what it does to the ledger."""

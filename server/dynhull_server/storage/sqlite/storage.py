@@ -105,11 +105,7 @@ class SQLiteStorage(RowStorage):
                     raise
                 raise StorageError(f"{self._folder.path}: {words(error)}", meaning=meaning_of(error)) from error
             self._open = stack.pop_all()
-        rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
-        fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
-        notes += [self._prefixed(note) for note in findings.notes]
-        totals = self._ledger.totals
-        return Contents(rows, totals.next_number, notes, fences, totals.committed)
+        return self._contents([*notes, *(self._prefixed(note) for note in findings.notes)])
 
     def close(self) -> None:
         """Release the folder."""
