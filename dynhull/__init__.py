@@ -35,15 +35,20 @@ __all__ = [
     "static",
 ]
 
+_MODULES = {
+    *("arrays", "convex", "decompose", "defects", "envelope", "gjk", "globe", "keys", "margin", "measure", "polygons"),
+    *("range_search", "ray", "robust", "trace"),
+}
+
 __version__: str
 """The version of the installed distribution."""
 
 
 def __getattr__(name: str) -> _Any:
-    if name == "ray":  # most programs need none
+    if name in _MODULES:  # most programs need few
         from importlib import import_module
 
-        return import_module("dynhull.ray")
+        return import_module(f"dynhull.{name}")
     if name == "__version__":  # read when asked for: it takes as long as a tenth of the import
         from importlib.metadata import version
 

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from . import measure, robust
 from ._nodes import LOWER, UPPER
-from ._shown import geometry, svg
-from .arrays import Points, as_coordinate, as_count, as_directions, as_points, repr_of
+from ._shown import Shown, geometry, svg
+from .arrays import Points, as_coordinate, as_count, as_directions, as_points, as_tuples, repr_of
 from .robust._sketch_error import few_vertices, sketch_error
 from .static import convex_hull
 
@@ -33,7 +33,7 @@ MOST_POINTS_DRAWN = 2000
 UNMEASURED: tuple[int, dict[str, Any]] = (-1, {})
 
 
-class Live:
+class Live(Shown):
     """A convex hull of points that come and go, in the plane or on the globe.
 
     Several threads may ask one hull; each answer belongs to one state of it.
@@ -107,6 +107,29 @@ class Live:
     def locate(self, xy: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """(k,) signs of (k, 2) points: +1 inside, 0 on the boundary, -1 outside. Exact. O(log n) each."""
         return self._tree.locate(xy)
+
+    def vertex_rows(self, xy: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """(h,) rows of (k, 2) points: for each of `vertices` the first row that is that point. O(k + h log n).
+
+        With the points that a hull was made of, these are the rows of a table that are its corners, as
+        `scipy.spatial.ConvexHull.vertices`.
+
+        Raises:
+            ValueError: a vertex is none of the points.
+
+        >>> import dynhull
+        >>> places = [[0, 0], [4, 0], [1, 1], [0, 4], [4, 0]]
+        >>> dynhull.DynamicHull(places).vertex_rows(places).tolist()
+        [0, 1, 3]
+        """
+        vertices, points = self.vertices(), self._as_points(xy)
+        first: dict[tuple[float, float], int] = {}
+        for row, point in enumerate(as_tuples(points)):
+            first.setdefault(point, row)
+        missing = [vertex for vertex in as_tuples(vertices) if vertex not in first]
+        if missing:
+            raise ValueError(f"the vertex {missing[0]} is none of the points: give all that the hull was made of")
+        return np.array([first[vertex] for vertex in as_tuples(vertices)], dtype=np.int64)
 
     def contains(self, xy: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """(k,) booleans: which of (k, 2) points are inside or on the boundary. Exact. O(log n) each."""
@@ -302,7 +325,7 @@ class Hull(Live):
         No points: shape (0, 2). O(n), and O(m log m) for m of them that floating point does not order.
 
         Args:
-            percent: from 0 to 100.
+            percent: 0, or from 1 to 100.
             center: the mean of the points, or the median of each coordinate.
         """
         share = as_percent(percent)
@@ -350,4 +373,6 @@ def as_percent(percent: float) -> float:
         raise TypeError(f"percent must be a real number, got {repr_of(percent)}") from None
     if not 0 <= share <= 100:
         raise ValueError(f"percent is {share}: must be from 0 to 100")
+    if 0 < share < 1:  # numpy, pandas and scipy count quantiles from 0 to 1: taken as written, it would drop nearly all
+        raise ValueError(f"percent is {share}, less than one percent: for a share of {share} give {100 * share:g}")
     return share

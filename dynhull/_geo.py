@@ -150,7 +150,7 @@ class Globe(Live):
         nanometre or so on the ground. No points: shape (0, 2). O(n log n).
 
         Args:
-            percent: from 0 to 100.
+            percent: 0, or from 1 to 100.
         """
         share = as_percent(percent)
         points = self.points()

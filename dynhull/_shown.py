@@ -1,12 +1,18 @@
 """A hull for other programs: as GeoJSON, which geometry libraries read, and as a picture, which notebooks show."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .arrays import Points
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from shapely.geometry.base import BaseGeometry
+
+    from .arrays import Points
 
 WIDTH, MOST_HEIGHT = 320.0, 240.0
 MARGIN = 12.0
@@ -27,6 +33,42 @@ def geometry(vertices: Points) -> dict[str, Any]:
         case 2:
             return {"type": "LineString", "coordinates": tuple(corners)}
     return {"type": "Polygon", "coordinates": ((*corners, corners[0]),)}
+
+
+class Shown:
+    """What any object with `__geo_interface__` has for libraries of geometry."""
+
+    __slots__ = ()
+
+    @property
+    def wkt(self) -> str:
+        """The geometry as Well-known Text, each coordinate in the digits that give the same double."""
+        return well_known_text(_geometry_of(self))
+
+    def to_shapely(self) -> BaseGeometry:
+        """The geometry as one of shapely, which has to be installed."""
+        from shapely.geometry import shape
+
+        return shape(_geometry_of(self))
+
+
+def _geometry_of(shown: Any) -> Mapping[str, Any]:
+    geojson: Mapping[str, Any] = shown.__geo_interface__
+    return geojson["geometry"] if geojson["type"] == "Feature" else geojson
+
+
+def well_known_text(geojson: Mapping[str, Any]) -> str:
+    """A GeoJSON geometry as Well-known Text."""
+    kind, coordinates = geojson["type"], geojson["coordinates"]
+    return f"{kind.upper()} {_nested([coordinates] if kind == 'Point' else coordinates)}"
+
+
+def _nested(coordinates: Sequence[Any]) -> str:
+    if not coordinates:
+        return "EMPTY"
+    if isinstance(coordinates[0], float):
+        return " ".join(repr(number).removesuffix(".0") for number in coordinates)
+    return f"({', '.join(map(_nested, coordinates))})"
 
 
 def svg(vertices: Points, title: str, points: Points | None = None) -> str:

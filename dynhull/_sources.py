@@ -32,21 +32,21 @@ def coordinates_of(source: Any, name: str) -> Any:
         ValueError: a geometry is missing or empty, or a frame has no or several such pairs of columns.
     """
     if isinstance(source, list | tuple) or (isinstance(source, np.ndarray) and source.ndim):
-        return _of_geometries(source, name) if len(source) and _is_geometry(source[0]) else source
-    series: Any = getattr(source, "geometry", None) if _is_geometry(source) else None
+        return _of_geometries(source, name) if len(source) and is_geometry(source[0]) else source
+    series: Any = getattr(source, "geometry", None) if is_geometry(source) else None
     if hasattr(series, "to_numpy"):  # of a GeoSeries or a GeoDataFrame
         return _of_geometries(series.to_numpy(), name)
     if hasattr(source, "columns"):
         return _of_frame(source, name)
-    return list(_positions(_geojson(source), name)) if _is_geometry(source) else source
+    return list(_positions(geojson_of(source), name)) if is_geometry(source) else source
 
 
-def _is_geometry(value: Any) -> bool:
+def is_geometry(value: Any) -> bool:
     """Whether it is GeoJSON or makes some. Asks the class: a large GeoSeries takes a minute to make its GeoJSON."""
     return hasattr(type(value), "__geo_interface__") or (isinstance(value, Mapping) and "type" in value)
 
 
-def _geojson(value: Any) -> Mapping[str, Any]:
+def geojson_of(value: Any) -> Mapping[str, Any]:
     geojson: Mapping[str, Any] = value if isinstance(value, Mapping) else value.__geo_interface__
     return geojson
 
@@ -63,9 +63,9 @@ def _of_geometries(geometries: Sequence[Any] | npt.NDArray[Any], name: str) -> A
             return shapely.get_coordinates(array)
     found: list[Sequence[float]] = []
     for row, geometry in enumerate(geometries):
-        if not _is_geometry(geometry):
+        if not is_geometry(geometry):
             raise ValueError(f"{name} row {row} is {geometry!r}: must be a geometry, as row 0 is")
-        found.extend(_positions(_geojson(geometry), f"{name} row {row}"))
+        found.extend(_positions(geojson_of(geometry), f"{name} row {row}"))
     return found
 
 

@@ -1,7 +1,8 @@
 """Convex sets given by their support functions: the farthest point in each direction.
 
 A shape is any object with the two members of `Convex`; a `DynamicHull` is one. Moving, turning, scaling and adding
-shapes makes new shapes that query the old ones, so a live hull inside one stays live.
+shapes makes new shapes that query the old ones, so a live hull inside one stays live. Points, and what points may come
+from, stand for their hull (see `as_convex`).
 
 >>> from dynhull.convex import ball, box, capsule, minkowski_sum, moved
 >>> square = box([0, 0], [2, 2])
@@ -18,19 +19,22 @@ from fractions import Fraction
 from functools import cmp_to_key
 from itertools import product
 from math import cos, isfinite, sin
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.ma  # np.unique needs it, and two threads cannot import it at its first call: python/cpython#149728
 import numpy.typing as npt
 
+from ._base import Live
 from ._exact import Integers, as_integers, root
 from ._predicates import EPSILON, Point, cross_sign
+from ._rings import ring_signs
+from ._sources import coordinates_of, geojson_of, is_geometry
 from .arrays import Points, as_array, as_directions, as_points, as_rows, as_tuples, as_vector
 from .static import convex_hull
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 Way = tuple[Point, Point, int]
 
@@ -318,6 +322,49 @@ class Mapped:
         return image
 
 
+Set = Convex | Any
+"""A shape, or points, a frame or a geometry in place of one."""
+
+
+def as_convex(shape: Set, name: str = "shape") -> Convex:
+    """The convex set of an argument: a shape as it is; points, a frame or a geometry as the convex hull.
+
+    Raises:
+        ValueError: there are no points, or a line or polygon of a geometry is not convex: its hull is another set.
+        TypeError, ValueError: a point is bad, or it is a hull on the globe.
+    """
+    if isinstance(shape, Convex):
+        return shape
+    if isinstance(shape, Live):
+        raise TypeError(f"{name} is {shape!r}: shapes are in the plane or in space, not on the globe")
+    points = as_rows(coordinates_of(shape, name), name)
+    if not len(points):
+        raise ValueError(f"{name} has no points: an empty set has no support function")
+    if points.shape[1] != 2:
+        return Cloud(points)
+    hull = polygon(points)
+    if is_geometry(shape) and not _is_convex(geojson_of(shape), points, convex_hull(points)):
+        raise ValueError(
+            f"{name} is a {geojson_of(shape)['type']} that is not convex: give its convex hull, or a list of convex "
+            "parts, as dynhull.decompose.convex_pieces makes of a polygon"
+        )
+    return hull
+
+
+def _is_convex(geojson: Mapping[str, Any], points: Points, hull: Points) -> bool:
+    """Whether the set of a geometry is its hull. Points by themselves stand for theirs, as everywhere."""
+    match geojson["type"]:
+        case "Feature":
+            return _is_convex(geojson["geometry"], points, hull)
+        case "Point" | "MultiPoint":
+            return True
+        case "LineString":
+            return len(hull) <= 2
+        case "Polygon":  # a simple ring is convex if all of its corners are on the boundary of its hull
+            return len(geojson["coordinates"]) == 1 and (len(hull) <= 2 or not ring_signs(hull, points).any())
+    return False
+
+
 def point(p: npt.ArrayLike) -> Cloud:
     """One point, in any dimension."""
     return Cloud(as_vector(p, "p")[None])
@@ -370,17 +417,19 @@ def cone(base: npt.ArrayLike, apex: npt.ArrayLike, radius: float) -> Cone:
     return Cone(_in_space(base, "base"), _in_space(apex, "apex"), radius)
 
 
-def moved(shape: Convex, offset: npt.ArrayLike) -> Mapped:
+def moved(shape: Set, offset: npt.ArrayLike) -> Mapped:
     """The shape, moved by an offset."""
+    shape = as_convex(shape)
     return Mapped(shape, np.eye(shape.dimension), as_vector(offset, "offset"), 1.0)
 
 
-def rotated(shape: Convex, rotation: float | npt.ArrayLike) -> Mapped:
+def rotated(shape: Set, rotation: float | npt.ArrayLike) -> Mapped:
     """The shape turned around the origin: by an angle in radians, counter-clockwise (2D), or by a rotation matrix.
 
     Raises:
         ValueError: the matrix is not orthogonal up to 1e-12, or an angle is given in three dimensions.
     """
+    shape = as_convex(shape)
     if np.ndim(rotation) == 0:
         if shape.dimension != 2:
             raise ValueError("rotation is an angle, but the shape is not in the plane: give a rotation matrix")
@@ -396,25 +445,26 @@ def rotated(shape: Convex, rotation: float | npt.ArrayLike) -> Mapped:
     return Mapped(shape, matrix, np.zeros(shape.dimension), 1.0)
 
 
-def scaled(shape: Convex, factor: float | npt.ArrayLike) -> Mapped:
+def scaled(shape: Set, factor: float | npt.ArrayLike) -> Mapped:
     """The shape scaled about the origin, by one factor or by one for each axis (an ellipse is a scaled ball)."""
+    shape = as_convex(shape)
     factors = as_array(factor, "factor").astype(np.float64)
     matrix = np.diag(np.broadcast_to(factors, (shape.dimension,)))
     stretch = abs(float(factors)) if factors.ndim == 0 else None
     return Mapped(shape, matrix, np.zeros(shape.dimension), stretch)
 
 
-def minkowski_sum(a: Convex, b: Convex) -> Sum:
+def minkowski_sum(a: Set, b: Set) -> Sum:
     """All points p + q, p of a and q of b."""
-    return Sum((a, b))
+    return Sum((as_convex(a, "a"), as_convex(b, "b")))
 
 
-def minkowski_difference(a: Convex, b: Convex) -> Sum:
+def minkowski_difference(a: Set, b: Set) -> Sum:
     """All points p - q, p of a and q of b: it holds the origin exactly where a and b intersect."""
-    return Sum((a, scaled(b, -1.0)))
+    return Sum((as_convex(a, "a"), scaled(as_convex(b, "b"), -1.0)))
 
 
-def convex_combination(a: Convex, b: Convex, share: float) -> Sum:
+def convex_combination(a: Set, b: Set, share: float) -> Sum:
     """(1 - share) a + share b: share 0 is a, share 1 is b, and between them a changes into b.
 
     Raises:
@@ -422,7 +472,7 @@ def convex_combination(a: Convex, b: Convex, share: float) -> Sum:
     """
     if not 0 <= share <= 1:
         raise ValueError(f"share is {share!r}: must be from 0 to 1")
-    return Sum((scaled(a, 1 - share), scaled(b, share)))
+    return Sum((scaled(as_convex(a, "a"), 1 - share), scaled(as_convex(b, "b"), share)))
 
 
 def sum_of_polygons(p: npt.ArrayLike, q: npt.ArrayLike) -> Points:

@@ -61,6 +61,9 @@ class Frontier:
         """The number of points, with multiplicity."""
         return len(self._hull)
 
+    def __repr__(self) -> str:
+        return f"<Frontier of {len(self)} points, {len(self.efficient())} of them efficient>"
+
     def add(self, risk: float, gain: float) -> bool:
         """Add a point. Returns whether the efficient points changed. O(log² n + h log n)."""
         (row,) = _as_risks([[risk, gain]])

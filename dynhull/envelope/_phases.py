@@ -67,6 +67,9 @@ class PhaseDiagram:
         """The number of entries, with multiplicity."""
         return len(self._hull)
 
+    def __repr__(self) -> str:
+        return f"<PhaseDiagram of {len(self)} entries, {len(self._chain())} of them stable>"
+
     def add(self, composition: float, energy: float) -> Points:
         """Add an entry. Returns the (k, 2) entries that became unstable."""
         return self.add_many([[composition, energy]])

@@ -8,14 +8,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .._base import Hull
+from .._sources import is_geometry
 from .._value import Value
 from ..arrays import Points
-from ..convex import Cloud, Convex
+from ..convex import Cloud, Convex, Set, as_convex
 from ..static import convex_hull
 from ._core import core
 from ._difference import Difference, Numbers, NumbersError, Walk, walk
@@ -49,7 +50,7 @@ class Contact(Value):
     iterations: int
 
 
-Shape = Convex | Sequence[Convex]
+Shape = Set | Sequence[Set]
 
 
 def intersect(a: Shape, b: Shape) -> bool:
@@ -62,17 +63,17 @@ def intersect(a: Shape, b: Shape) -> bool:
 
     Args:
         a: a convex set, or a sequence of convex sets for their union; `dynhull.decompose` makes one of a concave
-            polygon.
+            polygon. Points, a frame or a convex geometry stand for their hull.
         b: the same.
 
     Raises:
-        ValueError: the dimensions differ, are not 2 or 3, or a union or a hull is empty.
+        ValueError: the dimensions differ, are not 2 or 3, a union or a hull is empty, or a geometry is not convex.
 
     >>> from dynhull.convex import ball, box
     >>> intersect(box([0, 0], [1, 1]), box([1, 1], [2, 2])), intersect(box([0, 0], [1, 1]), ball([3, 0.5], 1))
     (True, False)
     """
-    return any(_intersect(p, q) for p, q in product(_pieces(a), _pieces(b)))
+    return any(_intersect(p, q) for p, q in product(_pieces(a, "a"), _pieces(b, "b")))
 
 
 def contact(a: Shape, b: Shape) -> Contact:
@@ -92,11 +93,11 @@ def contact(a: Shape, b: Shape) -> Contact:
     bound for the unions.
 
     Args:
-        a: a convex set, or a sequence of convex sets for their union.
+        a: a convex set, or a sequence of convex sets for their union, as in `intersect`.
         b: the same.
 
     Raises:
-        ValueError: the dimensions differ, are not 2 or 3, or a union or a hull is empty.
+        ValueError: the dimensions differ, are not 2 or 3, a union or a hull is empty, or a geometry is not convex.
 
     >>> from dynhull.convex import box
     >>> found = contact(box([0, 0, 0], [1, 1, 1]), box([4, 5, 0], [5, 6, 1]))
@@ -106,17 +107,22 @@ def contact(a: Shape, b: Shape) -> Contact:
     >>> found.depth, found.normal.tolist()
     (1.0, [1.0, 0.0])
     """
-    found = [_contact(p, q) for p, q in product(_pieces(a), _pieces(b))]
+    found = [_contact(p, q) for p, q in product(_pieces(a, "a"), _pieces(b, "b"))]
     best = min(found, key=lambda c: (c.distance, -c.depth))
     return replace(best, iterations=sum(c.iterations for c in found))
 
 
-def _pieces(shape: Shape) -> Sequence[Convex]:
-    if isinstance(shape, Convex):
-        return [shape]
+def _pieces(shape: Shape, name: str) -> list[Convex]:
+    """The sets whose union an argument is. A list of points is one set, a list of anything else a union."""
+    if isinstance(shape, Convex) or not isinstance(shape, Sequence) or (len(shape) and _is_row(shape[0])):
+        return [as_convex(shape, name)]
     if not shape:
         raise ValueError("a union needs at least one piece")
-    return shape
+    return [as_convex(piece, f"{name} piece {number}") for number, piece in enumerate(shape)]
+
+
+def _is_row(value: Any) -> bool:
+    return not is_geometry(value) and np.ndim(value) == 1
 
 
 def _intersect(a: Convex, b: Convex) -> bool:

@@ -61,6 +61,12 @@ def test_every_module_is_documented_or_marked_as_private():
     assert public == documented() - {"dynhull"}
 
 
+def test_every_documented_module_is_there_without_an_import_of_its_own():
+    names = sorted(name for name in documented() if name.count(".") == 1 and name.startswith("dynhull."))
+    script = "import dynhull\n" + "\n".join(name for name in names if name != "dynhull.ray")
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
 def test_the_classes_are_named_as_they_are_imported():
     assert repr(dynhull.DynamicHull) == "<class 'dynhull.DynamicHull'>"
     assert repr(dynhull.MissingPointError) == "<class 'dynhull.MissingPointError'>"

@@ -12,7 +12,10 @@ import pytest
 import shapely
 from shapely.geometry import shape
 
-from dynhull import DynamicHull, convex_hull
+from dynhull import DynamicHull, GeoHull, convex_hull
+from dynhull.convex import minkowski_sum, moved
+from dynhull.decompose import convex_pieces
+from dynhull.gjk import contact, intersect
 
 PAIRS = [(0.0, 0.0), (4.0, 0.0), (5.0, 5.0), (0.0, 4.0), (1.0, 1.0)]
 CORNERS = [[0, 0], [4, 0], [5, 5], [0, 4]]
@@ -119,6 +122,64 @@ def test_hulls_are_geometries(count: int, kind: str, area: float) -> None:
     assert geometry.equals(shapely.MultiPoint(PAIRS[:count]).convex_hull) or count == 0
     assert DynamicHull(geometry) == DynamicHull(hull.vertices())
     assert DynamicHull(hull) == DynamicHull(hull.vertices())
+
+
+@pytest.mark.parametrize("count", range(6))
+def test_hulls_are_geometries_of_shapely_and_texts(count: int) -> None:
+    hull = DynamicHull(np.array(PAIRS[:count]).reshape(-1, 2) / 3)
+    assert hull.to_shapely().equals(shape(hull)) or count == 0
+    assert shapely.from_wkt(hull.wkt) == hull.to_shapely()
+    globe = GeoHull([(177.4, -17.8), (178.4, -18.1), (-179.9, -16.8), (179.4, -16.4)])
+    assert globe.to_shapely().geom_type == "MultiPolygon"
+    assert shapely.from_wkt(globe.wkt) == globe.to_shapely()
+
+
+def test_a_hull_of_whole_numbers_as_text() -> None:
+    assert DynamicHull(PAIRS).wkt == "POLYGON ((0 0, 4 0, 5 5, 0 4, 0 0))"
+
+
+@pytest.mark.parametrize("hull", [DynamicHull, GeoHull])
+def test_the_rows_that_are_vertices(hull: type) -> None:
+    frame = pd.DataFrame({"name": list("abcdeb"), "lon": [*X, X[1]], "lat": [*Y, Y[1]]})
+    made = hull(frame)
+    rows = made.vertex_rows(frame)
+    assert frame.iloc[rows][["lon", "lat"]].to_numpy().tolist() == made.vertices().tolist()
+    assert sorted(frame.name.iloc[rows]) == ["a", "b", "c", "d"]
+    assert hull().vertex_rows(frame).tolist() == []
+    with pytest.raises(ValueError, match=r"the vertex \(5\.0, 5\.0\) is none of the points"):
+        made.vertex_rows(frame[frame.name != "c"])
+
+
+def test_geometries_points_and_frames_are_convex_sets() -> None:
+    square, corner = shapely.box(0, 0, 1, 1), pd.DataFrame({"x": [1, 2], "y": [1, 2]})
+    assert intersect(square, corner)
+    assert intersect(np.array(PAIRS), [shapely.box(7, 7, 8, 8), shapely.Point(5, 5)])
+    assert contact(shapely.MultiPoint(PAIRS), [[8, 9]]).distance == 5
+    assert contact(moved(square, [4, 0]), minkowski_sum(square, [[0, 0], [1, 1]])).distance == 2
+    assert not intersect(np.eye(3), [[0.0, 0, 0], [-1, -1, -1]])
+    assert intersect(convex_pieces(shapely.Polygon([(0, 0), (4, 2), (0, 4), (2, 2)])), [[1, 1]])
+
+
+@pytest.mark.parametrize(
+    ("shape", "complaint"),
+    [
+        (shapely.Polygon([(0, 0), (4, 2), (0, 4), (2, 2)]), "b is a Polygon that is not convex: give its convex hull"),
+        (shapely.Polygon(PAIRS[:4], [[(1, 1), (2, 1), (2, 2)]]), "b is a Polygon that is not convex"),
+        ([shapely.Point(1, 1), shapely.LineString(PAIRS)], "b piece 1 is a LineString that is not convex"),
+        (shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 2, 3, 3)]), "b is a MultiPolygon"),
+        (np.empty((0, 2)), "b has no points"),
+        ([[1, float("nan")]], r"b row 0 is \(1.0, nan\)"),
+    ],
+    ids=str,
+)
+def test_no_hull_in_silence_for_what_is_not_convex(shape: object, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        intersect(shapely.Point(0, 0), shape)
+
+
+def test_the_globe_is_no_plane() -> None:
+    with pytest.raises(TypeError, match="a is <GeoHull of 1 points, 1 vertices>: shapes are in the plane or in space"):
+        intersect(GeoHull([(1, 2)]), shapely.Point(0, 0))
 
 
 @pytest.mark.parametrize("scale", [1.0, 5e-324, 2.0**1021])

@@ -84,7 +84,7 @@ def test_influence(make, rows):
 @both
 @given(
     rows=points(25),
-    percent=st.one_of(st.integers(0, 100), st.floats(0, 100)),
+    percent=st.one_of(st.integers(0, 100), st.floats(1, 100)),
     center=st.sampled_from(["mean", "median"]),
 )
 @settings(max_examples=40)
@@ -215,6 +215,7 @@ def test_odd_arguments(make):
         (lambda: hull.sketch(0), ValueError, "k is 0: must be at least 1"),
         (lambda: hull.mcp(101), ValueError, "percent is 101.0: must be from 0 to 100"),
         (lambda: hull.mcp(float("nan")), ValueError, "percent is nan: must be from 0 to 100"),
+        (lambda: hull.mcp(0.95), ValueError, r"percent is 0\.95, less than one percent: for a share of 0\.95 give 95"),
         (lambda: hull.mcp("95"), TypeError, "percent must be a real number, got '95'"),
         (lambda: hull.mcp(95, "mode"), ValueError, 'center must be "mean" or "median", got \'mode\''),
     ):

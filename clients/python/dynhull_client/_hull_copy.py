@@ -11,6 +11,7 @@ import grpc
 import numpy as np
 
 from dynhull import DynamicHull, GeoHull
+from dynhull._shown import Shown
 
 from ._errors import HullNotFoundError, HullUnsuitableError, StaleCopyError
 from ._messages import Change, Deleted, Snapshot, shown_geometry, shown_svg
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from ._messages import Event
 
 
-class HullCopy:
+class HullCopy(Shown):
     """A copy of a watched hull, updated event by event, that answers questions without a call.
 
     Its answers are those of a `dynhull.DynamicHull` of the vertices: exact, and at the revision of the last event. They

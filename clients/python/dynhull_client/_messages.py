@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull import globe
-from dynhull._shown import geometry, svg
+from dynhull._shown import Shown, geometry, svg
 from dynhull._value import Value
 from dynhull.arrays import Points as Points
 from dynhull.keys import Keys, KeyType
@@ -115,7 +115,7 @@ class Measures(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Hull(Value):
+class Hull(Value, Shown):
     """A hull at one revision: (h, 2) vertices, counter-clockwise from the lexicographically smallest, and measures.
 
     `vertex_keys` has the key of each vertex, of several at one place the least; None for a hull without keys.
@@ -349,7 +349,7 @@ class Tangents(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Snapshot(Value):
+class Snapshot(Value, Shown):
     """The whole hull. `uid` identifies it when a watch resumes.
 
     This and the other events have the cause of their revision, "batch", "expiry" or "recenter"; the hull's clock at
