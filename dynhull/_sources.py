@@ -25,12 +25,13 @@ def coordinates_of(source: Any, name: str) -> Any:
 
     * an object with `__geo_interface__`, such as shapely's geometries, or GeoJSON as a dictionary: every vertex once
     * a list, array or GeoSeries of such objects, or a GeoDataFrame
-    * a frame (pandas, polars, pyarrow): its two columns with names such as x and y, or lon and lat, in any order; the
-      two columns of a frame that has no others
+    * a frame (pandas, polars, pyarrow; polars' lazy frames and series of structs): its two columns with names such as
+      x and y, or lon and lat, in any order; the two columns of a frame that has no others
 
     Raises:
         ValueError: a geometry is missing or empty, or a frame has no or several such pairs of columns.
     """
+    source = _polars_frame(source)
     if isinstance(source, list | tuple) or (isinstance(source, np.ndarray) and source.ndim):
         return _of_geometries(source, name) if len(source) and is_geometry(source[0]) else source
     series: Any = getattr(source, "geometry", None) if is_geometry(source) else None
@@ -39,6 +40,17 @@ def coordinates_of(source: Any, name: str) -> Any:
     if hasattr(source, "columns"):
         return _of_frame(source, name)
     return list(_positions(geojson_of(source), name)) if is_geometry(source) else source
+
+
+def _polars_frame(source: Any) -> Any:
+    """A frame for what is one in polars by another name; anything else unchanged."""
+    polars = sys.modules.get("polars")
+    if polars is None:
+        return source
+    if isinstance(source, polars.LazyFrame):
+        return source.collect()
+    # numpy would take the fields of a struct by their place: latitude, longitude as x, y
+    return source.struct.unnest() if isinstance(source, polars.Series) and source.dtype == polars.Struct else source
 
 
 def is_geometry(value: Any) -> bool:

@@ -45,6 +45,8 @@ FEATURE = {"type": "Feature", "geometry": {"type": "MultiPoint", "coordinates": 
         pd.DataFrame(PAIRS),
         pd.DataFrame({"name": list("abcde"), "a": X, "b": Y})[["a", "b"]],
         polars.DataFrame({"y": [int(y) for y in Y], "x": X, "id": range(5)}),
+        polars.LazyFrame({"lat": Y, "lon": X, "id": range(5)}),
+        polars.DataFrame({"latitude": Y, "longitude": X}).to_struct("place"),
         pyarrow.table({"latitude": Y, "longitude": X, "id": range(5)}),
     ],
     ids=lambda source: type(source).__name__,
