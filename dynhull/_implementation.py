@@ -6,7 +6,9 @@ number of threads that one call of the kernel may use, by default one for each p
 
 import os
 from operator import index
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
+from warnings import warn
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,9 +53,21 @@ def _load() -> _Kernel | None:
     except ModuleNotFoundError:
         if wanted == "cpp":
             raise
+        _warn_of_the_reference()
         return None
     built.set_threads(threads)
     return built
+
+
+def _warn_of_the_reference() -> None:
+    """Nobody shall find out by waiting that the reference in Python answers."""
+    folder = Path(__file__).parents[1]
+    if (folder / "pyproject.toml").is_file():
+        why = f"it was imported from its source folder, {folder}: begin Python in another folder"
+    else:
+        why = "no C++ compiler was found when it was installed: install one, and dynhull again"
+    message = f"dynhull has no C++ kernel here, so that all takes many times longer: {why}"
+    warn(f"{message}. If this is meant, set DYNHULL_KERNEL=python", RuntimeWarning, stacklevel=1)
 
 
 def _threads() -> int:

@@ -4,6 +4,9 @@ import copy
 import pickle
 import subprocess
 import sys
+from os import pathsep
+from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 import numpy as np
 import pytest
@@ -65,6 +68,37 @@ def test_which_implementation():
         [sys.executable, "-c", "import dynhull"], env={"DYNHULL_KERNEL": "rust"}, capture_output=True, text=True
     )
     assert 'DYNHULL_KERNEL must be "cpp" or "python", got \'rust\'' in wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("folder", "more", "why"),
+    [
+        ("source", {}, "it was imported from its source folder, "),
+        ("copy", {}, "no C++ compiler was found when it was installed"),
+        ("source", {"DYNHULL_KERNEL": "python"}, None),
+    ],
+)
+def test_an_import_without_the_kernel_says_why(folder, more, why, tmp_path):
+    """-S: without the finder of an editable installation, which finds the kernel of the source folder."""
+    source = Path(__file__).parents[2]
+    if folder == "copy":
+        copytree(source / "dynhull", tmp_path / "dynhull", ignore=ignore_patterns("kernel", "*.so"))
+    paths = [str(tmp_path if folder == "copy" else source), str(Path(np.__file__).parents[1])]
+    run = subprocess.run(
+        [sys.executable, "-S", "-c", "import dynhull; print(dynhull.KERNEL)"],
+        env={"PYTHONPATH": pathsep.join(paths), **more},
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+    )
+    assert run.stdout == "python\n"
+    if why is None:
+        assert run.stderr == ""
+    else:
+        assert (
+            f"RuntimeWarning: dynhull has no C++ kernel here, so that all takes many times longer: {why}" in run.stderr
+        )
 
 
 @pytest.mark.parametrize("given", ["0", "65", "-1", "two", "1.5"])
