@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -268,6 +268,39 @@ def test_a_writer_sends_the_times_at_which_keys_leave(client: HullClient, name: 
         writer.flush()
     assert [each.result().revision for each in (leaving, staying)] == [1, 3], "that b leaves is a revision, too"
     assert list(client.entities(name).keys) == ["a", "c", "d"]
+
+
+@pytest.mark.parametrize("coalesce", [None, "last"])
+def test_a_writer_puts_new_keys_only_and_keys_that_leave_again(
+    client: HullClient, name: str, coalesce: Literal["last"] | None
+) -> None:
+    client.create_hull(name, keyed="str", max_age=timedelta(days=1), clock="data")
+    with client.writer(name, linger=60, coalesce=coalesce) as writer:
+        first = writer.put(keys=["a"], points=[[0, 0]], times=[NOON], only="absent")
+        second = writer.put(keys=["a"], points=[[9, 9]], times=[NOON], only="absent")
+        writer.put(keys=["b"], points=[[1, 1]], times=[NOON], ttl=1)
+        writer.put(keys=["c"], points=[[2, 2]], times=[NOON], ttl=timedelta(seconds=1))
+        known = writer.put(keys=["a", "x"], points=[[3, 3], [4, 4]], times=[NOON] * 2, only="present")
+        writer.put(keys=["d"], points=[[5, 5]], times=[NOON + timedelta(seconds=2)])
+        writer.flush()
+        assert [first.result().inserted, second.result().skipped] == [1, 1]
+        assert (known.result().moved, known.result().skipped) == (1, 1)
+        with pytest.raises(ValueError, match='only must be "absent" or "present"'):
+            writer.put(keys=["e"], points=[[0, 0]], only="new")
+        with pytest.raises(ValueError, match="are given with keys to put"):
+            writer.put(insert=[[0, 0]], ttl=1)
+    assert list(client.entities(name).keys) == ["a", "d"]
+
+
+def test_an_ingest_puts_new_keys_only_and_keys_that_leave_again(client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str", max_age=timedelta(days=1), clock="data")
+    with client.ingest(name) as stream:
+        stream.apply(keys=["a", "b"], points=[[0, 0], [1, 1]], times=[NOON] * 2, ttl=1)
+        stream.apply(keys=["b", "c"], points=[[2, 2], [3, 3]], times=[NOON] * 2, only="absent")
+        stream.apply(keys=["e"], points=[[4, 4]], times=[NOON], expire_times=[NOON + timedelta(seconds=3)])
+        stream.apply(keys=["d"], points=[[5, 5]], times=[NOON + timedelta(seconds=2)])
+    assert (stream.summary.inserted, stream.summary.skipped) == (5, 1)
+    assert list(client.entities(name).keys) == ["c", "d", "e"]
 
 
 def test_every_position_once_though_the_server_is_killed(tmp_path: Path, connect: type[HullClient]) -> None:

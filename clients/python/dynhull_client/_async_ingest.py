@@ -11,11 +11,13 @@ from ._ingest import Ingest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from datetime import timedelta
     from types import TracebackType
 
     import numpy.typing as npt
 
     from ._async_connection import AsyncConnection
+    from ._batch import Only
     from ._calls import Ingesting
     from ._messages import Ingested
 
@@ -49,10 +51,25 @@ class AsyncIngest:
         points: npt.ArrayLike | None = None,
         times: Any = None,
         remove: Any = None,
+        only: Only | None = None,
+        ttl: float | timedelta | None = None,
+        expire_times: Any = None,
     ) -> None:
         """Send a batch; arguments and errors as for `Ingest.apply`."""
         await self._in_thread(
-            partial(self._ingest.apply, insert, delete, move, keys=keys, points=points, times=times, remove=remove)
+            partial(
+                self._ingest.apply,
+                insert,
+                delete,
+                move,
+                keys=keys,
+                points=points,
+                times=times,
+                remove=remove,
+                only=only,
+                ttl=ttl,
+                expire_times=expire_times,
+            )
         )
 
     def __repr__(self) -> str:

@@ -18,6 +18,7 @@ from ._writer import CLOSED
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
+    from datetime import timedelta
     from types import TracebackType
 
     import numpy.typing as npt
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
     from ._async_connection import AsyncConnection
+    from ._batch import Only
     from ._gathering import Part
     from ._messages import Applied
     from ._window import Settled
@@ -66,6 +68,8 @@ class AsyncWriter:
         keys: Any = None,
         points: npt.ArrayLike | None = None,
         times: Any = None,
+        only: Only | None = None,
+        ttl: float | timedelta | None = None,
         expire_times: Any = None,
         sequence: int | None = None,
     ) -> asyncio.Future[Applied]:
@@ -75,7 +79,9 @@ class AsyncWriter:
         """
         writing = self._writing
         coalesce = writing.coalesce == "last"
-        parts = put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
+        parts = put_parts(
+            insert, delete, move, keys, points, times, only, ttl, expire_times, writing.missing, coalesce=coalesce
+        )
         return await self._add(parts, sequence)
 
     async def remove(self, keys: Any, *, sequence: int | None = None) -> asyncio.Future[Applied]:

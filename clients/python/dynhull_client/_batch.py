@@ -170,7 +170,7 @@ def join_batches(batches: Sequence[batch_pb2.Batch]) -> batch_pb2.Batch:
     """
     if len(batches) == 1:
         return batches[0]
-    joined = batch_pb2.Batch(missing_points=batches[0].missing_points, missing_keys=batches[0].missing_keys)
+    joined = batch_pb2.Batch()
     _concatenate(joined, batches)
     return joined
 
@@ -189,7 +189,10 @@ def keep_last_rows(batch: batch_pb2.Batch) -> None:
 
 
 def _concatenate(whole: Message, pieces: Sequence[Message]) -> None:
-    """Set the bytes in a message and its parts to those of all the pieces, one after the other."""
+    """Set the bytes in a message and its parts to those of all the pieces, one after the other.
+
+    Anything else is the same in all pieces that have it.
+    """
     parts: dict[str, list[Any]] = {}
     for piece in pieces:
         for field, value in piece.ListFields():
@@ -198,4 +201,8 @@ def _concatenate(whole: Message, pieces: Sequence[Message]) -> None:
         if isinstance(values[0], bytes):
             setattr(whole, name, b"".join(values))
         elif isinstance(values[0], Message):
-            _concatenate(getattr(whole, name), values)
+            part = getattr(whole, name)
+            part.SetInParent()  # though nothing may be in it
+            _concatenate(part, values)
+        else:
+            setattr(whole, name, values[0])

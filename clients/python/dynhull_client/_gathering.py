@@ -13,15 +13,18 @@ from ._times import as_microseconds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from datetime import timedelta
 
     import numpy.typing as npt
 
     from dynhull_proto.v1 import batch_pb2
 
-    from ._batch import Missing
+    from ._batch import Missing, Only
 
 Key = str | int
 UNTIMED = 0
+Conditions = tuple["Only | None", "float | timedelta | None", bool]
+"""What all keys that a batch puts have in common."""
 
 
 @dataclass(slots=True)
@@ -33,7 +36,7 @@ class Part:
         rows: their number.
         latest: the last time of each key that is put, UNTIMED without times; None for a key that is removed.
         timed: whether the rows to put or insert have times; None if there are none.
-        expiring: whether the keys to put have times at which they leave; None if there are none.
+        conditions: `only`, `ttl` and whether there are times at which keys leave; None if no keys are put.
         kind: str or int for such keys, None for points without keys.
     """
 
@@ -41,7 +44,7 @@ class Part:
     rows: int
     latest: dict[Key, int | None] = field(default_factory=dict)
     timed: bool | None = None
-    expiring: bool | None = None
+    conditions: Conditions | None = None
     kind: type[Key] | None = None
 
 
@@ -52,6 +55,8 @@ def put_parts(
     keys: Any,
     points: npt.ArrayLike | None,
     times: Any,
+    only: Only | None,
+    ttl: float | timedelta | None,
     expire_times: Any,
     missing: Missing | None,
     *,
@@ -69,11 +74,13 @@ def put_parts(
             insert=insert,
             delete=delete,
             move=move,
+            only=only,
+            ttl=ttl,
             expire_times=expire_times,
             missing=missing,
         )
         return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
-    options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move}
+    options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move, "only": only, "ttl": ttl}
     checked, xy = checked_keys(keys), as_points(points, "points")
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")
@@ -81,15 +88,15 @@ def put_parts(
     whole = Batch(**options, **columns)
     names = plain_keys(checked)
     stamps = [UNTIMED] * len(names) if micros is None else micros.tolist()
+    conditions: Conditions = only, ttl, ends is not None
     parts = []
-    for rows in _runs(names, stamps, coalesce):
+    for rows in _runs(names, stamps, coalesce and only != "absent"):
         batch = whole
         if rows.stop - rows.start < len(names):
             of_rows = {name: None if each is None else each[rows] for name, each in columns.items()}
             batch = Batch(**options, **of_rows)
         latest: dict[Key, int | None] = dict(zip(names[rows], stamps[rows], strict=True))
-        timed, expiring = micros is not None, ends is not None
-        parts.append(Part(batch.message, rows.stop - rows.start, latest, timed, expiring, _kind(names)))
+        parts.append(Part(batch.message, rows.stop - rows.start, latest, micros is not None, conditions, _kind(names)))
     return parts
 
 
@@ -119,7 +126,7 @@ class Gathering:
         rows: the number of their rows.
     """
 
-    __slots__ = ("_coalesce", "_expiring", "_kind", "_latest", "_messages", "_timed", "rows")
+    __slots__ = ("_coalesce", "_conditions", "_kind", "_latest", "_messages", "_timed", "rows")
 
     def __init__(self, part: Part, *, coalesce: bool) -> None:
         self.rows = part.rows
@@ -127,18 +134,20 @@ class Gathering:
         self._messages = [part.message]
         self._latest = part.latest
         self._timed = part.timed
-        self._expiring = part.expiring
+        self._conditions = part.conditions
         self._kind = part.kind
 
     def admits(self, part: Part) -> bool:
         """Whether the part may go into the same batch."""
         if part.kind is not self._kind:  # the server refuses one of them, for the hull has one kind
             return False
-        if _differ(self._timed, part.timed) or _differ(self._expiring, part.expiring):
+        if _differ(self._timed, part.timed) or _differ(self._conditions, part.conditions):
             return False
         if self._latest.keys().isdisjoint(part.latest):
             return True
-        return all(_coalesces(self._latest, key, stamp, self._coalesce) for key, stamp in part.latest.items())
+        # Of new keys only, the first position is the one that counts.
+        coalesce = self._coalesce and (part.conditions is None or part.conditions[0] != "absent")
+        return all(_coalesces(self._latest, key, stamp, coalesce) for key, stamp in part.latest.items())
 
     def add(self, part: Part) -> None:
         """Add a part."""
@@ -146,7 +155,7 @@ class Gathering:
         self._latest.update(part.latest)
         self.rows += part.rows
         self._timed = part.timed if self._timed is None else self._timed
-        self._expiring = part.expiring if self._expiring is None else self._expiring
+        self._conditions = part.conditions if self._conditions is None else self._conditions
 
     def joined(self) -> batch_pb2.Batch:
         """The parts as one batch."""
@@ -160,7 +169,7 @@ def _kind(names: Sequence[Key]) -> type[Key] | None:
     return type(names[0]) if names else None
 
 
-def _differ(one: bool | None, other: bool | None) -> bool:
+def _differ(one: bool | Conditions | None, other: bool | Conditions | None) -> bool:
     return one is not None and other is not None and one != other
 
 

@@ -13,12 +13,14 @@ from ._messages import Ingested, decode_ingested
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from datetime import timedelta
     from types import TracebackType
 
     import numpy.typing as npt
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
+    from ._batch import Only
     from ._calls import Ingesting
     from ._connection import BlockingConnection
 
@@ -82,6 +84,9 @@ class Ingest:
         points: npt.ArrayLike | None = None,
         times: Any = None,
         remove: Any = None,
+        only: Only | None = None,
+        ttl: float | timedelta | None = None,
+        expire_times: Any = None,
     ) -> None:
         """Send a batch; arguments as for `HullClient.apply` or, in a keyed hull, `HullClient.put`.
 
@@ -92,7 +97,16 @@ class Ingest:
         """
         self._home.require()
         request = self._ingesting.batch(
-            insert=insert, delete=delete, move=move, keys=keys, points=points, times=times, remove=remove
+            insert=insert,
+            delete=delete,
+            move=move,
+            keys=keys,
+            points=points,
+            times=times,
+            remove=remove,
+            only=only,
+            ttl=ttl,
+            expire_times=expire_times,
         )
         if self._call is None:
             raise RuntimeError("an Ingest works only inside its context: write `with client.ingest(...) as stream:`")

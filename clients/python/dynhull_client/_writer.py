@@ -19,12 +19,14 @@ from ._window import Window
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Future
+    from datetime import timedelta
     from types import TracebackType
 
     import numpy.typing as npt
 
     from dynhull_proto.v1 import hull_service_pb2 as pb
 
+    from ._batch import Only
     from ._connection import BlockingConnection
     from ._gathering import Part
     from ._messages import Applied
@@ -80,6 +82,8 @@ class Writer:
         keys: Any = None,
         points: npt.ArrayLike | None = None,
         times: Any = None,
+        only: Only | None = None,
+        ttl: float | timedelta | None = None,
         expire_times: Any = None,
         sequence: int | None = None,
     ) -> Future[Applied]:
@@ -96,7 +100,7 @@ class Writer:
             keys: n keys to put, in a keyed hull; as for `HullClient.put`.
             points: (n, 2) positions of the keys.
             times: (n,) event times of the keys or of the points to insert.
-            expire_times: (n,) the times at which the keys leave; as for `HullClient.put`.
+            only, ttl, expire_times: as for `HullClient.put`.
             sequence: with `may_skip`, the number of these changes, greater than all before; without it, None.
 
         Returns:
@@ -111,7 +115,9 @@ class Writer:
         """
         writing = self._writing
         coalesce = writing.coalesce == "last"
-        parts = put_parts(insert, delete, move, keys, points, times, expire_times, writing.missing, coalesce=coalesce)
+        parts = put_parts(
+            insert, delete, move, keys, points, times, only, ttl, expire_times, writing.missing, coalesce=coalesce
+        )
         return self._add(parts, sequence)
 
     def remove(self, keys: Any, *, sequence: int | None = None) -> Future[Applied]:
