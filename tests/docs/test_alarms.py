@@ -16,7 +16,7 @@ from ports import free_port
 from server_process import server_process
 
 BEFORE = """\
-dynhull create vehicles --keyed str
+dynhull create vehicles --keyed str --geographic
 dynhull put vehicles truck-7 13.4 52.5
 dynhull fences create depot --polygon 'POLYGON ((13 52, 14 52, 14 53, 13 53, 13 52))' --subjects vehicles
 dynhull put vehicles truck-7 11.6 48.1
