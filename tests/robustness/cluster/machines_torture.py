@@ -9,8 +9,7 @@ network to it those of postgres_torture.py. The other faults:
 * a gateway is killed
 * a machine with its worker and its gateway is killed, or stopped as an operator does it, and started again
 * a machine is started again as another user, who sees no processes of others
-* the database is copied while it serves, and a server begins on the copy: nothing of that arrives
-* partitions are moved by hand; or are to be moved when the worker that has one, or is to have it, is killed or stopped,
+* partitions are to be moved when the worker that has one, or is to have it, is killed or stopped,
   or PostgreSQL is killed
 
 Between machines, and to callers, there is TLS.
@@ -20,32 +19,25 @@ import argparse
 import os
 import signal
 import sys
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
 import grpc
 import trustme
-from psycopg.conninfo import conninfo_to_dict
-
-from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 
 sys.path.append(str(Path(__file__).parent))
 import postgres_torture
-import torture
-from actors import persist
 from blind import blind, may_blind
 from cluster import processes
 from pacing import pause
 from patience import PATIENCE, wait_until
-from postgresql import postgresql, query
+from postgresql import query
 from promises import require
-from server_process import run as run_command
-from tortured import Server, killed_at_the_end
+from small_disk import arguments, on_small_disk
+from tortured import Server
 
 PARTITIONS = 4
 OPTIONS = ("--cluster", "--partitions", str(PARTITIONS), "--grace", "10")
@@ -59,11 +51,14 @@ class Torture(postgres_torture.Torture):
 
     def __init__(self, folder: Path, seed: int, breath: float) -> None:
         self._other: Server | None = None
-        self._given = (*OPTIONS, *certified(folder))
+        options = (*OPTIONS, *certified(folder))
         tls = grpc.ssl_channel_credentials((folder / "ca.pem").read_bytes())
-        super().__init__(folder, seed, breath, self._given, tls)
-        self._other = Server(folder, self._given, self._journal)
+        super().__init__(folder, seed, breath, options, tls)
+        self._other = Server(folder, self._options, self._journal)
         self._other.start()
+        for machine in self._machines():
+            self.readers.append(self._new_reader(machine.address))
+            self.readers[-1].start()
         self._balanced()
 
     def _machines(self) -> list[Server]:
@@ -108,12 +103,11 @@ class Torture(postgres_torture.Torture):
         require("taken over partition" in self.server.said(), self.server.said())
 
     def _workers(self) -> set[int]:
-        return {
-            number
-            for machine in self._machines()
-            for name, number in processes(machine.process.pid).items()
-            if name.startswith("worker")
-        }
+        return {worker for machine in self._machines() for worker in self._workers_of(machine)}
+
+    def _workers_of(self, machine: Server) -> set[int]:
+        found = processes(machine.process.pid)
+        return {number for name, number in found.items() if name.startswith("worker")}
 
     def _kill_machine(self) -> None:
         """The machine of the clients, or the other one, and its start later on."""
@@ -125,25 +119,18 @@ class Torture(postgres_torture.Torture):
         self._other.start()
 
     def _hidden(self) -> None:
-        """The machine of the clients is of another user than the other one, which sees no processes of others."""
+        """The machine of the clients is of another user than the other one, which sees no processes of others.
+
+        So it cannot know that the workers of the first one live; who takes their partitions over ends them.
+        """
+        self._balanced()
         self._turn()
         self._other.kill()
         self._begins()
+        there = self._workers_of(self.server)
         self._other.start(blind() if may_blind() else ())
         self._balanced()
-
-    def _copy(self) -> None:
-        """A server on a physical copy of the database: what it acknowledges never arrives here."""
-        database = conninfo_to_dict(self._url)["dbname"]
-        request = pb.ApplyRequest(name=torture.HULL)
-        request.batch.inserts.coordinates.extend([0.5, 0.5])
-        with postgresql(copied=self._database) as copied, tempfile.TemporaryDirectory() as folder:
-            beside = Server(Path(folder), self._given, copied.url(database))
-            beside.start()
-            with killed_at_the_end(beside), self.shared.channel(beside.address) as channel:
-                stub = HullServiceStub(channel)
-                counts = [persist(stub.Apply, request).result.point_count for _ in range(8)]
-            require(counts == list(range(counts[0], counts[0] + 8)), f"the points of the copy: {counts}")
+        require(self._workers_of(self.server) == there, f"living workers were taken for dead: {self.server.said()}")
 
     def _stop_machine(self) -> None:
         """As systemd does it: its partitions move first."""
@@ -151,21 +138,10 @@ class Torture(postgres_torture.Torture):
         require(self._other.process.wait(PATIENCE) == 0, self._other.said())
         self._other.start()
 
-    def _move(self) -> None:
-        """Every partition to one worker, and then anywhere."""
-        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
-        pause(self._random.uniform(0.2, 2.0))
-        self._order("anywhere")
-
-    def _order(self, worker: str) -> None:
-        """Have every partition moved to one worker, or anywhere."""
-        for partition in range(PARTITIONS):
-            self._command("cluster", "move", str(partition), worker, "--journal", self._url)
-
     def _kill_in_move(self) -> None:
         """One of the two workers of a move is killed, at any moment."""
         self._balanced()
-        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
+        self._order(self._any_worker())
         pause(self._random.uniform(0.0, 0.6))
         with suppress(ProcessLookupError):
             os.kill(self._one_of("worker"), signal.SIGKILL)
@@ -174,7 +150,7 @@ class Torture(postgres_torture.Torture):
     def _crash_in_move(self) -> None:
         """PostgreSQL is killed, at any moment of a move."""
         self._balanced()
-        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
+        self._order(self._any_worker())
         pause(self._random.uniform(0.0, 0.6))
         self._crash()
         self._order("anywhere")
@@ -182,7 +158,7 @@ class Torture(postgres_torture.Torture):
     def _stop_in_move(self) -> None:
         """One of the two is stopped for a while, at any moment, and goes on before it is replaced, or after."""
         self._balanced()
-        self._order(self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0])
+        self._order(self._any_worker())
         pause(self._random.uniform(0.0, 0.6))
         worker = self._one_of("worker")
         with suppress(ProcessLookupError):
@@ -190,11 +166,6 @@ class Torture(postgres_torture.Torture):
             pause(self._random.uniform(0.1, 6.0))
             os.kill(worker, signal.SIGCONT)
         self._order("anywhere")
-
-    def _command(self, *words: str) -> None:
-        done = run_command(*words)
-        named = "no worker of the cluster has this name" in done.stderr  # it has ended meanwhile
-        require(done.returncode == 0 or named, f"dynhull {' '.join(words)}: {done.stderr}")
 
     def finish(self) -> None:
         self.shared.over.set()
@@ -242,15 +213,13 @@ def certified(folder: Path) -> tuple[str, ...]:
 def run(folder: Path, options: argparse.Namespace) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
     tortured = Torture(folder, options.seed, options.breath)
-    tortured.rounds(options.kinds, options.faults, record=options.record)
+    tortured.rounds(options.kinds or KINDS, options.faults, record=options.record)
     return tortured.counts()
 
 
 def main() -> None:
-    parser = torture.arguments("Kill, stop and cut off the machines of a cluster while a model watches.")
-    parser.add_argument("--kinds", nargs="+", choices=sorted({*KINDS}), default=KINDS, help="which (default: all)")
-    options = parser.parse_args()
-    torture.on_small_disk(__file__, postgres_torture.DISK, lambda folder: run(folder, options), mounted=options.mounted)
+    options = arguments("Kill, stop and cut off the machines of a cluster while a model watches.", KINDS).parse_args()
+    on_small_disk(__file__, postgres_torture.DISK, lambda folder: run(folder, options), mounted=options.mounted)
 
 
 if __name__ == "__main__":

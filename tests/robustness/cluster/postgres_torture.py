@@ -8,12 +8,16 @@ The clients and the models are those of tests/robustness/server/torture.py, and 
 * the server is stopped until another one has taken over, and then goes on: it must end, and tell its callers
 * PostgreSQL ends the connections of the server; is killed and started again; is stopped for a while; has no room
 * the network between the two is cut; or passes nothing on for a while
+* the database is copied while it is served, and a server begins on the copy: it has what was acknowledged, and nothing
+  of what it takes arrives
+* the partitions of several workers are moved by hand
 """
 
 import argparse
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -21,19 +25,39 @@ from pathlib import Path
 import grpc
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
 sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 import torture
+from actors import persist
 from pacing import pause
 from patience import PATIENCE
-from postgresql import FAST, PostgreSQL, query
+from postgresql import FAST, PostgreSQL, postgresql, query
 from promises import require
 from proxy import Proxy
-from tortured import Server
+from server_process import run as run_command
+from small_disk import arguments, on_small_disk
+from tortured import Server, killed_at_the_end
 
 DISK = "256m"
 # So that a disk of that size can be full, and yet have room for the log.
 SMALL = (*FAST, "max_wal_size=64MB", "min_wal_size=32MB")
+KINDS = ["zombie", "crash", "terminate", "cut", "kill", "hold", "replace", "freeze", "terminate", "full_disk", "copy"]
+OF_WORKERS = [
+    "kill_worker",
+    "crash",
+    "pause_worker",
+    "terminate",
+    "restart",
+    "cut",
+    "move",
+    "replace",
+    "freeze",
+    "copy",
+    "full_disk",
+]
 ENDED = 70  # the exit code of a server that cannot go on
 
 
@@ -58,7 +82,6 @@ class Torture(torture.Torture):
         host, _, port = self._wire.address.partition(":")
         given = conninfo_to_dict(self._url)
         self._journal = make_conninfo(dbname=given["dbname"], user=given["user"], host=host, port=port)
-        self._options = options
         super().__init__(folder, seed, breath, options, self._journal, tls)
 
     def _socket(self) -> str:
@@ -130,6 +153,23 @@ class Torture(torture.Torture):
             self._wire.cut()
         self._wire.flowing.set()
 
+    def _copy(self) -> None:
+        """A server on a physical copy of the database has what was acknowledged; what it takes never arrives here."""
+        database = conninfo_to_dict(self._url)["dbname"]
+        acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
+        request = pb.ApplyRequest(name=torture.HULL)
+        request.batch.inserts.coordinates.extend([0.5, 0.5])
+        with postgresql(copied=self._database) as copied, tempfile.TemporaryDirectory() as folder:
+            beside = Server(Path(folder), self._options, copied.url(database))
+            beside.start()
+            with killed_at_the_end(beside), self.shared.channel(beside.address) as channel:
+                stub = HullServiceStub(channel)
+                for hull in {hull for writer in self.writers for hull in writer.hulls}:
+                    persist(stub.GetHull, pb.GetHullRequest(name=hull))  # its worker may still take it
+                self._check_copied(stub, acknowledged, beside)
+                counts = [persist(stub.Apply, request).result.point_count for _ in range(8)]
+            require(counts == list(range(counts[0], counts[0] + 8)), f"the points of the copy: {counts}")
+
     def _full_disk(self) -> None:
         """The disk of PostgreSQL is full, which ends it if its log has no room; then there is room again."""
         ballast = self._folder / "ballast"
@@ -141,6 +181,25 @@ class Torture(torture.Torture):
         if not self._database.runs():
             self._database.start()
 
+    def _move(self) -> None:
+        """Every partition to one worker, and then anywhere."""
+        self._order(self._any_worker())
+        pause(self._random.uniform(0.2, 2.0))
+        self._order("anywhere")
+
+    def _any_worker(self) -> str:
+        return self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0]
+
+    def _order(self, worker: str) -> None:
+        """Have every partition moved to one worker, or anywhere."""
+        for (partition,) in query(self._url, "SELECT partition FROM owners ORDER BY partition"):
+            self._command("cluster", "move", str(partition), worker, "--journal", self._url)
+
+    def _command(self, *words: str) -> None:
+        done = run_command(*words)
+        named = "no worker of the cluster has this name" in done.stderr  # it has ended meanwhile
+        require(done.returncode == 0 or named, f"dynhull {' '.join(words)}: {done.stderr}")
+
     def finish(self) -> None:
         super().finish()
         self._wire.close()
@@ -149,28 +208,15 @@ class Torture(torture.Torture):
 
 def run(folder: Path, options: argparse.Namespace) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
-    kinds = ["zombie", "crash", "terminate", "cut", "kill", "hold", "replace", "freeze", "terminate", "full_disk"]
-    if options.workers:
-        kinds = [
-            "kill_worker",
-            "crash",
-            "pause_worker",
-            "terminate",
-            "restart",
-            "cut",
-            "replace",
-            "freeze",
-            "full_disk",
-        ]
     tortured = Torture(folder, options.seed, options.breath, torture.WORKERS if options.workers else ())
-    tortured.rounds(kinds, options.faults, record=options.record)
+    tortured.rounds(options.kinds or (OF_WORKERS if options.workers else KINDS), options.faults, record=options.record)
     return tortured.counts()
 
 
 def main() -> None:
     description = "Kill, stop and cut off a server and its PostgreSQL while a model watches."
-    options = torture.arguments(description).parse_args()
-    torture.on_small_disk(__file__, DISK, lambda folder: run(folder, options), mounted=options.mounted)
+    options = arguments(description, KINDS, OF_WORKERS).parse_args()
+    on_small_disk(__file__, DISK, lambda folder: run(folder, options), mounted=options.mounted)
 
 
 if __name__ == "__main__":

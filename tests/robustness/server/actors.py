@@ -45,8 +45,8 @@ class Shared:
     over: threading.Event = field(default_factory=threading.Event)
     failures: list[BaseException] = field(default_factory=list)
 
-    def stub(self) -> tuple[grpc.Channel, HullServiceStub]:
-        channel = self.channel(self.target)
+    def stub(self, target: str = "") -> tuple[grpc.Channel, HullServiceStub]:
+        channel = self.channel(target or self.target)
         return channel, HullServiceStub(channel)
 
     def channel(self, target: str) -> grpc.Channel:
@@ -62,14 +62,15 @@ class Shared:
 
 
 class Actor(threading.Thread):
-    """Repeats one action; a transient failure makes it start again."""
+    """Repeats one action, on the server of all or the one at `target`; a transient failure makes it start again."""
 
-    def __init__(self, shared: Shared, name: str) -> None:
+    def __init__(self, shared: Shared, name: str, target: str = "") -> None:
         super().__init__(name=name, daemon=True)
         self.shared = shared
+        self._target = target
 
     def run(self) -> None:
-        channel, stub = self.shared.stub()
+        channel, stub = self.shared.stub(self._target)
         with channel:
             while not self.shared.over.is_set():
                 try:
@@ -225,19 +226,26 @@ class PointWriter(Streamer):
 
 
 class Reader(Actor):
-    """Never sees a revision below one it has seen."""
+    """Never sees a revision below one it has seen, nor one below what was `acknowledged` before it asked."""
 
     seen = 0
     reads = 0
 
-    def __init__(self, shared: Shared, hull: str) -> None:
-        super().__init__(shared, f"reader of {hull}")
+    def __init__(
+        self, shared: Shared, hull: str, acknowledged: Callable[[], int] = lambda: 0, target: str = ""
+    ) -> None:
+        super().__init__(shared, f"reader of {hull}" + (target and f" at {target}"), target)
         self._hull = hull
+        self._acknowledged = acknowledged
 
     def act(self, stub: HullServiceStub) -> None:
         while not self.shared.over.is_set():
+            acknowledged = self._acknowledged()
             revision = self.read(stub)
             require(revision >= self.seen, f"{self.name}: revision {revision} after {self.seen}")
+            require(
+                revision >= acknowledged, f"{self.name}: stale: revision {revision}, {acknowledged} was acknowledged"
+            )
             self.seen = revision
             self.reads += 1
             pause(2 * self.shared.breath)

@@ -11,7 +11,7 @@ keys between two hulls. After every fault models check each promise of docs/guar
 * keys, positions, times, vertices and their names are those of the model at the hull's clock: no point has left early,
   and none is late
 * the clock of a hull never goes back, and is that of the data, or not ahead of the time
-* no reader ever sees a revision below one it has seen
+* no reader ever sees a revision below one it has seen, or below what was acknowledged before it asked
 * a watcher's copy is the exact hull, with the names of its vertices, at the revision and clock of each event
 * the hull is the one that a static algorithm finds, here and in the server
 * callers that cancel a call, and a server that is out of file descriptors, change nothing of this
@@ -30,7 +30,6 @@ import random
 import resource
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -49,7 +48,6 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 import wall_clock
 from actors import (
-    BREATH,
     Leaver,
     PointWriter,
     Reader,
@@ -66,6 +64,7 @@ from promises import require
 from proxy import Proxy
 from record import recorded
 from server_process import run
+from small_disk import arguments, on_small_disk
 from timed import ModelledHull, Shuttle, TimedWriter, wall
 from timeline import FLEETS, SECOND, TIMED
 from tortured import Server, killed_at_the_end
@@ -75,6 +74,19 @@ POINT_WRITERS = 2
 WORKERS = ("--workers", "2", "--gateways", "2")
 DISK = "64m"
 PAGE_BYTES = 8192  # of the database
+CLOCK_BACK = "clock_back" if shutil.which("faketime") else "kill"
+KINDS = ["kill", CLOCK_BACK, "descriptors", "damage", "kill", "full_disk", "pause", "copy", "restore", "sever"]
+OF_WORKERS = [
+    "kill_worker",
+    "kill_gateway",
+    "restart",
+    "kill_worker",
+    "pause_worker",
+    "full_disk",
+    "copy",
+    "sever",
+    "restore",
+]
 ON_ITS_WAY = 0.1  # seconds in which answers of a server that has been killed may still arrive
 
 
@@ -93,6 +105,7 @@ class Torture:
         tls: grpc.ChannelCredentials | None = None,
     ) -> None:
         self._folder = folder
+        self._options = options
         self._seed, self._random = seed, random.Random(seed)
         self.server = Server(folder, options, journal)
         self.server.start()
@@ -113,7 +126,7 @@ class Torture:
         self.hulls += [ModelledHull(self.shared, kind, shuttles) for kind in FLEETS]
         self.writers = [*points, *timed, *shuttles]
         self._point_writers, self._timed_writers = points, timed
-        self.readers = [Reader(self.shared, HULL), TogetherReader(self.shared, shuttles[0].hulls)]
+        self.readers = [self._new_reader(), TogetherReader(self.shared, shuttles[0].hulls)]
         self._copies = [Watcher(self.shared, f"watcher-{i}", HULL) for i in range(2)]
         self.watchers = [*self._copies, *(hull.watcher for hull in self.hulls)]
         self.leavers = [Leaver(self.shared, f"leaver-{i}", HULL, seed + i) for i in range(2)]
@@ -124,6 +137,9 @@ class Torture:
         for actor in (*self.writers, *self.readers, *self.watchers, *self.leavers):
             actor.start()
         self.shared.gate.set()
+
+    def _new_reader(self, target: str = "") -> Reader:
+        return Reader(self.shared, HULL, lambda: sum(writer.acknowledged for writer in self._point_writers), target)
 
     def round(self, fault: str) -> None:
         """Traffic, a fault during it, the checks that must hold at once, and those that must hold at rest."""
@@ -246,14 +262,14 @@ class Torture:
         """A backup of the running server, and a restore of a killed one's folder: both are served, and are right."""
         acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
         with tempfile.TemporaryDirectory() as folder:
-            copied = Server(Path(folder))
+            copied = Server(Path(folder), self._options)
             self._command("backup", str(copied.data), "--data", str(self.server.data))
             self.shared.gate.clear()
             self._check_copy(copied, acknowledged)
         self.server.kill()
         acknowledged = {writer.name: writer.acknowledged for writer in self.writers}
         with tempfile.TemporaryDirectory() as folder:
-            restored = Server(Path(folder))
+            restored = Server(Path(folder), self._options)
             self._command("restore", str(self.server.data), "--data", str(restored.data))
             self._proxy.cut()
             self._start()
@@ -299,7 +315,10 @@ class Torture:
     def _check_copy(self, copied: Server, acknowledged: dict[str, int]) -> None:
         copied.start()
         with killed_at_the_end(copied), grpc.insecure_channel(copied.address) as channel:
-            last = self._check_damaged(HullServiceStub(channel), acknowledged, copied, "a copy")
+            self._check_copied(HullServiceStub(channel), acknowledged, copied)
+
+    def _check_copied(self, stub: HullServiceStub, acknowledged: dict[str, int], copied: Server) -> None:
+        last = self._check_damaged(stub, acknowledged, copied, "a copy")
         for name, count in acknowledged.items():
             require(last[name] >= count, f"{name}: of {count} batches acknowledged the copy has {last[name]}")
 
@@ -420,7 +439,7 @@ class Torture:
         kinds = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in sorted(self.faults.items()))
         return (
             f"faults: {kinds}; batches acknowledged: {acknowledged}, lost: 0, doubled: 0; "
-            f"reads: {sum(reader.reads for reader in self.readers)}, revisions back: 0; "
+            f"reads: {sum(reader.reads for reader in self.readers)}, revisions back: 0, stale: 0; "
             f"watch events after a resume: {sum(watcher.resumed for watcher in self.watchers)}; "
             f"calls left: {sum(leaver.left for leaver in self.leavers)}"
         )
@@ -446,60 +465,18 @@ class Torture:
 
 def torture(folder: Path, options: argparse.Namespace) -> str:
     """Run `faults` rounds. Returns the counts; raises BrokenPromiseError with the broken promise."""
-    clock_back = "clock_back" if shutil.which("faketime") else "kill"
-    kinds = ["kill", clock_back, "descriptors", "damage", "kill", "full_disk", "pause", "copy", "restore", "sever"]
-    if options.workers:
-        kinds = [
-            "kill_worker",
-            "kill_gateway",
-            "restart",
-            "kill_worker",
-            "pause_worker",
-            "full_disk",
-            "sever",
-            "restore",
-        ]
     run = Torture(folder, options.seed, options.breath, options=WORKERS if options.workers else ())
-    run.rounds(kinds, options.faults, record=options.record)
+    run.rounds(options.kinds or (OF_WORKERS if options.workers else KINDS), options.faults, record=options.record)
     damage = (
         f"with a bit changed: {run.damage['refused']} refused to start, {run.damage['served']} served what is right"
     )
     return f"{run.counts()}; {damage}"
 
 
-def arguments(description: str) -> argparse.ArgumentParser:
-    """The command line of a torture."""
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--faults", type=int, default=50, help="how many (default 50)")
-    parser.add_argument("--seed", type=int, default=0, help="what the faults and the batches depend on (default 0)")
-    parser.add_argument(
-        "--breath", type=float, default=BREATH, help=f"seconds between the calls of a client (default {BREATH})"
-    )
-    parser.add_argument("--workers", action="store_true", help="a server of two gateways and two workers")
-    parser.add_argument("--record", action="store_true", help="append the run to build/torture/COMMIT.jsonl")
-    parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
-    return parser
-
-
-def on_small_disk(file: str, size: str, work: Callable[[Path], str], *, mounted: bool) -> None:
-    """Print what some work on a small disk of its own returns; unless `mounted`, by another run of the file."""
-    if not mounted:
-        unshare = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--mount", "--map-root-user"]
-        command = [*unshare, sys.executable, file, "--mounted", *sys.argv[1:]]
-        sys.exit(subprocess.run(command, check=False).returncode)
-    with tempfile.TemporaryDirectory() as folder:
-        subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "none", folder], check=True)
-        try:
-            print("\n" + work(Path(folder)))
-        except BaseException:
-            print((Path(folder) / "server.log").read_text(), file=sys.stderr)
-            raise
-        finally:
-            subprocess.run(["umount", "--lazy", folder], check=True)
-
-
 def main() -> None:
-    options = arguments("Kill, pause, cut off and starve a server while a model watches.").parse_args()
+    options = arguments(
+        "Kill, pause, cut off and starve a server while a model watches.", KINDS, OF_WORKERS
+    ).parse_args()
     on_small_disk(__file__, DISK, lambda folder: torture(folder, options), mounted=options.mounted)
 
 
