@@ -8,9 +8,8 @@ from google.rpc.status_pb2 import Status
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.methods import DESCRIPTOR, FENCES, FINISHED
+from dynhull_surface.reasons import NOT_BEGUN
 
-# Refusals of a server that has not begun to do what was asked.
-NOT_BEGUN = {"STARTING", "DRAINING"}
 LISTS = {"ListHulls", "ListFences"}
 READS = {
     f"/{service.full_name}/{method.name}"

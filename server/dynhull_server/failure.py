@@ -5,21 +5,20 @@ from typing import NoReturn
 
 import typer
 
+from dynhull_surface.reasons import Exit
+
 from .storage.port import DamagedError
 
-FAILED = 1
-UNUSABLE = 2
 
-
-def fail(message: str, code: int = UNUSABLE) -> NoReturn:
+def fail(message: str, code: int = Exit.UNUSABLE) -> NoReturn:
     """Print an error and end the command."""
     typer.echo(f"error: {message}", err=True)
     sys.exit(code)
 
 
-def code_of(error: Exception) -> int:
+def code_of(error: Exception) -> Exit:
     """The exit code after an error: damaged data is a result, anything else makes the command unusable."""
-    return FAILED if isinstance(error, DamagedError) else UNUSABLE
+    return Exit.FAILED if isinstance(error, DamagedError) else Exit.UNUSABLE
 
 
 def text_of(error: Exception) -> str:

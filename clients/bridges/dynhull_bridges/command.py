@@ -8,11 +8,11 @@ import typer
 
 from dynhull_cli.connected import AsJson, Connect, connecting, fail
 from dynhull_cli.durations import more_than_0
-from dynhull_cli.exits import Exit
 from dynhull_cli.groups import beside, group
 from dynhull_cli.json_lines import json_line
 from dynhull_cli.listing import listed
 from dynhull_cli.tab_lines import tab_line
+from dynhull_surface.reasons import Exit
 
 
 class LogForm(StrEnum):

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from .exits import Exit
+from dynhull_surface.reasons import Exit
 
 
 class _Output(io.FileIO):

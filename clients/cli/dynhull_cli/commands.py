@@ -17,7 +17,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from .exits import Exit
+from dynhull_surface.reasons import Exit
+
 from .groups import Group
 
 GROUP = "dynhull.commands"
@@ -230,19 +231,20 @@ app = typer.Typer(
 )
 
 
-@app.callback(context_settings={"help_option_names": ["-h", "--help"]})
+HELP = f"""Exact convex hulls of points that are inserted, moved and deleted.
+
+Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, and a token from --token or
+DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
+
+Exit codes: {", ".join(f"{code.value} {code.meaning}" for code in Exit)}. `serve`, `gateway`,
+`dashboard`, `ingest` and `relay` end with 0 when they are interrupted, because that is how they are ended.
+"""
+
+
+@app.callback(context_settings={"help_option_names": ["-h", "--help"]}, help=HELP)
 def options(
     _: Annotated[
         bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_show_version)
     ] = False,
 ) -> None:
-    """Exact convex hulls of points that are inserted, moved and deleted.
-
-    Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, and a token from --token or
-    DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
-
-    Exit codes: 0 success, 1 a hull differs, data is damaged or the server refused a request, 2 the command or its input
-    is unusable, 3 the server does not answer, or cannot do it now, 4 the server requires another token, 70
-    `dynhull serve` ended itself because it could not rely on its own state, 130 interrupted. `serve`, `gateway`,
-    `dashboard`, `ingest` and `relay` end with 0 when they are interrupted, because that is how they are ended.
-    """
+    """Show help or the version."""

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
 
+from dynhull_surface.reasons import Exit, exit_of
+
 from .durations import more_than_0
-from .exits import Exit
 
 if TYPE_CHECKING:
     from grpc import ChannelCredentials
 
-    from dynhull_client import AsyncHullClient, HullClient
+    from dynhull_client import AsyncHullClient, DynhullError, HullClient
 
 Client = TypeVar("Client", "HullClient", "AsyncHullClient")
 
@@ -124,41 +125,9 @@ def connecting(command: Callable[..., None], *, optional: bool = False) -> Calla
             encryption = credentials(tls, tls_ca, client_cert, client_key)
             seconds = more_than_0(ping_interval, "--ping-interval")
             command(Connect(address, token, encryption, seconds), **given)
-        except (sdk.UnavailableError, sdk.DeadlineError) as error:
-            if error.reason:  # which only our server gives
-                fail(Exit.UNAVAILABLE, f"the server at {address} answers, but cannot do this now: {error}")
-            encrypted = tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:"))
-            about_tls = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
-            advice = f"Is it running (dynhull serve), is the address right (--address), {about_tls}?"
-            if "CERTIFICATE_VERIFY_FAILED" in str(error):
-                advice = (
-                    "This machine does not trust the server's certificate: name its authority's file with --tls-ca."
-                )
-            fail(Exit.UNAVAILABLE, f"no answer from {address}: {error}\n{advice}")
-        except sdk.UnauthenticatedError:
-            if token is None:
-                fail(Exit.FORBIDDEN, "the server requires a token: give one with --token or in DYNHULL_TOKEN")
-            fail(
-                Exit.FORBIDDEN,
-                "the server does not know the given token: give another one with --token or in DYNHULL_TOKEN",
-            )
-        except sdk.PermissionDeniedError as error:
-            fail(Exit.FORBIDDEN, str(error))
-        except sdk.HullNotFoundError as error:
-            fail(Exit.FAILED, f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one.")
-        except sdk.FenceNotFoundError as error:
-            fail(Exit.FAILED, f"{error}\n`dynhull fences list` shows the fences of the server.")
-        except sdk.InvalidRequestError as error:
-            from .fields import in_options
-
-            fail(Exit.UNUSABLE, in_options(error))
-        except sdk.LimitExceededError as error:
-            if error.metadata.get("limit") == "max_points":  # an option of that name is for windows
-                where = "(--point-limit of the hull, or --max-points of `dynhull serve`)"
-                fail(Exit.FAILED, f"the limit on the points of the hull is {error.value} {where}")
-            fail(Exit.FAILED, str(error))
         except sdk.DynhullError as error:
-            fail(Exit.FAILED, str(error))
+            encrypted = bool(tls or tls_ca or client_cert or address.startswith(("https:", "grpcs:")))
+            fail(exit_of(type(error)), _said(error, address, has_token=token is not None, encrypted=encrypted))
         except OSError as error:
             fail(Exit.UNUSABLE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
         except (ValueError, TypeError) as error:
@@ -174,6 +143,39 @@ def connecting(command: Callable[..., None], *, optional: bool = False) -> Calla
     run.__annotations__ = {each.name: each.annotation for each in parameters}
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return run
+
+
+def _said(error: "DynhullError", address: str, *, has_token: bool, encrypted: bool) -> str:
+    """The message of an error of the SDK, with what to do about it."""
+    import dynhull_client as sdk
+
+    match error:
+        case sdk.UnavailableError() | sdk.DeadlineError():
+            if error.reason:  # which only our server gives
+                return f"the server at {address} answers, but cannot do this now: {error}"
+            about_tls = "does it serve TLS" if encrypted else "does it require TLS (--tls)"
+            advice = f"Is it running (dynhull serve), is the address right (--address), {about_tls}?"
+            if "CERTIFICATE_VERIFY_FAILED" in str(error):
+                advice = (
+                    "This machine does not trust the server's certificate: name its authority's file with --tls-ca."
+                )
+            return f"no answer from {address}: {error}\n{advice}"
+        case sdk.UnauthenticatedError():
+            if has_token:
+                return "the server does not know the given token: give another one with --token or in DYNHULL_TOKEN"
+            return "the server requires a token: give one with --token or in DYNHULL_TOKEN"
+        case sdk.HullNotFoundError():
+            return f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one."
+        case sdk.FenceNotFoundError():
+            return f"{error}\n`dynhull fences list` shows the fences of the server."
+        case sdk.InvalidRequestError():
+            from .fields import in_options
+
+            return in_options(error)
+        case sdk.LimitExceededError() if error.metadata.get("limit") == "max_points":  # an option for windows
+            where = "(--point-limit of the hull, or --max-points of `dynhull serve`)"
+            return f"the limit on the points of the hull is {error.value} {where}"
+    return str(error)
 
 
 def fail(code: Exit, message: str) -> NoReturn:

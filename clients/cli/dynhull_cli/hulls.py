@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dynhull_surface.reasons import Exit
+
 from .connected import AsJson, connected, fail
 from .durations import duration, shown
-from .exits import Exit
 from .json_lines import json_line
 from .listing import below, listed
 from .plural import plural

@@ -2,8 +2,9 @@
 
 import sys
 
+from dynhull_surface.reasons import Exit
+
 from .closed_pipe import success_on_closed_pipe
-from .exits import Exit
 
 
 def main() -> None:

@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from dynhull_surface.counts import COUNTS, OF_CHANGES, text_of
+from dynhull_surface.reasons import Exit
+
 from .connected import AsJson, HullName, connected, fail
 from .durations import duration
-from .exits import Exit
 from .json_lines import json_line
 from .plural import plural
 
@@ -123,8 +125,7 @@ def _all_rows(points: list[str] | None) -> "Points":
 
 def _left_out(applied: "Applied") -> str:
     """The rows that changed nothing, or were changed, by kind; empty if there are none."""
-    kinds = ("stale", "late", "skipped", "clamped", "evicted", "held", "released", "dropped")
-    return "".join(f", {getattr(applied, kind):,} {kind}" for kind in kinds if getattr(applied, kind))
+    return text_of({name: getattr(applied, name) for name in COUNTS if name not in OF_CHANGES})
 
 
 def _report(name: str, applied: "Applied", what: str, as_json: bool) -> None:

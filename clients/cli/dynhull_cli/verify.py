@@ -9,8 +9,9 @@ import typer
 if TYPE_CHECKING:
     from dynhull_client import HullClient, Verification
 
+from dynhull_surface.reasons import Exit
+
 from .connected import AsJson, connected
-from .exits import Exit
 from .json_lines import json_line
 from .listing import listed
 from .plural import plural

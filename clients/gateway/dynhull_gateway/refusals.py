@@ -1,7 +1,7 @@
 """Refusals of the server, in the names of the request that the caller has sent."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -9,29 +9,9 @@ import grpc
 from starlette.responses import Response
 
 from dynhull_client import DeadlineError, DynhullError
+from dynhull_surface.reasons import http_of
 
 from .problems import Cause, named, pointer, problem, said, shown
-
-STATUS_OF_CODE: Mapping[grpc.StatusCode, int] = {
-    grpc.StatusCode.CANCELLED: 503,
-    grpc.StatusCode.UNKNOWN: 502,
-    grpc.StatusCode.INVALID_ARGUMENT: 400,
-    grpc.StatusCode.DEADLINE_EXCEEDED: 504,
-    grpc.StatusCode.NOT_FOUND: 404,
-    grpc.StatusCode.ALREADY_EXISTS: 409,
-    grpc.StatusCode.PERMISSION_DENIED: 403,
-    grpc.StatusCode.RESOURCE_EXHAUSTED: 429,
-    grpc.StatusCode.FAILED_PRECONDITION: 409,
-    grpc.StatusCode.ABORTED: 409,
-    grpc.StatusCode.OUT_OF_RANGE: 410,
-    grpc.StatusCode.UNIMPLEMENTED: 501,
-    grpc.StatusCode.INTERNAL: 502,
-    grpc.StatusCode.UNAVAILABLE: 503,
-    grpc.StatusCode.DATA_LOSS: 502,
-    grpc.StatusCode.UNAUTHENTICATED: 401,
-}
-# Where HTTP distinguishes what gRPC does not.
-STATUS_OF_REASON: Mapping[str, int] = {"DISK_FULL": 507, "SEQUENCE_AHEAD": 409}
 
 IN_BATCH = {
     "inserts": ("insert",),
@@ -148,7 +128,7 @@ def of_refused_rows(error: DynhullError | ValueError, applied: int) -> Response:
 
 def status_of(error: DynhullError) -> int:
     """The HTTP status for an error of the server."""
-    return STATUS_OF_REASON.get(error.reason) or STATUS_OF_CODE.get(error.code, HTTPStatus.BAD_GATEWAY)
+    return http_of(error.reason, error.code.name)
 
 
 def problem_of(error: DynhullError) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dynhull_client import Applied, AsyncHullClient, DynhullError
+from dynhull_surface.counts import COUNTS
 
 from .problems import ProblemError
 from .rows import KEY_AND_TIME, Row, RowError
@@ -18,10 +19,6 @@ from .schemas import Uploaded
 BATCH_ROWS = 8192
 
 KINDS = {type(None): "absent", str: "a string", int: "an integer", datetime: "there"}
-SUMS = (
-    *("inserted", "deleted", "missing", "moved", "stale", "late", "skipped", "clamped", "evicted"),
-    *("held", "released", "dropped"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +60,7 @@ class Upload:
         self._sending: asyncio.Task[Applied] | None = None
         self._sent_rows = 0
         self._last: Applied | None = None
-        self._sums = dict.fromkeys(SUMS, 0)
+        self._sums = dict.fromkeys(COUNTS, 0)
         self._batches = 0
         self._repeated = 0
         self.settled = 0
@@ -114,7 +111,7 @@ class Upload:
         self._batches += 1
         if applied.duplicate:
             self._repeated += self._sent_rows
-        for name in SUMS:
+        for name in COUNTS:
             self._sums[name] += getattr(applied, name)
 
     async def close(self) -> None:

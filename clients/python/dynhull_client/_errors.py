@@ -10,6 +10,7 @@ from grpc_status import rpc_status
 
 import dynhull
 from dynhull_proto.v1.hull_service_pb2 import ReadError
+from dynhull_surface.reasons import REASONS, Code
 
 DOMAIN = "dynhull.v1"
 
@@ -188,47 +189,9 @@ class DeadlineError(DynhullError, TimeoutError):
     """The call took longer than its timeout."""
 
 
-BY_REASON: Mapping[str, type[DynhullError]] = {
-    "CONSUMER_NOT_FOUND": ConsumerNotFoundError,
-    "DISK_FULL": LimitExceededError,
-    "DRAINING": UnavailableError,
-    "FENCE_EXISTS": FenceExistsError,
-    "FENCE_NOT_FOUND": FenceNotFoundError,
-    "FENCE_REPLACED": FenceReplacedError,
-    "HULL_EMPTY": HullEmptyError,
-    "HULL_EXISTS": HullExistsError,
-    "HULL_FENCED": HullFencedError,
-    "HULL_NOT_FOUND": HullNotFoundError,
-    "HULL_REPLACED": HullReplacedError,
-    "HULL_UNSUITABLE": HullUnsuitableError,
-    "HULLS_APART": HullUnsuitableError,
-    "INVALID_FIELD": InvalidRequestError,
-    "KEY_MISSING": KeyMissingError,
-    "KEY_REPEATED": DuplicateKeyError,
-    "LIMIT_EXCEEDED": LimitExceededError,
-    "MALFORMED_MESSAGE": InvalidRequestError,
-    "METHOD_UNKNOWN": MethodUnknownError,
-    "OUTCOME_UNKNOWN": OutcomeUnknownError,
-    "PERMISSION_DENIED": PermissionDeniedError,
-    "POINT_MISSING": PointMissingError,
-    "RESTORED": RestoredError,
-    "REVISION_FORGOTTEN": RevisionForgottenError,
-    "SEQUENCE_AHEAD": SequenceAheadError,
-    "SEQUENCE_GAP": SequenceGapError,
-    "STARTING": UnavailableError,
-    "STORAGE_FAILED": UnavailableError,
-    "UNAUTHENTICATED": UnauthenticatedError,
-}
-
+BY_REASON: Mapping[str, type[DynhullError]] = {name: globals()[reason.error] for name, reason in REASONS.items()}
 # What gRPC itself and proxies answer, without a reason. The server gives a reason with every refusal.
-BY_CODE: Mapping[grpc.StatusCode, type[DynhullError]] = {
-    grpc.StatusCode.DEADLINE_EXCEEDED: DeadlineError,
-    grpc.StatusCode.PERMISSION_DENIED: PermissionDeniedError,
-    grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceededError,
-    grpc.StatusCode.UNAUTHENTICATED: UnauthenticatedError,
-    grpc.StatusCode.UNAVAILABLE: UnavailableError,
-    grpc.StatusCode.UNIMPLEMENTED: MethodUnknownError,
-}
+BY_CODE: Mapping[str, type[DynhullError]] = {code.name: globals()[code.error] for code in Code}
 
 CODES: Mapping[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
 
@@ -290,7 +253,7 @@ def _error(code: grpc.StatusCode, message: str | None, details: Iterable[Any]) -
     info = _error_info(details)
     if info.reason:
         return BY_REASON.get(info.reason, DynhullError)(message or code.name, code, info.reason, info.metadata)
-    return BY_CODE.get(code, DynhullError)(message or code.name, code, "", {})
+    return BY_CODE.get(code.name, DynhullError)(message or code.name, code, "", {})
 
 
 def _error_info(details: Iterable[Any]) -> ErrorInfo:

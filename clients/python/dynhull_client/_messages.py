@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from html import escape
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from dynhull._value import Value
 from dynhull.arrays import Points as Points
 from dynhull.keys import Keys, KeyType
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
+from dynhull_surface.counts import COUNTS
 
 from ._keys import KeyTuple, decode_keys, decode_names, join_keys
 from ._quarantine_messages import Quarantine, decode_quarantine
@@ -580,47 +582,32 @@ def decode_hull(message: hull_service_pb2.GetHullResponse) -> Hull:
 def decode_applied(message: batch_pb2.BatchResult) -> Applied:
     """The effect of a batch."""
     return Applied(
-        message.revision,
-        message.inserted,
-        message.deleted,
-        message.missing,
-        message.hull_changed,
-        message.point_count,
-        message.duplicate,
-        message.moved,
-        message.stale,
-        message.late,
-        message.skipped,
-        message.clamped,
-        message.evicted,
-        _clock(message),
-        message.held,
-        tuple(message.held_rows),
-        message.released,
-        message.dropped,
+        revision=message.revision,
+        hull_changed=message.hull_changed,
+        points=message.point_count,
+        duplicate=message.duplicate,
+        clock=_clock(message),
+        held_rows=tuple(message.held_rows),
+        **_counts(message),
     )
 
 
 def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
     """The effect of an ingest."""
     return Ingested(
-        message.batches,
-        message.revision,
-        message.inserted,
-        message.deleted,
-        message.missing,
-        message.point_count,
-        message.duplicates,
-        message.moved,
-        message.stale,
-        message.late,
-        message.skipped,
-        message.clamped,
-        message.evicted,
-        message.held,
-        message.released,
-        message.dropped,
+        batches=message.batches,
+        revision=message.revision,
+        points=message.point_count,
+        duplicates=message.duplicates,
+        **_counts(message),
     )
+
+
+_values_of_counts = attrgetter(*COUNTS)
+
+
+def _counts(message: batch_pb2.BatchResult | hull_service_pb2.IngestResponse) -> dict[str, int]:
+    return dict(zip(COUNTS, _values_of_counts(message), strict=True))
 
 
 def decode_positions(message: hull_service_pb2.GetPositionsResponse) -> Positions:

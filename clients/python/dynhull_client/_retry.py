@@ -7,15 +7,15 @@ from typing import TypeVar
 
 import grpc
 
+from dynhull_surface.reasons import NOT_BEGUN, Repeat, repeat_of
+
 from ._calls import Call
-from ._errors import DeadlineError, DynhullError, HullNotFoundError, OutcomeUnknownError, not_sent
+from ._errors import DeadlineError, DynhullError, HullNotFoundError, not_sent
 
 FIRST_PAUSE = 0.1
 LONGEST_PAUSE = 5.0
 # A hull that is awaited is asked for this often: a missing hull costs the server little.
 LONGEST_PAUSE_FOR_A_HULL = 1.0
-# Refusals of a server that has not begun to do what was asked, as it starts or stops.
-NOT_BEGUN = {"STARTING", "DRAINING"}
 
 Answer = TypeVar("Answer")
 
@@ -23,9 +23,9 @@ Answer = TypeVar("Answer")
 def passes(error: DynhullError) -> bool:
     """Whether the call may succeed later, once the server can be reached or can read its disk.
 
-    Decided by the code for UNAVAILABLE, which means this in every gRPC service, whatever the reason.
+    UNAVAILABLE means this in every gRPC service, also with a reason that this version does not know.
     """
-    return error.code == grpc.StatusCode.UNAVAILABLE or isinstance(error, OutcomeUnknownError)
+    return repeat_of(error.reason, error.code.name) is not Repeat.NO
 
 
 def pauses(longest: float = LONGEST_PAUSE) -> Iterator[float]:

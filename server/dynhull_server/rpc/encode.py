@@ -10,6 +10,7 @@ from dynhull import globe, measure
 from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
+from dynhull_surface.counts import COUNTS
 
 from ..engine.difference import Difference
 from ..engine.layers import Layers
@@ -279,6 +280,14 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
     if applied.evicted:
         result.evicted = applied.evicted
     result.clock_time.FromMicroseconds(applied.clock)
+
+
+def add_counts(applied: Applied, summary: hull_service_pb2.IngestResponse) -> None:
+    """Add the counts of a batch to those of an ingest."""
+    for name in COUNTS:
+        count = len(applied.held) if name == "held" else getattr(applied, name)
+        if count:
+            setattr(summary, name, getattr(summary, name) + count)
 
 
 def encode_change(

@@ -158,18 +158,7 @@ class HullService:
                 for _, applied in streamed.applied():
                     call.batches += 1
                     summary.duplicates += applied.duplicate
-                    summary.inserted += applied.inserted
-                    summary.deleted += applied.deleted
-                    summary.missing += applied.missing
-                    summary.moved += applied.moved
-                    summary.stale += applied.stale
-                    summary.late += applied.late
-                    summary.skipped += applied.skipped
-                    summary.clamped += applied.clamped
-                    summary.evicted += applied.evicted
-                    summary.held += len(applied.held)
-                    summary.released += applied.released
-                    summary.dropped += applied.dropped
+                    encode.add_counts(applied, summary)
                     summary.revision, summary.point_count = applied.revision, applied.points
         summary.batches = call.batches - summary.duplicates
         return summary

@@ -1,13 +1,15 @@
 """Conversion of refusals to gRPC statuses with google.rpc details."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
-from google.protobuf.any_pb2 import Any
+from google.protobuf import any_pb2
 from google.protobuf.message import DecodeError, Message
-from google.rpc import code_pb2 as code
 from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, PreconditionFailure, QuotaFailure, ResourceInfo
 from google.rpc.status_pb2 import Status
+
+from dynhull_surface.reasons import REASONS, Code
 
 from ..state.errors import (
     ConsumerNotFoundError,
@@ -45,6 +47,7 @@ from .decode import InvalidFieldError
 DOMAIN = "dynhull.v1"
 # The reason of TokensChangedError, for the gateway that gets it.
 TOKENS_CHANGED = "TOKENS_CHANGED"
+STOPPING = "the server is shutting down"
 HULL_TYPE, FENCE_TYPE, CONSUMER_TYPE = "dynhull.v1.Hull", "dynhull.v1.Fence", "dynhull.v1.FenceConsumer"
 # Statuses are sent as headers, whose size is limited.
 LONGEST_VALUE = 120
@@ -144,6 +147,73 @@ ANSWERED = (
 )
 
 
+class Refusal(NamedTuple):
+    """What the status of an error says. Its code follows from the reason, and from the code what it is about.
+
+    Attributes:
+        reason: the reason.
+        metadata: from an error, the field at fault, its value, and more.
+        resource: the type of what is missing, or exists already.
+        subject: what a precondition is about; the value at fault unless given.
+        message: the message; that of the error unless given.
+    """
+
+    reason: str
+    metadata: Callable[[Any], Mapping[str, object]] = lambda _: {}
+    resource: str = ""
+    subject: str = ""
+    message: str = ""
+
+
+def _name(error: Any) -> Mapping[str, object]:
+    return {"value": error.name}
+
+
+REFUSALS: Mapping[type[Exception], Refusal] = {
+    ConsumerNotFoundError: Refusal("CONSUMER_NOT_FOUND", _name, CONSUMER_TYPE),
+    DecodeError: Refusal("MALFORMED_MESSAGE", message="these bytes are not the request's message"),
+    DiskFullError: Refusal("DISK_FULL", lambda _: {"limit": "disk"}),
+    DrainingError: Refusal("DRAINING", message=STOPPING),
+    FenceExistsError: Refusal("FENCE_EXISTS", _name, FENCE_TYPE),
+    FenceNotFoundError: Refusal("FENCE_NOT_FOUND", _name, FENCE_TYPE),
+    FenceReplacedError: Refusal("FENCE_REPLACED", lambda e: {"field": "uid", "value": e.name, "uid": e.uid}),
+    HullEmptyError: Refusal("HULL_EMPTY", _name),
+    HullExistsError: Refusal("HULL_EXISTS", _name, HULL_TYPE),
+    HullFencedError: Refusal("HULL_FENCED", lambda e: {"value": e.name, "fence": e.fence}),
+    HullNotFoundError: Refusal("HULL_NOT_FOUND", _name, HULL_TYPE),
+    HullReplacedError: Refusal("HULL_REPLACED", lambda e: {"field": "resume.uid", "value": e.name, "uid": e.uid}),
+    HullUnsuitableError: Refusal(
+        "HULL_UNSUITABLE", lambda e: {"field": e.field or None, "value": e.name, "point": e.point}
+    ),
+    HullsApartError: Refusal("HULLS_APART", lambda e: {"field": e.field, "value": e.name}),
+    LimitExceededError: Refusal("LIMIT_EXCEEDED", lambda e: {"limit": e.limit, "value": e.maximum}),
+    MethodUnknownError: Refusal("METHOD_UNKNOWN"),
+    NotStoredError: Refusal("STORAGE_FAILED"),
+    OutcomeUnknownError: Refusal("OUTCOME_UNKNOWN"),
+    PagesForgottenError: Refusal("REVISION_FORGOTTEN", lambda e: {"field": "vertex_page_token", "value": e.revision}),
+    PermissionDeniedError: Refusal("PERMISSION_DENIED", lambda e: {"scope": e.scope, "value": e.name}),
+    RestoredError: Refusal(
+        "RESTORED", lambda e: {"value": e.name, "uid": e.uid, "last": e.last, "expected": e.last + 1}
+    ),
+    RevisionForgottenError: Refusal(
+        "REVISION_FORGOTTEN",
+        lambda e: {"field": "resume.revision", "value": e.revision, "oldest": e.oldest, "newest": e.newest},
+    ),
+    SequenceAheadError: Refusal("SEQUENCE_AHEAD", lambda e: {"field": e.field, "value": e.sequence, "last": e.last}),
+    SequenceGapError: Refusal(
+        "SEQUENCE_GAP",
+        lambda e: {"field": "sequence", "value": e.sequence, "expected": e.expected},
+        subject="sequence",
+    ),
+    ServiceUnknownError: Refusal("SERVICE_UNKNOWN", lambda e: {"value": _short(e.name)}),
+    ShardAwayError: Refusal("STARTING"),
+    StartingError: Refusal("STARTING"),
+    StoppingError: Refusal("DRAINING", message=STOPPING),
+    TokensChangedError: Refusal(TOKENS_CHANGED),
+    UnauthenticatedError: Refusal("UNAUTHENTICATED"),
+}
+
+
 def error_status(error: Exception, batch: int | None = None, within: str = "") -> Status:
     """The status for `error`, one of ANSWERED.
 
@@ -154,6 +224,10 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
     """
     where = {} if batch is None else {"batch": str(batch)}
     match error:
+        case PartRefusedError():
+            return error_status(error.reason, error.index, f"batches[{error.index}].")
+        case RelayedError():
+            return error.status
         case InvalidFieldError():
             return _invalid_field(within, error, where)
         case KeyRepeatedError():
@@ -161,123 +235,58 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
             return _invalid_field(within, _of_batch(error), first | where, "KEY_REPEATED")
         case InvalidBatchError():
             return _invalid_field(within, _of_batch(error), where)
-        case PointMissingError():
-            field, value = within + PART_FIELDS[error.part], _short(error.point)
-            failure = PreconditionFailure()
-            failure.violations.add(type="POINT_MISSING", subject=f"{field}[{error.row}]", description=str(error))
-            message = f"{field}[{error.row}] is {value}: no such point to delete; nothing of the batch was applied"
-            metadata = {"field": field, "row": str(error.row), "value": value, **where}
-            return _status(code.FAILED_PRECONDITION, message, "POINT_MISSING", metadata, failure)
-        case KeyMissingError():
-            field, value = f"{within}batch.removes", _short(error.key)
-            failure = PreconditionFailure()
-            failure.violations.add(type="KEY_MISSING", subject=f"{field}[{error.row}]", description=str(error))
-            message = f"{field}[{error.row}] is {value}: no such key to remove; nothing of the batch was applied"
-            metadata = {"field": field, "row": str(error.row), "value": value, **where}
-            return _status(code.FAILED_PRECONDITION, message, "KEY_MISSING", metadata, failure)
-        case PartRefusedError():
-            return error_status(error.reason, error.index, f"batches[{error.index}].")
-        case HullNotFoundError():
-            resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
-            return _status(code.NOT_FOUND, str(error), "HULL_NOT_FOUND", {"value": error.name, **where}, resource)
-        case HullsApartError():
-            failure = PreconditionFailure()
-            failure.violations.add(type="HULLS_APART", subject=error.name, description=str(error))
-            metadata = {"field": error.field, "value": error.name}
-            return _status(code.FAILED_PRECONDITION, str(error), "HULLS_APART", metadata, failure)
-        case HullExistsError():
-            resource = ResourceInfo(resource_type=HULL_TYPE, resource_name=error.name, description=str(error))
-            return _status(code.ALREADY_EXISTS, str(error), "HULL_EXISTS", {"value": error.name}, resource)
-        case FenceNotFoundError():
-            resource = ResourceInfo(resource_type=FENCE_TYPE, resource_name=error.name, description=str(error))
-            return _status(code.NOT_FOUND, str(error), "FENCE_NOT_FOUND", {"value": error.name}, resource)
-        case ConsumerNotFoundError():
-            resource = ResourceInfo(resource_type=CONSUMER_TYPE, resource_name=error.name, description=str(error))
-            return _status(code.NOT_FOUND, str(error), "CONSUMER_NOT_FOUND", {"value": error.name}, resource)
-        case FenceExistsError():
-            resource = ResourceInfo(resource_type=FENCE_TYPE, resource_name=error.name, description=str(error))
-            return _status(code.ALREADY_EXISTS, str(error), "FENCE_EXISTS", {"value": error.name}, resource)
-        case FenceReplacedError():
-            metadata = {"field": "uid", "value": error.name, "uid": error.uid}
-            return _status(code.OUT_OF_RANGE, str(error), "FENCE_REPLACED", metadata)
         case InvalidPlaceError():
             return _invalid_field(within, InvalidFieldError(error.field, error.value, error.problem, error.row), where)
         case InvalidFenceError():
             return _invalid_field("config.", InvalidFieldError(error.field, error.value, error.problem), where)
-        case HullFencedError():
-            failure = PreconditionFailure()
-            failure.violations.add(type="HULL_FENCED", subject=error.name, description=str(error))
-            metadata = {"value": error.name} | ({} if error.fence is None else {"fence": error.fence})
-            return _status(code.FAILED_PRECONDITION, str(error), "HULL_FENCED", metadata, failure)
-        case SequenceAheadError():
-            metadata = {"field": error.field, "value": str(error.sequence), "last": str(error.last)}
-            return _status(code.OUT_OF_RANGE, str(error), "SEQUENCE_AHEAD", metadata)
-        case RestoredError():
-            failure = PreconditionFailure()
-            failure.violations.add(type="RESTORED", subject=error.name, description=str(error))
-            metadata = {"value": error.name, "uid": error.uid, "last": str(error.last), "expected": str(error.last + 1)}
-            return _status(code.FAILED_PRECONDITION, str(error), "RESTORED", metadata | where, failure)
-        case SequenceGapError():
-            failure = PreconditionFailure()
-            failure.violations.add(type="SEQUENCE_GAP", subject="sequence", description=str(error))
-            metadata = {"field": "sequence", "value": str(error.sequence), "expected": str(error.expected), **where}
-            return _status(code.FAILED_PRECONDITION, str(error), "SEQUENCE_GAP", metadata, failure)
-        case HullEmptyError():
-            failure = PreconditionFailure()
-            failure.violations.add(type="HULL_EMPTY", subject=error.name, description=str(error))
-            return _status(code.FAILED_PRECONDITION, str(error), "HULL_EMPTY", {"value": error.name}, failure)
-        case HullUnsuitableError():
-            failure = PreconditionFailure()
-            failure.violations.add(type="HULL_UNSUITABLE", subject=error.name, description=str(error))
-            point = {} if error.point is None else {"point": str(error.point)}
-            unsuitable = {"field": within + error.field} if error.field else {}
-            metadata = {**unsuitable, "value": error.name, **point, **where}
-            return _status(code.FAILED_PRECONDITION, str(error), "HULL_UNSUITABLE", metadata, failure)
-        case RevisionForgottenError():
-            metadata = {"field": "resume.revision", "value": str(error.revision)}
-            metadata |= {"oldest": str(error.oldest), "newest": str(error.newest)}
-            return _status(code.OUT_OF_RANGE, str(error), "REVISION_FORGOTTEN", metadata)
-        case PagesForgottenError():
-            metadata = {"field": "vertex_page_token", "value": str(error.revision)}
-            return _status(code.OUT_OF_RANGE, str(error), "REVISION_FORGOTTEN", metadata)
-        case HullReplacedError():
-            metadata = {"field": "resume.uid", "value": error.name, "uid": error.uid}
-            return _status(code.OUT_OF_RANGE, str(error), "HULL_REPLACED", metadata)
-        case UnauthenticatedError():
-            return _status(code.UNAUTHENTICATED, str(error), "UNAUTHENTICATED", {})
-        case PermissionDeniedError():
-            metadata = {"scope": error.scope, "value": error.name}
-            return _status(code.PERMISSION_DENIED, str(error), "PERMISSION_DENIED", metadata)
-        case LimitExceededError():
-            quota = QuotaFailure()
-            quota.violations.add(subject=error.limit, description=str(error))
-            metadata = {"limit": error.limit, "value": str(error.maximum), **where}
-            return _status(code.RESOURCE_EXHAUSTED, str(error), "LIMIT_EXCEEDED", metadata, quota)
-        case ServiceUnknownError():
-            return _status(code.NOT_FOUND, str(error), "SERVICE_UNKNOWN", {"value": _short(error.name)})
-        case MethodUnknownError():
-            return _status(code.UNIMPLEMENTED, str(error), "METHOD_UNKNOWN", {})
-        case DecodeError():
-            return _status(
-                code.INVALID_ARGUMENT, "these bytes are not the request's message", "MALFORMED_MESSAGE", where
-            )
-        case DiskFullError():
-            quota = QuotaFailure()
-            quota.violations.add(subject="disk", description=str(error))
-            return _status(code.RESOURCE_EXHAUSTED, str(error), "DISK_FULL", {"limit": "disk", **where}, quota)
-        case NotStoredError():
-            return _status(code.UNAVAILABLE, str(error), "STORAGE_FAILED", where)
-        case OutcomeUnknownError():
-            return _status(code.UNKNOWN, str(error), "OUTCOME_UNKNOWN", where)
-        case StartingError() | ShardAwayError():
-            return _status(code.UNAVAILABLE, str(error), "STARTING", where)
-        case TokensChangedError():
-            return _status(code.UNAVAILABLE, str(error), TOKENS_CHANGED, where)
-        case RelayedError():
-            return error.status
-        case DrainingError() | StoppingError():
-            return _status(code.UNAVAILABLE, "the server is shutting down", "DRAINING", where)
-    raise error
+        case PointMissingError():
+            field = within + PART_FIELDS[error.part]
+            return _missing(error, "POINT_MISSING", field, error.point, "point to delete", where)
+        case KeyMissingError():
+            return _missing(error, "KEY_MISSING", f"{within}batch.removes", error.key, "key to remove", where)
+    refusal = next((REFUSALS[each] for each in type(error).__mro__ if each in REFUSALS), None)
+    if refusal is None:
+        raise error
+    metadata = {name: str(value) for name, value in refusal.metadata(error).items() if value is not None}
+    if isinstance(error, HullUnsuitableError) and error.field:
+        metadata["field"] = within + error.field
+    detail = _detail(refusal, metadata, str(error))
+    return _status(refusal.reason, refusal.message or str(error), metadata | where, *detail)
+
+
+def _detail(refusal: Refusal, metadata: Mapping[str, str], description: str) -> list[Message]:
+    """What the refusal is about, as google.rpc has it for its code."""
+    code, value = REASONS[refusal.reason].code, metadata.get("value", "")
+    if refusal.resource:
+        return [ResourceInfo(resource_type=refusal.resource, resource_name=value, description=description)]
+    if code is Code.FAILED_PRECONDITION:
+        return [_failed(refusal.reason, refusal.subject or value, description)]
+    if code is Code.RESOURCE_EXHAUSTED:
+        quota = QuotaFailure()
+        quota.violations.add(subject=metadata["limit"], description=description)
+        return [quota]
+    return []
+
+
+def _missing(
+    error: PointMissingError | KeyMissingError,
+    reason: str,
+    field: str,
+    value: object,
+    what: str,
+    where: Mapping[str, str],
+) -> Status:
+    """The status where a batch names what the hull does not have."""
+    place, shown = f"{field}[{error.row}]", _short(value)
+    message = f"{place} is {shown}: no such {what}; nothing of the batch was applied"
+    metadata = {"field": field, "row": str(error.row), "value": shown, **where}
+    return _status(reason, message, metadata, _failed(reason, place, str(error)))
+
+
+def _failed(reason: str, subject: str, description: str) -> PreconditionFailure:
+    failure = PreconditionFailure()
+    failure.violations.add(type=reason, subject=subject, description=description)
+    return failure
 
 
 def _of_batch(error: InvalidBatchError) -> InvalidFieldError:
@@ -295,13 +304,13 @@ def _invalid_field(
     detail.field_violations.add(field=field, description=f"{error.problem}, got {_quoted(value)}")
     message = f"{field} is {_quoted(value)}: {error.problem}"
     metadata = {"field": name, **row, "value": value, **where}
-    return _status(code.INVALID_ARGUMENT, message, reason, metadata, detail)
+    return _status(reason, message, metadata, detail)
 
 
-def _status(number: int, message: str, reason: str, metadata: Mapping[str, str], *details: Message) -> Status:
-    status = Status(code=number, message=message)
+def _status(reason: str, message: str, metadata: Mapping[str, str], *details: Message) -> Status:
+    status = Status(code=REASONS[reason].code.number, message=message)
     for detail in (ErrorInfo(reason=reason, domain=DOMAIN, metadata=metadata), *details):
-        packed = Any()
+        packed = any_pb2.Any()
         packed.Pack(detail)
         status.details.append(packed)
     return status

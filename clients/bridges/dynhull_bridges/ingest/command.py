@@ -8,8 +8,8 @@ import typer
 
 from dynhull_cli.connected import Connect, connecting, fail
 from dynhull_cli.durations import duration
-from dynhull_cli.exits import Exit
 from dynhull_cli.times import TimeUnit
+from dynhull_surface.reasons import Exit
 
 from ..command import LogForm
 

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dynhull_surface.reasons import Exit
+
 from ..connected import AsJson, connected, fail
-from ..exits import Exit
 from ..json_lines import json_line
 from ..listing import below, listed
 from ..plural import plural
