@@ -1,7 +1,7 @@
 """The server's answers, as values with read-only numpy arrays. Points are (n, 2) arrays of float64."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime, timedelta
 from html import escape
 from operator import attrgetter
@@ -579,17 +579,17 @@ def decode_hull(message: hull_service_pb2.GetHullResponse) -> Hull:
     return Hull(info, decode_points(message.vertices), decode_measures(message.measures), keys)
 
 
+# In the order of the fields of Applied, around its clock: one call for many fields is faster than each by its name.
+_ON_THE_WIRE = [{"points": "point_count"}.get(each.name, each.name) for each in fields(Applied)]
+_before_clock = attrgetter(*_ON_THE_WIRE[: _ON_THE_WIRE.index("clock")])
+_after_clock = attrgetter(*_ON_THE_WIRE[_ON_THE_WIRE.index("clock") + 1 :])
+_counts = attrgetter(*COUNTS)
+
+
 def decode_applied(message: batch_pb2.BatchResult) -> Applied:
     """The effect of a batch."""
-    return Applied(
-        revision=message.revision,
-        hull_changed=message.hull_changed,
-        points=message.point_count,
-        duplicate=message.duplicate,
-        clock=_clock(message),
-        held_rows=tuple(message.held_rows),
-        **_counts(message),
-    )
+    held, held_rows, *left = _after_clock(message)
+    return Applied(*_before_clock(message), _clock(message), held, tuple(held_rows), *left)
 
 
 def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
@@ -599,15 +599,8 @@ def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
         revision=message.revision,
         points=message.point_count,
         duplicates=message.duplicates,
-        **_counts(message),
+        **dict(zip(COUNTS, _counts(message), strict=True)),
     )
-
-
-_values_of_counts = attrgetter(*COUNTS)
-
-
-def _counts(message: batch_pb2.BatchResult | hull_service_pb2.IngestResponse) -> dict[str, int]:
-    return dict(zip(COUNTS, _values_of_counts(message), strict=True))
 
 
 def decode_positions(message: hull_service_pb2.GetPositionsResponse) -> Positions:
