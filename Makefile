@@ -19,7 +19,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster torture cluster upgrade ray kafka simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster torture cluster upgrade ray kafka simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -109,6 +109,9 @@ stub: .venv/.check  ## regenerate the types of what is in C++: dynhull/_kernel.p
 
 proto: .venv/.check  ## regenerate proto/dynhull_proto from proto/dynhull
 	$(BIN)/python proto/generate.py
+
+surface: .venv/.test  ## what users see of HTTP, commands and the SDK is to change: writes tests/surface/goldens anew
+	SURFACE=renew $(BIN)/pytest -q tests/surface/test_goldens.py
 
 vendor:  ## bring newer libraries and maps into the dashboard's page, from npm
 	npm ci --prefix clients/dashboard --no-audit --no-fund --ignore-scripts
