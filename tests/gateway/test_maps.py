@@ -79,6 +79,52 @@ def test_boxes_and_times(gateway: Gateway, fleet: str) -> None:
     assert fleet not in [each["id"] for each in items(gateway, "hulls", "?bbox=-40,40,-20,60&limit=1000")["features"]]
 
 
+@pytest.fixture(scope="module")
+def ships(gateway: Gateway) -> str:
+    """Keys on both sides of the antimeridian and upon it, in all ways to write them, and a hull without any."""
+    gateway.post("/hulls", {"name": "maps/ships", "keyed": "str", "geographic": True})
+    gateway.post("/hulls", {"name": "maps/none", "keyed": "str", "geographic": True})
+    keys, longitudes = ["180", "-180", "190", "-170", "-190", "170"], [180, -180, 190, -170, -190, 170]
+    points = [(lon, -10 - row) for row, lon in enumerate(longitudes)]
+    gateway.post("/hulls/maps%2Fships/points", {"keys": keys, "points": points})
+    return "maps/ships"
+
+
+@pytest.mark.parametrize(
+    ("box", "inside"),
+    [
+        ("165,-20,180,0", {"180", "-180", "-190", "170"}),
+        ("-180,-20,-165,0", {"180", "-180", "190", "-170"}),
+        ("165,-20,-165,0", {"180", "-180", "190", "-170", "-190", "170"}),
+        ("165,-20,195,0", {"180", "-180", "190", "-170", "-190", "170"}),
+        ("-195,-20,-175,0", {"180", "-180", "-190", "170"}),
+        ("175,-20,185,0", {"180", "-180"}),
+        ("185,-20,195,0", {"190", "-170"}),
+        ("-175,-20,-165,0", {"190", "-170"}),
+        ("-360,-90,0,90", {"180", "-180", "190", "-170", "-190", "170"}),
+        ("0,-20,10,0", set()),
+    ],
+)
+def test_boxes_about_the_antimeridian(gateway: Gateway, ships: str, box: str, inside: set[str]) -> None:
+    assert {each["id"] for each in items(gateway, f"entities:{ships}", f"?bbox={box}")["features"]} == inside
+    hulls = {each["id"] for each in items(gateway, "hulls", f"?bbox={box}&limit=1000")["features"]}
+    assert (ships in hulls) == bool(inside)
+    assert "maps/none" in hulls  # what is nowhere is on all pages
+
+
+def test_places_are_within_the_range_of_crs84(gateway: Gateway, ships: str) -> None:
+    found = items(gateway, f"entities:{ships}")["features"]
+    longitudes = {each["id"]: each["geometry"]["coordinates"][0] for each in found}
+    assert longitudes == {"180": 180, "-180": -180, "190": -170, "-170": -170, "-190": 170, "170": 170}
+    one = gateway.get(f"/collections/{quote(f'entities:{ships}', safe='')}/items/190").json
+    assert one["geometry"]["coordinates"][0] == -170
+
+
+def test_a_leap_second_is_a_time(gateway: Gateway, fleet: str) -> None:
+    found = items(gateway, f"entities:{fleet}", "?datetime=2016-12-31T23:59:60Z/2026-01-02T12:00:00Z&limit=999")
+    assert {each["properties"]["time"][8:10] for each in found["features"]} == {"01", "02"}
+
+
 def test_a_page_of_a_revision_that_is_gone_is_refused(gateway: Gateway, address: str, name: str) -> None:
     """Pages of several revisions could have a key at two places, or one that left and another that came."""
     collection = f"entities:{name}"
@@ -108,6 +154,9 @@ def test_a_page_of_a_revision_that_is_gone_is_refused(gateway: Gateway, address:
         "bbox=1,2,3",
         "bbox=1,9,2,3",
         "bbox=a,b,c,d",
+        "bbox=500,-20,600,0",
+        "bbox=0,-100,10,95",
+        "datetime=2016-12-31T23:61:60Z",
         "datetime=now",
         "datetime=../..",
         "limit=0",

@@ -13,7 +13,7 @@ from dynhull_client import AsyncHullClient, Entities, HullInfo
 
 from ..problems import ProblemError
 from ..schemas import NO_TIME
-from .filters import Found, Page
+from .filters import Found, Page, in_range
 
 KEPT = 16
 KEPT_KEYS = 1_000_000  # of all that are kept, beside the latest: about 200 bytes each
@@ -96,11 +96,11 @@ class Snapshots:
 
 
 def feature(key: Key, lonlat: list[float], time: np.datetime64 | None) -> dict[str, Any]:
-    """A key as a GeoJSON Feature."""
+    """A key as a GeoJSON Feature, with a longitude from -180 to 180."""
     when = {} if time is None or time == NO_TIME else {"time": f"{np.datetime_as_string(time)}Z"}
     return {
         "type": "Feature",
         "id": key,
-        "geometry": {"type": "Point", "coordinates": lonlat},
+        "geometry": {"type": "Point", "coordinates": [in_range(lonlat[0]), lonlat[1]]},
         "properties": {"key": key, **when},
     }

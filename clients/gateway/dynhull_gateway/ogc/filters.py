@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -37,6 +37,17 @@ class Found:
     matched: int | None
 
 
+def in_range(lon: float) -> float:
+    """A longitude of -360 to 360 degrees as one of -180 to 180, as CRS84 has them."""
+    return lon if abs(lon) <= 180 else lon - 360 if lon > 0 else lon + 360
+
+
+def turned(lonlat: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """(n, 2) places with longitudes from -180 to 180."""
+    lon = lonlat[:, 0]
+    return np.column_stack([np.where(np.abs(lon) <= 180, lon, lon - np.copysign(360, lon)), lonlat[:, 1]])
+
+
 @dataclass(frozen=True, slots=True)
 class Box:
     """A box in degrees; west is greater than east where it crosses the antimeridian."""
@@ -53,29 +64,47 @@ class Box:
             raise ValueError("must be four numbers of degrees with commas between: WEST,SOUTH,EAST,NORTH")
         numbers = [float(each) for each in text.split(",")]
         west, south, east, north = numbers if len(numbers) == 4 else (*numbers[:2], *numbers[3:5])
+        for name, value, most in (("west", west, 360), ("south", south, 90), ("east", east, 360), ("north", north, 90)):
+            if abs(value) > most:
+                raise ValueError(f"must be WEST,SOUTH,EAST,NORTH: {name} is {value:g}, beyond {most} degrees")
         if south > north:
             raise ValueError(
                 f"must be WEST,SOUTH,EAST,NORTH: the southern edge {south:g} is north of the northern edge {north:g}"
             )
+        if east - west >= 360:
+            west, east = -180.0, 180.0
+        elif west < -180 or east > 180 or west > 180 or east < -180:
+            west, east = in_range(west), in_range(east)
         return cls(west, south, east, north)
 
     def holds(self, lonlat: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-        """Which of (n, 2) places are in the box."""
-        lon, lat = lonlat[:, 0], lonlat[:, 1]
+        """Which of (n, 2) places are in the box; 180 and -180 degrees are one meridian."""
+        lon, lat = turned(lonlat)[:, 0], lonlat[:, 1]
         in_lon = (
             (self.west <= lon) & (lon <= self.east)
             if self.west <= self.east
             else (self.west <= lon) | (lon <= self.east)
         )
+        if self._has_antimeridian:
+            in_lon |= np.abs(lon) == 180
         return in_lon & (self.south <= lat) & (lat <= self.north)
 
     def meets(self, geometry: Mapping[str, Any] | None) -> bool:
-        """Whether a GeoJSON geometry has a point in the box."""
+        """Whether a GeoJSON geometry within 180 degrees has a point in the box.
+
+        What is nowhere is in every box: the standard has it in all pages (requirement 24, C).
+        """
         if geometry is None:
-            return False
+            return True
         shape = shapely.geometry.shape(geometry)
         parts = [(self.west, self.east)] if self.west <= self.east else [(self.west, 180.0), (-180.0, self.east)]
+        if self._has_antimeridian:
+            parts += [(180.0, 180.0), (-180.0, -180.0)]
         return any(shape.intersects(shapely.box(west, self.south, east, self.north)) for west, east in parts)
+
+    @property
+    def _has_antimeridian(self) -> bool:
+        return self.west > self.east or self.west == -180 or self.east == 180
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +185,10 @@ def _instant(text: str) -> datetime | None:
         return None
     try:
         if RFC3339.fullmatch(text):
-            return INSTANT.validate_python(text)
-    except ValidationError:
+            leap = text[17:19] == "60"  # the second after 59, before the next minute begins
+            time = INSTANT.validate_python(f"{text[:17]}59{text[19:]}" if leap else text)
+            return time + timedelta(seconds=1) if leap else time
+    except (ValidationError, OverflowError):
         pass
     raise ValueError(f"{text!r} is not a time such as 2026-01-31T12:00:00Z")
 
