@@ -7,6 +7,7 @@ network to it those of postgres_torture.py. The other faults:
 
 * a worker is killed, or stopped until its partitions are taken over, and then goes on
 * a gateway is killed
+* a machine stands still, as one of a hypervisor does, until its partitions are taken over, and then goes on
 * a machine with its worker and its gateway is killed, or stopped as an operator does it, and started again
 * a machine is started again as another user, who sees no processes of others
 * partitions are to be moved when the worker that has one, or is to have it, is killed or stopped,
@@ -25,23 +26,27 @@ from pathlib import Path
 import grpc
 import trustme
 
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
 sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 
 sys.path.append(str(Path(__file__).parent))
 import postgres_torture
+import torture
+from actors import persist
 from blind import blind, may_blind
-from cluster import processes
+from cluster import descendants, processes
 from pacing import pause
 from patience import PATIENCE, wait_until
-from postgresql import query
 from promises import require
 from small_disk import arguments, on_small_disk
 from tortured import Server
 
 PARTITIONS = 4
 OPTIONS = ("--cluster", "--partitions", str(PARTITIONS), "--grace", "10")
-SERVED = "SELECT worker FROM owners WHERE until > '-infinity' AND address <> ''"
+ASKED = 20  # calls of a machine that stands still
 
 
 class Torture(postgres_torture.Torture):
@@ -63,15 +68,6 @@ class Torture(postgres_torture.Torture):
 
     def _machines(self) -> list[Server]:
         return [self.server] if self._other is None else [self.server, self._other]
-
-    def _balanced(self) -> None:
-        """Wait until both machines serve half of the partitions."""
-
-        def is_balanced() -> bool:
-            workers = [worker for (worker,) in query(self._url, SERVED)]
-            return len(workers) == PARTITIONS and {workers.count(each) for each in workers} == {PARTITIONS // 2}
-
-        wait_until(is_balanced)
 
     def round(self, fault: str) -> None:
         super().round(fault)
@@ -95,19 +91,40 @@ class Torture(postgres_torture.Torture):
         os.kill(worker, signal.SIGSTOP)
         self._begins()
         try:
-            wait_until(lambda: len({each for (each,) in query(self._url, SERVED)}) == 1)
+            wait_until(lambda: len(self._serving()) == 1)
             pause(self._random.uniform(0.1, 1.0))
         finally:
             os.kill(worker, signal.SIGCONT)
         wait_until(lambda: worker not in self._workers())
         require("taken over partition" in self.server.said(), self.server.said())
 
-    def _workers(self) -> set[int]:
-        return {worker for machine in self._machines() for worker in self._workers_of(machine)}
+    def _suspend(self) -> None:
+        """The machine of the clients or the other one stands still until the other one has its partitions, and goes on.
 
-    def _workers_of(self, machine: Server) -> set[int]:
-        found = processes(machine.process.pid)
-        return {number for name, number in found.items() if name.startswith("worker")}
+        What was asked of it meanwhile is answered as of now.
+        """
+        self._balanced()
+        if self._random.random() < 0.5:
+            self._turn()
+        stopped = [self._other.process.pid, *descendants(self._other.process.pid)]
+        with self.shared.channel(self._other.address) as channel:
+            stub, request = HullServiceStub(channel), pb.GetHullRequest(name=torture.HULL)
+            persist(stub.GetHull, request)
+            for each in stopped:
+                os.kill(each, signal.SIGSTOP)
+            self._begins()
+            try:
+                wait_until(lambda: len(self._serving()) == 1)
+                pause(self._random.uniform(0.1, 1.0))
+                acknowledged = self.acknowledged()
+                asked = [stub.GetHull.future(request, timeout=10) for _ in range(ASKED)]
+            finally:
+                for each in stopped:
+                    os.kill(each, signal.SIGCONT)
+            for call in asked:
+                if call.code() is grpc.StatusCode.OK:
+                    revision = call.result().hull.revision
+                    require(revision >= acknowledged, f"stale: revision {revision}, {acknowledged} was acknowledged")
 
     def _kill_machine(self) -> None:
         """The machine of the clients, or the other one, and its start later on."""
@@ -143,6 +160,7 @@ class Torture(postgres_torture.Torture):
         self._balanced()
         self._order(self._any_worker())
         pause(self._random.uniform(0.0, 0.6))
+        self._begins()
         with suppress(ProcessLookupError):
             os.kill(self._one_of("worker"), signal.SIGKILL)
         self._order("anywhere")
@@ -153,6 +171,7 @@ class Torture(postgres_torture.Torture):
         self._order(self._any_worker())
         pause(self._random.uniform(0.0, 0.6))
         self._crash()
+        self._begins()
         self._order("anywhere")
 
     def _stop_in_move(self) -> None:
@@ -165,6 +184,7 @@ class Torture(postgres_torture.Torture):
             os.kill(worker, signal.SIGSTOP)
             pause(self._random.uniform(0.1, 6.0))
             os.kill(worker, signal.SIGCONT)
+        self._begins()
         self._order("anywhere")
 
     def finish(self) -> None:
@@ -198,6 +218,7 @@ KINDS = [
     "hidden",
     "full_disk",
     "copy",
+    "suspend",
 ]
 
 

@@ -18,6 +18,7 @@ import os
 import signal
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -32,8 +33,9 @@ sys.path.append(str(Path(__file__).parents[1] / "server"))
 sys.path.append(str(Path(__file__).parents[2] / "support"))
 import torture
 from actors import persist
+from cluster import processes
 from pacing import pause
-from patience import PATIENCE
+from patience import PATIENCE, wait_until
 from postgresql import FAST, PostgreSQL, postgresql, query
 from promises import require
 from proxy import Proxy
@@ -58,6 +60,7 @@ OF_WORKERS = [
     "copy",
     "full_disk",
 ]
+SERVED = "SELECT worker FROM owners WHERE until > '-infinity' AND address <> ''"
 ENDED = 70  # the exit code of a server that cannot go on
 
 
@@ -182,17 +185,47 @@ class Torture(torture.Torture):
             self._database.start()
 
     def _move(self) -> None:
-        """Every partition to one worker, and then anywhere."""
+        """Every partition to one worker, and then anywhere; no worker ends of that."""
+        self._balanced()
+        there = self._workers()
         self._order(self._any_worker())
         pause(self._random.uniform(0.2, 2.0))
         self._order("anywhere")
+        self._balanced()
+        require(self._workers() == there, f"a move has ended workers: {self.server.said()}")
+
+    def _balanced(self) -> None:
+        """Wait until two workers serve half of the partitions each."""
+
+        def is_balanced() -> bool:
+            partitions = len(self._partitions())
+            return list(self._serving().values()) == [partitions // 2] * 2
+
+        wait_until(is_balanced)
+
+    def _serving(self) -> Counter[str]:
+        """How many partitions each worker serves."""
+        return Counter(worker for (worker,) in query(self._url, SERVED))
+
+    def _partitions(self) -> list[int]:
+        return [partition for (partition,) in query(self._url, "SELECT partition FROM owners ORDER BY partition")]
+
+    def _machines(self) -> list[Server]:
+        return [self.server]
+
+    def _workers(self) -> set[int]:
+        return {worker for machine in self._machines() for worker in self._workers_of(machine)}
+
+    def _workers_of(self, machine: Server) -> set[int]:
+        found = processes(machine.process.pid)
+        return {number for name, number in found.items() if name.startswith("worker")}
 
     def _any_worker(self) -> str:
         return self._random.choice(query(self._url, "SELECT worker FROM workers ORDER BY worker"))[0]
 
     def _order(self, worker: str) -> None:
         """Have every partition moved to one worker, or anywhere."""
-        for (partition,) in query(self._url, "SELECT partition FROM owners ORDER BY partition"):
+        for partition in self._partitions():
             self._command("cluster", "move", str(partition), worker, "--journal", self._url)
 
     def _command(self, *words: str) -> None:

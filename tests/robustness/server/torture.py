@@ -139,7 +139,11 @@ class Torture:
         self.shared.gate.set()
 
     def _new_reader(self, target: str = "") -> Reader:
-        return Reader(self.shared, HULL, lambda: sum(writer.acknowledged for writer in self._point_writers), target)
+        return Reader(self.shared, HULL, self.acknowledged, target)
+
+    def acknowledged(self) -> int:
+        """The revision of the points that no answer to a call from now on may be below."""
+        return sum(writer.acknowledged for writer in self._point_writers)
 
     def round(self, fault: str) -> None:
         """Traffic, a fault during it, the checks that must hold at once, and those that must hold at rest."""
