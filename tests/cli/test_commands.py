@@ -367,6 +367,18 @@ def test_a_full_disk_behind_standard_output(hull, served):
     assert (done.returncode, done.stderr) == (2, "error: standard output: No space left on device\n")
 
 
+def test_what_the_encoding_lacks_is_escaped(hull, served):
+    with HullClient(served) as client:
+        client.create_hull(f"{hull}/towns", keyed="str")
+        client.put(f"{hull}/towns", ["Kiel", "Łódź", "Oslo"], [(0, 0), (4, 4), (0, 4)])
+    command = [COMMAND, "query", f"{hull}/towns", "vertices", "--keys", "--address", served]
+    done = subprocess.run(
+        command, env=os.environ | {"PYTHONIOENCODING": "cp1252"}, capture_output=True, text=True, encoding="cp1252"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [line.split("\t")[2] for line in done.stdout.splitlines()] == ["Kiel", "\\u0141ód\\u017a", "Oslo"]
+
+
 def test_a_reader_of_a_quiet_hull_that_has_enough(hull, served):
     for options in ("", "--json"):
         command = f"{COMMAND} watch {hull} {options} --address {served} | head -1"

@@ -37,7 +37,7 @@ def success_on_closed_pipe() -> Iterator[None]:
     sys.stdout = io.TextIOWrapper(
         io.BufferedWriter(_Output(old.fileno(), "w", closefd=False)),
         encoding=old.encoding,
-        errors=old.errors,
+        errors="backslashreplace",  # of what the terminal's encoding has no character for
         line_buffering=bool(old.line_buffering),
     )
     try:
