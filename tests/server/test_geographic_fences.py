@@ -170,7 +170,7 @@ def test_fences_on_the_globe_that_cannot_be_are_refused(client, fleet, name):
         (fleet, plane, "is a plane, and the other hull is geographic"),
         (plane, fleet, "is a plane, and the other hull is geographic"),
         (elsewhere, fleet, "has another centre"),
-        (ZONE, chosen, "has no centre so far"),
+        (ZONE, chosen, "has no centre so far: put its first points, or recenter it"),
         (ZONE, Prefix(name), "fences over a prefix are in the plane"),
     ):
         with pytest.raises(HullUnsuitableError, match=words):

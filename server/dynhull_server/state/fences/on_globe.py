@@ -41,8 +41,11 @@ def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull | None
         raise HullUnsuitableError(geographic[0].name, "is geographic, and fences over a prefix are in the plane")
     for hull in hulls:
         if hull.state.center is None:
-            reason = "has no centre so far" if hull in geographic else "is a plane, and the other hull is geographic"
-            raise HullUnsuitableError(hull.name, f"{reason}: hulls of a fence on the globe have the same centre")
+            if hull in geographic:
+                reason = "has no centre so far: put its first points, or recenter it, before its fences are created"
+            else:
+                reason = "is a plane, and the other hull is geographic"
+            raise HullUnsuitableError(hull.name, f"{reason}; hulls of a fence on the globe have the same centre")
     centers = {hull.name: hull.state.center for hull in hulls}
     if len(set(centers.values())) > 1:
         raise HullUnsuitableError(
