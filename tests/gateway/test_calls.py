@@ -125,6 +125,8 @@ def test_fences(gateway: Gateway, name: str) -> None:
     assert (created.status, created.json["area"]) == (201, [{"exterior": SQUARE, "holes": []}])
     gateway.post(f"/hulls/{name}/points", {"keys": ["a"], "points": [[1, 1]]})
     assert gateway.get(f"/fences/{name}/inside").json["subjects"] == [{"hull": name, "keys": ["a"], "revision": 1}]
+    verified = gateway.get(f"/hulls/{name}/verification").json
+    assert (verified["whole"], verified["fences"], verified["fence_differences"]) == (True, 1, [])
     circle = {"area": {"center": [9, 9], "radius": 1}, "subjects": name}
     assert gateway.call("PUT", f"/fences/{name}", circle).json["area"] == circle["area"]
     acknowledged = gateway.call("PUT", f"/fences/{name}/consumers/c", {"sequence": 1})
@@ -187,6 +189,7 @@ def test_the_server_s_errors_have_the_names_of_the_request(gateway: Gateway, nam
     at, other = (f"/hulls/{each.replace('/', '%2F')}/points" for each in (keyed, globe))
     put, far = {"keys": ["a"], "points": [[0, 0]]}, {"insert": [[0, 0], [0, 91]]}
     ring = {"exterior": [[0, 0], [1, 1], [1, 0], [0, 1]]}
+    around = {"name": name, "area": {"hull": keyed}}
     cases = [
         (gateway.post(at, [[1, 2]]), 409, "/0"),
         (gateway.post(at, {"insert": [[1, 2]]}), 409, "/insert/0"),
@@ -203,6 +206,11 @@ def test_the_server_s_errors_have_the_names_of_the_request(gateway: Gateway, nam
         (gateway.post("/fences", {"name": name, "area": [ring], "subjects": keyed}), 400, "/area/0/exterior"),
         (gateway.post("/fences", {"name": name, "area": {"center": [0, 0]}, "subjects": keyed}), 400, "/area/radius"),
         (gateway.post("/hulls", {"name": "x", "center": [0, 0]}), 400, "/center"),
+        (gateway.post("/hulls", {"name": "x", "keyed": "str", "max_points": 9, "shards": 2}), 409, "/max_points"),
+        (gateway.post("/fences", {**around, "other_hull": name, "crosses": True}), 400, "/crosses"),
+        (gateway.post("/fences", {**around, "subjects": globe, "without_self": True}), 400, "/without_self"),
+        (gateway.post("/fences", {"name": name, "area": [], "subjects": keyed}), 400, "/area"),
+        (gateway.post("/fences", {"name": name, "area": ring, "subjects": keyed}), 400, "/area/exterior"),
     ]
     for answer, status, pointer in cases:
         said = answer.json

@@ -198,6 +198,16 @@ def test_layers_and_sketches_out_of_range_are_refused(gateway: Gateway, name: st
     assert (refused.status, refused.json["field"]) == (400, query.partition("=")[0])
 
 
+def test_the_form_of_events_has_one_name_and_an_old_one(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name})
+    for query in ("f=geojson", "form=geojson"):
+        events = Events(gateway, f"/hulls/{name}/events?{query}")
+        assert events.next()[1]["type"] == "Feature"
+        events.close()
+    refused = gateway.get(f"/hulls/{name}/events?f=geojson&form=vertices")
+    assert (refused.status, refused.json["field"]) == (400, "form")
+
+
 def test_what_a_hull_does_not_have_is_refused_before_the_stream(gateway: Gateway, name: str) -> None:
     """After an event "problem", an EventSource would come again and again."""
     gateway.post("/hulls", {"name": name, "geographic": True})
@@ -268,8 +278,8 @@ def test_a_reader_that_does_not_read_gets_a_snapshot_later(address: str, name: s
         client.create_hull(name)
         xy = [[i, i * i] for i in range(4000)]
         client.apply(name, insert=xy)
-        slow = Events(gateway, f"/hulls/{name}/events?rate=100&form=vertices")
-        other = Events(gateway, f"/hulls/{name}/events?rate=100&form=vertices")
+        slow = Events(gateway, f"/hulls/{name}/events?rate=100&f=vertices")
+        other = Events(gateway, f"/hulls/{name}/events?rate=100&f=vertices")
         revision = 1
         for i in range(4000, 4120):
             revision = client.apply(name, insert=[[i, i * i]]).revision

@@ -79,7 +79,7 @@ def test_behind_a_proxy(behind: Gateway, tmp_path: Path, name: str, proxy) -> No
         data = proxied.get("/collections", Host=NAMED, X_Forwarded_Proto="https").json["links"][0]["href"]
         assert urlsplit(data).hostname == NAMED
         assert urlsplit(data).path == "/dynhull/collections"
-        events = Events(proxied, f"{path}/events?form=vertices", Host=NAMED)
+        events = Events(proxied, f"{path}/events?f=vertices", Host=NAMED)
         kind, hull_now = events.next()
         assert (kind, hull_now["points"]) == ("snapshot", 20_000)
         sender = threading.Thread(target=lambda: proxied.post(f"{path}/points", [[-1, 0]], Host=NAMED))

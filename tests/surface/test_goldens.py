@@ -35,12 +35,12 @@ def openapi() -> Iterator[str]:
 
 def _lines(value: Any, path: str) -> Iterator[str]:
     """A document of JSON as lines, each a path and what fits into a line there."""
-    text = json.dumps(value, ensure_ascii=False)
+    text = json.dumps(value, ensure_ascii=False, sort_keys=True)
     if len(text) <= LONGEST or not isinstance(value, dict | list):
         yield f"{path} {text}"
         return
-    parts = value.items() if isinstance(value, dict) else enumerate(value)
-    for name, each in parts:
+    named = {each.get("name", i) if isinstance(each, dict) else i: each for i, each in enumerate(value)}
+    for name, each in sorted(value.items()) if isinstance(value, dict) else named.items():
         yield from _lines(each, f"{path}.{name}")
 
 

@@ -308,11 +308,15 @@ def _members(info: "HullInfo") -> dict[str, Any]:
         "point_limit": info.point_limit,
         "max_age": None if window is None or window.max_age is None else window.max_age.total_seconds(),
         "max_points": None if window is None else window.max_points,
+        "window_clock": None if window is None else window.clock,
+        "max_skew": None if window is None or window.max_skew is None else window.max_skew.total_seconds(),
+        "ahead": None if window is None else window.ahead,
         "clock": None if info.clock is None else info.clock.isoformat(),
         "geographic": info.geographic,
         "center": info.center,
         "held": info.held,
         "shards": info.shards,
+        "restored": info.restored,
         **rule_members(info.quarantine),
     }
 

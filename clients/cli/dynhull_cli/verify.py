@@ -37,7 +37,9 @@ def verify(
     for name in names or listed([info.name for info in client.list_hulls()], "no hulls"):
         found = client.verify(name, timeout=timeout)
         different += not found.whole
-        typer.echo(json_line(name=name, **asdict(found)) if as_json else f"{name}: {_summary(found)}")
+        typer.echo(
+            json_line(name=name, whole=found.whole, **asdict(found)) if as_json else f"{name}: {_summary(found)}"
+        )
     if different:
         sys.exit(Exit.FAILED)
 

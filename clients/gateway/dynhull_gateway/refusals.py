@@ -9,48 +9,13 @@ import grpc
 from starlette.responses import Response
 
 from dynhull_client import DeadlineError, DynhullError
+from dynhull_surface.names import find
 from dynhull_surface.reasons import http_of
 
 from .problems import Cause, named, pointer, problem, said, shown
 
-IN_BATCH = {
-    "inserts": ("insert",),
-    "insert_times": ("times",),
-    "deletes": ("delete",),
-    "moves.origins": ("move", "origins"),
-    "moves.destinations": ("move", "destinations"),
-    "puts.keys": ("keys",),
-    "puts.points": ("points",),
-    "puts.times": ("times",),
-    "puts.expire_times": ("expire_times",),
-    "puts.ttl": ("ttl",),
-    "puts.condition": ("only",),
-    "removes": ("remove",),
-    "releases": ("release",),
-    "drops": ("drop",),
-    "missing_points": ("missing",),
-    "missing_keys": ("missing",),
-}
-IN_SETTINGS = {
-    "identity": ("keyed",),
-    "max_points": ("point_limit",),
-    "frame": ("geographic",),
-    "window": (),
-    "subject_hull": ("subjects",),
-    "near_distance": ("near",),
-    "hull_area.layer": ("layer",),
-    "hull_area.hull": ("area", "hull"),
-    "circle_area.radius": ("area", "radius"),
-}
-PARAMETERS = {
-    "include_keys": "keys",
-    "layer_count": "count",
-    "sample_size": "size",
-    "sequence": "Idempotency-Key",
-    "producer": "Idempotency-Key",
-}
+OF_SEVERAL = re.compile(r"batches\[(\d+)\]\.")
 BATCH = re.compile(r"(?:batches\[(\d+)\]\.)?batch(?:\.(.*))?")
-POLYGON = re.compile(r"polygon_area\.polygons\[(\d+)\](?:\.(exterior|holes)(?:\[(\d+)\])?)?")
 SDK = re.compile(r"(\w+)(?: row (\d+))? is .*?: (.*)", re.DOTALL)
 OF_KIND = re.compile(r"(?:batches\[\d+\]\.)?batch\.(inserts|deletes|puts\.keys|removes)")
 COLUMNS = {"puts.keys": "key", "removes": "key", "puts.times": "time", "insert_times": "time"}
@@ -87,7 +52,7 @@ def of_refusal(error: DynhullError, body: Any = None, *, waited: Sequence[str] =
         detail = said(cause)
         fields |= {name: each for name, each in named(cause, path).items() if each is not None}
     elif error.field is not None:
-        fields["field"] = PARAMETERS.get(error.field, error.field)
+        fields["field"] = _parameter(error.field)
     return problem(status_of(error), detail, reason=error.reason or error.code.name, **(fields | more))
 
 
@@ -159,27 +124,24 @@ def _cause(error: DynhullError, path: list[str | int], body: Any) -> Cause:
 
 def _path(field: str, body: Any) -> list[str | int] | None:
     """The way through the body to a field that the server names; None if the body does not have it."""
-    if batch := BATCH.fullmatch(field):
-        within: list[str | int] = []
-        if batch[1] is not None:
-            within = ["batches", list(body["batches"])[int(batch[1])]]
-        if isinstance(body, list):
-            return []
-        return [*within, *IN_BATCH.get(batch[2] or "", ())]
-    if field.startswith("config."):
-        return _in_settings(field.removeprefix("config.").removeprefix("window."), body)
-    return [field] if isinstance(body, dict) and field in body else None
+    of_several = OF_SEVERAL.match(field)
+    found = find(field.removeprefix(of_several[0]) if of_several else field)
+    if found is None:
+        return [field] if isinstance(body, dict) and field in body else None
+    way = list(found.json)
+    if found.path.startswith("batch"):
+        within = ["batches", list(body["batches"])[int(of_several[1])]] if of_several else []
+        return [] if isinstance(body, list) else [*within, *way]
+    if way[1:] and way[0] == "area" and isinstance(way[1], int) and not isinstance(_at(body, ["area"]), list):
+        del way[1]  # one polygon is no list
+    in_body = not way or found.path.startswith("config") or (isinstance(body, dict) and way[0] in body)
+    return way if in_body else None
 
 
-def _in_settings(field: str, body: Any) -> list[str | int]:
-    if polygon := POLYGON.fullmatch(field):
-        area = isinstance(body, dict) and body.get("area")
-        index = [int(polygon[1])] if isinstance(area, list) else []
-        hole = [] if polygon[3] is None else [int(polygon[3])]
-        return ["area", *index, *([] if polygon[2] is None else [polygon[2]]), *hole]
-    if field.startswith("circle_area.center"):
-        return ["area", "center"]
-    return list(IN_SETTINGS.get(field, field.split(".")))
+def _parameter(field: str) -> str:
+    """A field of the server that is no part of a body, as a parameter or a header is called."""
+    found = find(field)
+    return field if found is None or not found.json else str(found.json[-1])
 
 
 def _at(body: Any, path: list[str | int]) -> Any:

@@ -267,6 +267,7 @@ class HullInfo(Response):
     quarantine: PresentRules | None = Field(description="Null for a hull that has never had any rules.")
     held: int = Field(description="Keys in quarantine.")
     shards: int | None = Field(description="The shards that its points are divided among; null for a whole hull.")
+    restored: bool = Field(description="Whether a backup has brought the hull back, without the batches after it.")
 
 
 class HullPage(Response):
@@ -658,8 +659,21 @@ class Difference(Response):
     recomputed: Place | None
 
 
+class FenceDifference(Response):
+    """One thing about a fence that is not as it must be."""
+
+    fence: str
+    hull: str = Field(description="With `key`, the subject, if there is one.")
+    key: str | int | None
+    sequence: int = Field(description="That of the wrong event; 0 for who is inside.")
+    expected: str
+    found: str
+
+
 class Verification(Response):
-    """The live hull compared with one computed anew."""
+    """The live hull compared with one computed anew, and the fences that compare it."""
+
+    whole: bool = Field(description="Whether everything that was compared is as it must be.")
 
     revision: int
     equal: bool
@@ -667,7 +681,11 @@ class Verification(Response):
     vertices: int
     rounds: list[ChanRound]
     difference: Difference | None
-    keys_equal: bool
+    keys_equal: bool = Field(description="Whether the points of a keyed hull are the positions of its keys.")
+    fences: int = Field(description="The fences that compare the hull or its keys.")
+    fence_differences: Annotated[list[FenceDifference], BeforeValidator(_listed)] = Field(
+        description="What is wrong with who is inside of them and with their events, the first of it."
+    )
 
 
 # Fences

@@ -2,21 +2,19 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
-from ..schemas import Measures, Place, Rows
+from ..schemas import Measures, Place, Rows, SubjectsInside
 
 
 class HullEvent(BaseModel):
     """What all events of a hull have."""
 
-    model_config = ConfigDict(extra="allow")
-
     revision: int = Field(description="The revision of the hull. An event may stand for several revisions.")
 
 
 class HullSnapshot(HullEvent):
-    """The whole hull: event `snapshot`, not with form=geojson."""
+    """The whole hull: event `snapshot`, not with f=geojson."""
 
     points: int = Field(description="The number of points.")
     vertices: Rows = Field(description="The vertices, counter-clockwise.")
@@ -31,7 +29,7 @@ class HullSnapshot(HullEvent):
 
 
 class HullChange(HullEvent):
-    """The difference to the event before: event `change`, with form=changes.
+    """The difference to the event before: event `change`, with f=changes.
 
     From the vertices of the event before, remove the rows `removed_rows`, move the first `rotation` of those that are
     left to the end, then insert `added`, one after the other, each so that it becomes the row in `added_rows`. With
@@ -49,6 +47,7 @@ class HullChange(HullEvent):
     renamed_keys: list[str] | list[int] | None = Field(None, description="and these keys.")
     measures: Measures | None = Field(None, description="With measures=true.")
     cause: str = Field(description="What has changed the hull: batch, expiry or recenter.")
+    clock: str | None = Field(None, description="The clock of a hull with a window.")
     center: Place | None = Field(None, description="Of a hull on the globe whose centre has moved.")
 
 
@@ -57,15 +56,26 @@ class HullProgress(HullEvent):
 
     points: int = Field(description="The number of points.")
     cause: str = Field(description="As in a change.")
+    clock: str | None = Field(None, description="As in a change.")
+    center: Place | None = Field(None, description="As in a change.")
 
 
 class FenceEvent(BaseModel):
     """The data of an event of a fence; fields that do not apply are left out."""
 
-    model_config = ConfigDict(extra="allow")
-
     type: Literal[
-        "enter", "exit", "cross", "dwell", "transfer", "begin", "cease", "snapshot", "closed", "lost", "progress"
+        "enter",
+        "exit",
+        "cross",
+        "dwell",
+        "transfer",
+        "begin",
+        "cease",
+        "snapshot",
+        "closed",
+        "lost",
+        "progress",
+        "unknown",
     ] = Field(description="What happened; the name of the event, too.")
     sequence: int = Field(description="Counted per fence from 1, without gaps.")
     fence: str = Field("", description="The name of the fence.")
@@ -74,10 +84,23 @@ class FenceEvent(BaseModel):
     hull: str = Field("", description="The hull of the subject.")
     key: str | int | None = Field(None, description="The key of the subject.")
     revision: int = Field(0, description="The revision of that hull.")
+    area_revision: int = Field(0, description="The revision of the area's hull.")
     position: Place | None = Field(None, description="Where the subject is.")
     previous_position: Place | None = Field(None, description="Where it was.")
+    distance: float | None = Field(
+        None, description="From the position to the area, 0 inside; of begin and cease, between the hulls."
+    )
     time: str = Field("", description="When the server made the event.")
     event_time: str | None = Field(None, description="The event time of the position.")
+    first_time: str | None = Field(
+        None, description="When the subject changed its side, if it had to stay; of dwell, since when it is inside."
+    )
+    inside: list[SubjectsInside] = Field([], description="Of snapshot and closed, who was inside, by hull.")
+    first: int = Field(0, description="Of lost, the first sequence that was dropped,")
+    last: int = Field(0, description="and the last one.")
+    conflated: int = Field(0, description="Events left out before this one because they cancel each other.")
+    previous_hull: str = Field("", description="The hull that a batch has moved the subject from.")
+    previous_hull_revision: int = Field(0, description="The revision of that hull that has removed the key.")
 
 
 OF_HULL = (

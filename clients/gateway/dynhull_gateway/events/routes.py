@@ -27,11 +27,12 @@ ONE_A_DAY = 1 / 86400  # the least that a watch takes
 Rate = Annotated[
     float, Query(ge=ONE_A_DAY, le=100, description="The most events a second, each with all changes before it.")
 ]
+OLD_NAME = "The old name of `f`, which takes its place."
 FormOf = Annotated[
-    Form,
+    Form | None,
     Query(
-        description="changes: a snapshot, then what differs; vertices: the whole hull in each event; geojson: the "
-        "whole hull as a Feature."
+        description="changes, the default: a snapshot, then what differs; vertices: the whole hull in each event; "
+        "geojson: the whole hull as a Feature."
     ),
 ]
 WithKeys = Annotated[bool, Query(description="Whether to name the vertices, in a keyed hull.")]
@@ -73,7 +74,8 @@ async def hull_events(
     request: Request,
     client: Caller,
     name: HullPath,
-    form: FormOf = "changes",
+    f: FormOf = None,
+    form: Annotated[Form | None, Query(deprecated=True, description=OLD_NAME)] = None,
     rate: Rate = 10.0,
     keys: WithKeys = False,
     measures: WithMeasures = False,
@@ -87,20 +89,22 @@ async def hull_events(
     a snapshot; so does one that is too slow. A hull that is created again begins with a snapshot. What ends the stream
     is an event "problem".
 
-    The data is JSON, as described by the schemas HullSnapshot, HullChange and HullProgress. With form=changes, the
-    events after the first one are "change", with what differs: HullChange says how to apply it. With form=vertices and
-    form=geojson each change is a "snapshot" of the whole hull. "progress" is a revision with the same vertices,
+    The data is JSON, as described by the schemas HullSnapshot, HullChange and HullProgress. With f=changes, the
+    events after the first one are "change", with what differs: HullChange says how to apply it. With f=vertices and
+    f=geojson each change is a "snapshot" of the whole hull. "progress" is a revision with the same vertices,
     "deleted" has its revision alone, and "problem" is a Problem.
 
     Events of a stream with max_vertices have no ids: each shows all there is, and a reader that connects again begins
     with the present one. An inner layer begins with a snapshot also when the gateway has lost the server for a while.
     """
+    if f is not None and form is not None:
+        raise ProblemError(400, f"form: {OLD_NAME}: give f alone", "INVALID_FIELD", field="form", value=form)
     _admit(request)
     with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
         await client.count(name, np.empty((0, 2)))  # whether it is there, and may be read
         if keys:
             await _require_keys(client, name)
-    view = View(token_of(request), name, form, rate, keys, measures, layer, max_vertices)
+    view = View(token_of(request), name, f or form or "changes", rate, keys, measures, layer, max_vertices)
     state = request.app.state
     texts = state.feeds.read(client, view, resumed(last_event_id), state.settings.keepalive_seconds, state.figures)
     return EventStream(texts, state.health, state.figures)

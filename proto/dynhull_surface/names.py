@@ -1,0 +1,129 @@
+"""What the fields of a request are called on every way to the server: one table, by their paths on the wire."""
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+
+class Name(NamedTuple):
+    """The names of a field.
+
+    Attributes:
+        json: the way to it in a body over HTTP; as the last part of its path unless given, empty for the whole body.
+        option: the option of commands; the last part of `json` as an option unless given.
+        row: what commands call one of its rows, if it has rows.
+    """
+
+    json: tuple[str, ...] | None = None
+    option: str | None = None
+    row: str = ""
+
+
+# Fields below one that is named here belong to it.
+NAMES: Mapping[str, Name] = {
+    "config": Name((), ""),
+    "config.identity": Name(("keyed",)),
+    "config.max_points": Name(("point_limit",)),
+    "config.ordering": Name(option="--event-order"),
+    "config.frame": Name(("geographic",)),
+    "config.center": Name(),
+    "config.shards": Name(),
+    "config.window": Name((), "--max-age or --max-points"),
+    "config.window.max_age": Name(),
+    "config.window.max_points": Name(),
+    "config.window.clock": Name(),
+    "config.window.max_skew": Name(),
+    "config.window.ahead": Name(option="--clamp"),
+    "config.quarantine": Name(option=""),
+    "config.quarantine.max_speed": Name(("quarantine", "max_speed")),
+    "config.quarantine.max_growth": Name(("quarantine", "max_growth")),
+    "config.quarantine.confirmations": Name(("quarantine", "confirmations")),
+    "config.hull_area": Name(("area",)),
+    "config.hull_area.name": Name(("area", "hull"), "--area"),
+    "config.hull_area.without_self": Name(),
+    "config.hull_area.layer": Name(),
+    "config.area": Name(("area",), "the area"),
+    "config.polygon_area": Name(("area",), "--polygon"),
+    "config.circle_area": Name(("area",), "--circle"),
+    "config.subject_hull": Name(("subjects",)),
+    "config.subject_prefix": Name(),
+    "config.other_hull": Name(),
+    "config.boundary": Name(),
+    "config.initial": Name(),
+    "config.margin": Name(),
+    "config.near_distance": Name(("near",)),
+    "config.report_crosses": Name(("crosses",)),
+    "config.dwell": Name(),
+    "config.min_dwell": Name(),
+    "config.confirmations": Name(),
+    "config.max_events": Name(),
+    "config.max_event_age": Name(),
+    "quarantine": Name((), ""),
+    "quarantine.max_speed": Name(),
+    "quarantine.max_growth": Name(),
+    "quarantine.confirmations": Name(),
+    "shards": Name(option="SHARDS"),
+    "batch": Name((), ""),
+    "batch.inserts": Name(("insert",), row="point"),
+    "batch.insert_times": Name(("times",), "--time", "time"),
+    "batch.deletes": Name(("delete",), row="point"),
+    "batch.moves": Name(("move",)),
+    "batch.moves.origins": Name(("move", "origins"), row="point"),
+    "batch.moves.destinations": Name(("move", "destinations"), row="point"),
+    "batch.puts": Name((), ""),
+    "batch.puts.keys": Name(row="key"),
+    "batch.puts.points": Name(row="position"),
+    "batch.puts.times": Name(option="--time", row="time"),
+    "batch.puts.expire_times": Name(option="--expires", row="time to leave"),
+    "batch.puts.ttl": Name(),
+    "batch.puts.condition": Name(("only",)),
+    "batch.removes": Name(("remove",), row="key"),
+    "batch.releases": Name(("release",), row="key"),
+    "batch.drops": Name(("drop",), row="key"),
+    "batch.missing_points": Name(("missing",), "--missing-ok"),
+    "batch.missing_keys": Name(("missing",), "--missing-ok"),
+    "producer": Name(("Idempotency-Key",), "--producer"),
+    "sequence": Name(("Idempotency-Key",), ""),
+    "consumer": Name(),
+    "after_sequence": Name(("after",)),
+    "other_name": Name(("other",), "the other hull"),
+    "include_keys": Name(("keys",)),
+    "layer_count": Name(("count",)),
+    "sample_size": Name(("size",)),
+}
+# What is below an area, as a body over HTTP has it; other fields, such as the encodings of points, are in no body.
+IN_AREA = {"exterior": "exterior", "holes": "holes", "center_x": "center", "center_y": "center", "radius": "radius"}
+PART = re.compile(r"\w+|\[\d+\]")
+
+
+class Found(NamedTuple):
+    """A field that is named, and what of a path is below it: names of fields and numbers of rows."""
+
+    path: str
+    name: Name
+    below: tuple[str, ...]
+
+    @property
+    def json(self) -> tuple[str | int, ...]:
+        """The way to it in a body over HTTP."""
+        way = self.name.json if self.name.json is not None else (self.path.rpartition(".")[2],)
+        below = (int(each[1:-1]) if each.startswith("[") else IN_AREA.get(each) for each in self.below)
+        return (*way, *(each for each in below if each is not None))
+
+    @property
+    def option(self) -> str:
+        """The option of commands; the path for none."""
+        if self.name.option is not None:
+            return self.name.option or self.path
+        way = self.name.json or (self.path.rpartition(".")[2],)
+        return f"--{way[-1].replace('_', '-')}"
+
+
+def find(path: str) -> Found | None:
+    """The names of the field with a path as the server names it, or of the nearest field above; None for none."""
+    parts = PART.findall(path)
+    for most in range(len(parts), 0, -1):
+        above = ".".join(parts[:most])
+        if above in NAMES:
+            return Found(above, NAMES[above], tuple(parts[most:]))
+    return None
