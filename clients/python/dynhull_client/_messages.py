@@ -589,7 +589,8 @@ _counts = attrgetter(*COUNTS)
 def decode_applied(message: batch_pb2.BatchResult) -> Applied:
     """The effect of a batch."""
     held, held_rows, *left = _after_clock(message)
-    return Applied(*_before_clock(message), _clock(message), held, tuple(held_rows), *left)
+    values: tuple[Any, ...] = (*_before_clock(message), _clock(message), held, tuple(held_rows), *left)
+    return Applied(*values)
 
 
 def decode_ingested(message: hull_service_pb2.IngestResponse) -> Ingested:
