@@ -1,32 +1,11 @@
-"""The storage that the settings ask for, if it is a database."""
+"""The database that the settings name."""
 
 from typing import TYPE_CHECKING
 
-from dynhull_server.app import end_process
 from dynhull_server.settings import Settings
-from dynhull_server.storage.port import Storage
 
 if TYPE_CHECKING:
     from .postgres.database import Database
-
-
-def storage_of(settings: Settings) -> Storage | None:
-    """What keeps the hulls of a server of one process in a database; None if the settings name none.
-
-    Raises:
-        ValueError: the address is invalid, or the package for PostgreSQL is missing.
-    """
-    if settings.journal is None:
-        return None
-    database = database_of(settings)
-    from .postgres.storage import PostgresStorage
-
-    return PostgresStorage(
-        database,
-        end_process,
-        settings.durability,
-        address=f"{settings.host}:{settings.port}",
-    )
 
 
 def database_of(settings: Settings) -> "Database":

@@ -2,14 +2,12 @@
 
 import asyncio
 import logging
-import os
 import shutil
 import socket
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from secrets import token_hex
 
 from dynhull_server import logs
 from dynhull_server.app import metrics_page, token_file
@@ -31,6 +29,7 @@ from dynhull_server.storage.worker_folders import divide, worker_folder, write_m
 from .child_process import ChildProcess, StartFailedError, prepare
 from .machines.entrance import checked_certificate, require_own_address
 from .metrics import registry_of
+from .postgres.processes import this_server
 from .sockets import socket_folder
 
 # Seconds in which the processes of a supervisor that was killed have ended, too.
@@ -74,9 +73,7 @@ async def _serve(settings: Settings) -> None:
         sockets = socket_folder(settings.data if in_folder else None)
         opened.callback(shutil.rmtree, sockets, ignore_errors=True)
         own = settings.model_copy(update={"port": port})
-        # Copies of a machine and containers have the same names and numbers.
-        site = f"{socket.gethostname()}-{os.getpid()}-{token_hex(2)}"
-        begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets), "site": site}
+        begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets), "site": this_server()}
         processes = Processes(
             [ChildProcess(f"worker-{i}", begin, settings.grace) for i in range(workers)],
             [ChildProcess(f"gateway-{i}", begin, settings.grace) for i in range(gateways)],

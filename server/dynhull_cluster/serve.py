@@ -23,10 +23,9 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     if settings.workers is None and not settings.cluster:
         from dynhull_server.process import run as run_one
 
-        from .divisions.divisions import ServedDivisions
-        from .journal import storage_of
+        from .alone import serving_alone
 
-        run_one(settings, partial(storage_of, settings), partial(ServedDivisions, settings))
+        run_one(settings, partial(serving_alone, settings))
     else:
         from .process import run
 

@@ -142,7 +142,7 @@ class Server:
             RuntimeError, OSError: the address is in use, or does not belong to this machine.
             StorageError: the stored data cannot be used.
         """
-        await self._listen()
+        await self.listen()
         await self._engine.read_ahead(storage, progress)
 
     async def start(self, progress: Progress = _unseen) -> None:
@@ -155,7 +155,7 @@ class Server:
             RuntimeError: the address is in use, or does not belong to this machine.
             StorageError: the stored data cannot be used.
         """
-        await self._listen()
+        await self.listen()
         for note in await self._engine.start(progress):
             log.warning("lost", extra={"what": note})
         self._calls.ready()
@@ -175,8 +175,12 @@ class Server:
             self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
         log.info("serving", extra={"address": self.address})
 
-    async def _listen(self) -> None:
-        """Listen, if that has not been done."""
+    async def listen(self) -> None:
+        """Listen, if that has not been done. Until the start, calls get UNAVAILABLE, and health is NOT_SERVING.
+
+        Raises:
+            RuntimeError, OSError: the address is in use, or does not belong to this machine.
+        """
         if self.address:
             return
         service = HullService(

@@ -7,38 +7,58 @@ import os
 import resource
 import signal
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 from dynhull import set_threads
 
 from . import event_loop, logs
-from .app import Server
-from .engine.division import Divisions
 from .failure import code_of, fail, text_of
 from .malloc import return_large_blocks
 from .progress import progress_bar
 from .setting_sources import warn_of_service_links
 from .settings import Settings
 from .starting import started
-from .storage.port import Storage, StorageError
+from .storage.port import Progress, StorageError
 
 log = logging.getLogger(__name__)
 
 SIGNALS = signal.SIGTERM, signal.SIGINT
 
 
-def run(
-    settings: Settings,
-    storage: Callable[[], Storage | None] = lambda: None,
-    divisions: Callable[[], Divisions | None] = lambda: None,
-) -> None:
+class Alone(Protocol):
+    """What serves in the only process of a server, from `start` until `drain` has returned."""
+
+    @property
+    def address(self) -> str:
+        """The host:port it listens on, once started."""
+
+    @property
+    def metrics_url(self) -> str:
+        """The URL of the metrics page; empty for none."""
+
+    async def start(self, progress: Progress) -> None:
+        """Listen, load the stored hulls, then serve.
+
+        Args:
+            progress: called with the number of hulls loaded so far and the total.
+
+        Raises:
+            RuntimeError, OSError: the address is in use, or does not belong to this machine.
+            StorageError: the stored data cannot be used.
+        """
+
+    async def drain(self) -> None:
+        """End the calls in progress, and stop; also after a start that has failed."""
+
+
+def run(settings: Settings, make: Callable[[], Awaitable[Alone]]) -> None:
     """Serve, then return; an error of the settings, the storage or the operating system ends the process.
 
     Args:
         settings: the settings.
-        storage: returns what keeps the hulls, None for memory or a folder as the settings say.
-        divisions: returns what runs hulls over shards, None for a server without.
+        make: makes what serves, another one for each attempt to start.
     """
     logs.configure(settings.log_level, settings.log_format)
     warn_of_service_links()
@@ -46,7 +66,7 @@ def run(
     share_processors(settings)
     allow_connections(settings.max_connections)
     try:
-        event_loop.run(_serve(settings, storage, divisions))
+        event_loop.run(_serve(settings, make))
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
 
@@ -66,12 +86,7 @@ def allow_connections(most: int) -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
-async def _serve(
-    settings: Settings, storage: Callable[[], Storage | None], divisions: Callable[[], Divisions | None]
-) -> None:
-    async def make() -> Server:
-        return Server(settings, storage=storage(), divisions=divisions())
-
+async def _serve(settings: Settings, make: Callable[[], Awaitable[Alone]]) -> None:
     with stop_signal() as stop:
         with progress_bar("hulls read") as progress:
             server = await started(make, lambda made: made.start(progress), stop, settings.start_patience)

@@ -2,7 +2,9 @@
 
 import re
 import subprocess
+import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -24,8 +26,13 @@ from server_process import finished, server_process
 from wall_clock import at
 
 from dynhull_client import HullClient
-from dynhull_cluster.machines.joining import clock_difference
+from dynhull_cluster.machines.board import join
+from dynhull_cluster.machines.joining import admit, clock_difference
 from dynhull_cluster.placement import worker_of
+from dynhull_cluster.postgres import ownership
+from dynhull_cluster.postgres.database import Database
+from dynhull_cluster.postgres.ownership import Leases
+from dynhull_server.storage.port import LockedError
 
 pytestmark = pytest.mark.one_process("a cluster has a shape of its own")
 
@@ -66,6 +73,8 @@ def test_a_machine_that_others_cannot_reach_or_whose_clock_is_wrong_does_not_joi
         assert refused.returncode != 0
         # Less than an hour by what the database took to answer.
         assert re.search(r"the clock of this machine is 3\d{3}\.\d s ahead of that of the database", refused.stderr)
+        refused = finished([*at("+1h"), COMMAND, "serve", "--port", "0", "--journal", postgres.new_database(), *QUIET])
+        assert "s ahead of that of the database" in refused.stderr
         refused = joined((), url, "--cluster-host", "192.0.2.7", "--insecure")
         assert refused.returncode != 0
         assert "cannot listen on --cluster-host 192.0.2.7: Cannot assign requested address" in refused.stderr
@@ -127,6 +136,29 @@ def test_a_limit_can_be_raised(postgres: PostgreSQL) -> None:
     options = machine(postgres.new_database(), "--max-clock-difference", "7200")
     with server_process(*options, wrap=at("-1h")) as server, HullClient(server.address) as client:
         assert client.apply("hull", insert=[[1, 2]]).revision == 1
+
+
+def test_a_server_without_cluster_waits_for_the_end_of_a_lease_that_nobody_renews(
+    postgres: PostgreSQL, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ownership, "LEASE", 0.5)
+    url = postgres.new_database()
+    join(Database(url), 1)
+    query(url, "INSERT INTO owners VALUES (0, 1, 'south-1-a', '', '', '2970-01-01')")
+    renewed = time.monotonic()
+    admit(Database(url), "north-1-a", "", 60, Leases())
+    assert time.monotonic() > renewed + 0.5
+    with ThreadPoolExecutor() as pool:
+        admitted = pool.submit(admit, Database(url), "north-1-b", "", 60, Leases())
+
+        def renews() -> bool:
+            query(url, "UPDATE owners SET until = until + interval '1 s'")
+            query(url, "UPDATE workers SET seen = '1970-01-01'")  # only the lease speaks against it
+            return admitted.done()
+
+        wait_until(renews)
+        with pytest.raises(LockedError, match="is served by south-1-a: stop that server first"):
+            admitted.result()
 
 
 def test_a_slow_database_is_no_wrong_clock() -> None:

@@ -211,16 +211,20 @@ def test_a_worker_that_is_slower_than_another_one_has_not_failed(url: str) -> No
 
 
 @pytest.mark.one_process("a cluster has a shape of its own")
-def test_a_cluster_beside_a_server_of_before_says_that_it_waits_for_its_end(url: str) -> None:
+def test_a_cluster_beside_a_server_of_one_process_says_that_it_waits_for_its_end(url: str) -> None:
     options = ("--journal", url, *QUIET)
     beside = ("--cluster", *options, "--log-level", "warning", "--log-format", "json")
     with server_process(*options) as first, HullClient(first.address) as client:
         assert client.apply("hull", insert=[[1, 1]]).points == 1
         with logged_process([COMMAND, "serve", "--port", "0", *beside]) as second:
             said = second.wait_for("nothing to serve: a server without --cluster has it, until that is stopped")
-            assert said["served_by"] == f"process {first.process.pid} on {socket.gethostname()}"
+            assert said["served_by"].startswith(f"{socket.gethostname()}-{first.process.pid}-")
             shown = dynhull("cluster", "status", "--journal", url).stdout
             assert f"{said['served_by']}  serves, without --cluster  1: 0\n" in shown
+            query(url, "UPDATE owners SET until = '-infinity'")  # until the first one renews it
+            query(url, "NOTIFY dynhull")
+            wait_until(lambda: query(url, "SELECT worker FROM owners WHERE until > '-infinity'"))
+            assert query(url, "SELECT worker, epoch FROM owners") == [(said["served_by"], 1)]
             first.process.terminate()
             with HullClient(second.process.stdout.readline().split()[-1], retries=100) as other:
                 assert other.apply("hull", insert=[[2, 2]]).points == 2

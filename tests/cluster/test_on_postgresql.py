@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -75,8 +76,8 @@ def test_a_killed_server_its_backup_and_the_next_one_have_the_same(
         before = state(client)
         refused = run("serve", "--port", "0", "--journal", url, *QUIET)
         assert refused.returncode == 2
-        assert f"is served by process {server.process.pid} on " in refused.stderr
-        assert "stop that server first, or choose another database" in refused.stderr
+        assert f"is served by {socket.gethostname()}-{server.process.pid}-" in refused.stderr
+        assert "stop that server first, choose another database, or start both with --cluster" in refused.stderr
         assert state(client) == before
         server.process.kill()
     with server_process("--journal", url, *QUIET) as server, HullClient(server.address) as client:

@@ -3,6 +3,7 @@
 import os
 import signal
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
@@ -15,6 +16,7 @@ from postgresql import PostgreSQL, query
 from server_process import Server, run, server_process
 
 from dynhull_client import HullClient, UnavailableError
+from dynhull_cluster.machines.joining import PRESENT
 
 pytestmark = pytest.mark.one_process("a cluster has a shape of its own")
 
@@ -90,18 +92,25 @@ def test_a_database_of_workers_of_before_opens(url: str) -> None:
 def test_workers_do_not_begin_beside_a_single_server(url: str) -> None:
     with server_process("--journal", url, *QUIET) as server, HullClient(server.address) as client:
         client.create_hull("a")
-        assert f"is served by process {server.process.pid} on " in refused("--workers", "1", "--journal", url)
+        assert f"is served by {socket.gethostname()}-{server.process.pid}-" in refused(
+            "--workers", "1", "--journal", url
+        )
         assert client.apply("a", insert=[[1, 2]]).revision == 1
 
 
 @with_all_cases
-def test_workers_take_over_from_a_single_server_elsewhere_that_has_died(url: str) -> None:
+@pytest.mark.parametrize("options", [(), ("--workers", "1")], ids=["one process", "workers"])
+def test_a_server_takes_over_from_one_elsewhere_that_has_died(url: str, options: tuple[str, ...]) -> None:
     with server_process("--journal", url, *QUIET, killed=True) as server, HullClient(server.address) as client:
         client.create_hull("a")
         server.process.kill()
-    query(url, "UPDATE owners SET process = 'elsewhere', until = clock_timestamp() + interval '5 s'")
-    with server_process("--workers", "1", "--journal", url, *QUIET) as server, HullClient(server.address) as client:
+    for table in ("owners", "workers"):
+        query(url, f"UPDATE {table} SET process = 'elsewhere'")
+    renewed = time.monotonic()
+    query(url, "UPDATE workers SET seen = clock_timestamp()")
+    with server_process(*options, "--journal", url, *QUIET) as server, HullClient(server.address) as client:
         assert client.apply("a", insert=[[1, 2]]).revision == 1
+        assert time.monotonic() > renewed + PRESENT
 
 
 @with_all_cases

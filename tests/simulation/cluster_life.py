@@ -20,11 +20,11 @@ from dynhull_cluster.machines.addresses import Addresses
 from dynhull_cluster.machines.board import Owner, Tables
 from dynhull_cluster.machines.entrance import proof_of
 from dynhull_cluster.postgres import ownership, processes
-from dynhull_cluster.postgres.ownership import LOOK, REQUIRE, Ownership, taken_over, writer_name
+from dynhull_cluster.postgres.ownership import LOOK, REQUIRE, Leases, Ownership, taken_over, writer_name
 from dynhull_server.state.errors import NotStoredError, OutcomeUnknownError
 from dynhull_server.state.limits import Limits
 from dynhull_server.storage.memory import MemoryStorage
-from dynhull_server.storage.port import Contents, LockedError, NotCommittedError, Progress, StorageError, TakenOverError
+from dynhull_server.storage.port import Contents, NotCommittedError, Progress, StorageError, TakenOverError
 
 from .clients import Client, probe
 from .core_life import ClientActor, Condition, CoreServer, Wait, compare
@@ -158,7 +158,7 @@ class Process:
         self.proof = proof_of(PARTITION, worker, SECRET)
         world.current = self
         database: Any = SimpleNamespace(connect=self.connect, end_silent=lambda _: None)
-        self.ownership = Ownership(database, PARTITION, "", self._lost, worker)
+        self.ownership = Ownership(database, PARTITION, self._lost, worker)
         self.spawn("server", self._serve)
         world.schedule.actor("reaper", lambda: self.alive and self._doomed, self.end)
 
@@ -206,13 +206,12 @@ class Process:
     # Its life
 
     def _serve(self) -> None:
+        leases = Leases()
         while True:
             try:
-                self.ownership.take()
+                self.ownership.take(leases)
                 break
-            except LockedError:
-                pass  # as long as that server renews its lease
-            except StorageError:
+            except StorageError:  # as long as another server renews its lease, too
                 self.wait(lambda: False, LOOK)
         storage: Any = OwnedStorage(self)
         self.core = CoreServer(self.world.limits, storage, self.site.model, self, self._threads)  # type: ignore[arg-type]
@@ -513,7 +512,6 @@ class World:
             CLOCK_BOOTTIME=0,
             clock_gettime=lambda _: self.now,
             monotonic=lambda: self.now,
-            sleep=lambda seconds: self._acting.wait(lambda: False, seconds),
         )
         threads = SimpleNamespace(
             Thread=lambda *, target, name, daemon: _Thread(self._acting, target, name),  # noqa: ARG005

@@ -166,10 +166,10 @@ class Postgres:
         return Result()
 
     def _insert(self, values: list[Any]) -> Result:
-        partition, worker, process, address, _ = values
+        partition, worker, process, _ = values
         if partition in self.owners:
             return Result()
-        self.owners[partition] = Row(partition, 1, worker, process, address, self._renewed())
+        self.owners[partition] = Row(partition, 1, worker, process, "", self._renewed())
         return Result(rowcount=1)
 
     def _select(self, session: Session, sql: str, values: list[Any]) -> Result:
@@ -196,7 +196,7 @@ class Postgres:
             session.before.setdefault(row.partition, copy(row))
         if "epoch + 1" in sql:
             row.epoch += 1
-            row.worker, row.process, row.address = new[:3]
+            row.worker, row.process, row.address = *new[:2], ""
             row.until = self._renewed()
         elif "clock_timestamp()" in sql:
             row.until = self._renewed()

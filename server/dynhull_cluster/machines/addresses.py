@@ -165,8 +165,8 @@ class Addresses:
 
 
 def _place_of(owner: Owner) -> _Place | None:
-    """Where an owner is reached; None of one that has gone, does not listen yet, or is none of a cluster."""
-    if owner.free or owner.alone or not owner.address:
+    """Where an owner is reached; None of one that has gone, or does not listen for others, or not yet."""
+    if owner.free or " " not in owner.address:  # one address is that for callers, of a server of before
         return None
     host, port, frames_port = owner.address.rsplit(" ", 2)
     return _Place(owner.epoch, owner.worker, host, int(port), int(frames_port))

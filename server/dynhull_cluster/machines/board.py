@@ -19,7 +19,7 @@ from dynhull_server.state.errors import words
 from dynhull_server.storage.port import StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors, storage_error
-from ..postgres.ownership import CHANNEL, IS_CONNECTED, LEASE
+from ..postgres.ownership import CHANNEL, IS_CONNECTED, LEASE, Leases
 from ..postgres.processes import is_known_dead, this_process
 from ..postgres.schema import hold, partitions_of, prepare
 from ..versions import UNSAID, Versions, own_versions
@@ -94,14 +94,9 @@ class Owner(NamedTuple):
         """Whether callers can expect answers."""
         return not self.free and self.connected and self.renewed
 
-    @property
-    def alone(self) -> bool:
-        """Whether it is a server without --cluster: it has one address, which is for callers, and keeps what it has."""
-        return not self.free and self.address != "" and " " not in self.address
-
 
 class Worker(NamedTuple):
-    """A worker that is present, and whether it is to give up its partitions."""
+    """A worker that is present, and whether it is to give up its partitions; without --cluster it has no host."""
 
     draining: bool
     process: str
@@ -139,6 +134,10 @@ class Tables(NamedTuple):
         owners = self.owners.values()
         here = {each.worker for each in owners if each.connected} | set(self.strangers())
         return {each.worker: each.process for each in owners if not each.free and each.worker not in here}
+
+    def alone(self) -> list[str]:
+        """The servers without --cluster that are there: while they are, nobody else has any partition."""
+        return [name for name, each in self.workers.items() if not each.host and not is_known_dead(each.process)]
 
     def strangers(self) -> dict[str, Versions]:
         """The workers that are present and have no version of the protocol in common with this program."""
@@ -216,6 +215,7 @@ class Board:
     Args:
         database: the database.
         changed: called with the tables after each look.
+        leases: what this process sees of leases.
         worker: the worker whose row it renews; empty for a process that only reads.
         host: where the worker listens for the others.
 
@@ -225,7 +225,14 @@ class Board:
         clock_difference: seconds by which the clock of a worker's machine is ahead of that of the database.
     """
 
-    def __init__(self, database: Database, changed: Callable[[Tables], None], worker: str = "", host: str = "") -> None:
+    def __init__(
+        self,
+        database: Database,
+        changed: Callable[[Tables], None],
+        leases: Leases,
+        worker: str = "",
+        host: str = "",
+    ) -> None:
         self.tables = Tables({}, {}, {}, {}, 0)
         self.leaving = False
         self.clock_difference = 0.0
@@ -233,24 +240,21 @@ class Board:
         self._changed = changed
         self._worker = worker
         self._host = host
-        self._since: dict[int, tuple[str, float]] = {}
+        self._leases = leases
         self._renewed = 0.0, False
-        self._looked = 0.0
+        self._looked: float | None = None
 
-    def lapsed(self, partition: int) -> str | None:
-        """The lease of an owner that has not been renewed for so long that it has ended; None of another."""
+    def is_free(self, partition: int) -> bool:
+        """Whether a partition can be taken at once."""
         owner = self.tables.owners.get(partition)
-        if owner is None or owner.free:
-            return None
-        until, since = self._since[partition]
-        return until if time.monotonic() > since + LEASE else None
+        return owner is None or owner.free or self._leases.ended(partition) or is_known_dead(owner.process)
 
     def forsaken(self, partition: int, worker: str) -> bool:
         """Whether nobody has a partition, and the worker that should take it has died, or does not do it."""
         owner = self.tables.owners.get(partition)
         if owner is None:
             return False
-        if time.monotonic() > self._since[partition][1] + (LEASE if owner.free else 2 * LEASE):
+        if self._leases.seconds(partition) > (LEASE if owner.free else 2 * LEASE):
             return True
         there = self.tables.workers.get(worker)
         return owner.free and there is not None and is_known_dead(there.process)
@@ -268,7 +272,7 @@ class Board:
         """Which worker has each partition, as far as is known; empty for none."""
         owners = self.tables.owners
         return [
-            "" if (owner := owners.get(each)) is None or owner.free or self.lapsed(each) else owner.worker
+            "" if (owner := owners.get(each)) is None or owner.free or self._leases.ended(each) else owner.worker
             for each in range(partitions)
         ]
 
@@ -336,12 +340,11 @@ class Board:
             cursors = [await connection.execute(sql) for sql in ALL]
         self.tables = _tables([await each.fetchall() for each in cursors])
         now = time.monotonic()
-        if now > self._looked + GAP:  # perhaps the owners could not renew them either
-            self._since.clear()
+        if self._looked is not None and now > self._looked + GAP:  # perhaps the owners could not renew them either
+            self._leases.forget()
         self._looked = now
         for partition, owner in self.tables.owners.items():
-            if self._since.get(partition, ("", 0.0))[0] != owner.until:
-                self._since[partition] = owner.until, now
+            self._leases.see(partition, owner.until)
         self._changed(self.tables)
 
     @asynccontextmanager

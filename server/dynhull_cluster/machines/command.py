@@ -62,10 +62,10 @@ def _state(tables: "Tables", worker: str) -> str:
         return "not connected to this database"
     if owned and not any(owner.renewed for owner in owned):
         return "is stopped or cut off: it does not renew its lease"
-    if any(owner.alone for owner in owned) or (present is not None and not present.host):
-        return "serves, without --cluster"
     if present is None:
         return "away"
+    if not present.host:
+        return "serves, without --cluster"
     return "gives up its partitions" if present.draining else "serves"
 
 

@@ -11,17 +11,16 @@ import socket
 import time
 from contextlib import closing
 
+from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.settings import is_loopback
 from dynhull_server.storage.port import LockedError, StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors
-from ..postgres.ownership import IS_CONNECTED
+from ..postgres.ownership import IS_CONNECTED, LOOK, Leases
 from ..postgres.processes import is_known_dead, shares_loopback, this_process
 from ..postgres.schema import hold
 from ..versions import EARLIER, UNSAID, Versions, apart, own_versions
 
-# Seconds between looks whether a worker out of reach is there.
-LOOK = 0.25
 # Seconds after which a worker that does not renew its row is one no longer.
 PRESENT = 5
 
@@ -33,6 +32,8 @@ RENEW = (
     b"draining = excluded.draining OR (workers.draining AND workers.process = excluded.process) "
     b"RETURNING extract(epoch FROM clock_timestamp())::float8"
 )
+# The work that fails while the clock of the machine is wrong.
+CLOCK = "clock of the machine"
 # How the connection of a worker to the tables is called, before its name.
 BOARD = "dynhull board"
 # What a worker of a row says of its versions; and if nothing, also not in a column that versions before do not have,
@@ -48,15 +49,20 @@ OTHERS = (
     f"WHERE seen > clock_timestamp() - interval '{PRESENT}s' AND worker <> %s ORDER BY worker"
 ).encode()
 
+OWNERS = b"SELECT partition, worker, process, until::text FROM owners WHERE until > '-infinity'"
 
-def admit(database: Database, worker: str, host: str, limit: float) -> None:
+
+def admit(database: Database, worker: str, host: str, limit: float, leases: Leases) -> None:
     """Put a worker into the tables of a cluster, if all servers that are present can reach and understand each other.
+
+    Of owners that have died elsewhere, a server without --cluster awaits the end of the leases, which it sees.
 
     Args:
         database: the database, which is prepared.
         worker: the worker.
         host: where it listens for other servers; empty for a server without --cluster.
         limit: how many seconds the clock of this machine may be off.
+        leases: what this process sees of leases.
 
     Raises:
         LockedError: another server is there, and one of the two is without --cluster.
@@ -65,7 +71,7 @@ def admit(database: Database, worker: str, host: str, limit: float) -> None:
     seen: dict[str, str] = {}
     with as_storage_errors(), closing(database.connect("dynhull start")) as connection:
         require_right_clock(_measured(connection), limit)
-        while against := _admit(connection, database, worker, host):
+        while against := _admit(connection, database, worker, host, leases):
             for other, (reason, when) in against.items():
                 if seen.setdefault(other, when) != when:  # it has not died in between
                     raise reason
@@ -86,8 +92,8 @@ def served_by(database: Database, worker: str) -> LockedError:
 
 
 def server_of(worker: str) -> str:
-    """The server that a worker is one of, by their names."""
-    return worker.rpartition("/")[0]
+    """The server that a worker is one of, by their names; one of a single process is the server."""
+    return worker.partition("/")[0]
 
 
 def clock_difference(before: float, there: float, after: float) -> float:
@@ -111,20 +117,32 @@ def require_right_clock(difference: float, limit: float) -> None:
         )
 
 
+def watch_clock(supervisor: Supervisor, difference: float, limit: float) -> None:
+    """Say it when the clock of this machine has become wrong, or right again; what it serves keeps its time."""
+    try:
+        require_right_clock(difference, limit)
+    except StorageError as error:
+        supervisor.failed(CLOCK, error)
+    else:
+        supervisor.succeeded(CLOCK)
+
+
 def _measured(connection: Connection) -> float:
     before = time.time()
     ((there,),) = connection.execute("SELECT extract(epoch FROM clock_timestamp())::float8").fetchall()
     return clock_difference(before, there, time.time())
 
 
-def _admit(connection: Connection, database: Database, worker: str, host: str) -> dict[str, tuple[StorageError, str]]:
+def _admit(
+    connection: Connection, database: Database, worker: str, host: str, leases: Leases
+) -> dict[str, tuple[StorageError, str]]:
     """Put the worker into the tables, unless others speak against it: why, and when they were seen."""
     against: dict[str, tuple[StorageError, str]] = {}
     with connection.transaction():
         hold(connection, database)  # two that join at once see each other
         for other, process, where, when, said, earlier in connection.execute(OTHERS, [worker]).fetchall():
             versions = versions_of(said, earlier)
-            if server_of(other) == server_of(worker):
+            if server_of(other) == server_of(worker) or (host and _is_awaited(other, where)):
                 continue
             if not (host and where):
                 if not is_known_dead(process):
@@ -133,9 +151,22 @@ def _admit(connection: Connection, database: Database, worker: str, host: str) -
                 against[other] = StorageError(apart(other, versions)), when
             elif not shares_loopback(process) and (_is_only_here(host) or _is_only_here(where)):
                 against[other] = StorageError(_out_of_reach(other, where, host)), when
+        for partition, owner, process, until in [] if host else connection.execute(OWNERS).fetchall():
+            if server_of(owner) != server_of(worker) and not is_known_dead(process):
+                leases.see(partition, until)
+                if not leases.ended(partition):
+                    against[f"partition {partition}"] = served_by(database, owner), until
         if not against:
             connection.execute(RENEW, [worker, False, this_process(), host, own_versions().text])
     return against
+
+
+def _is_awaited(other: str, where: str) -> bool:
+    """Whether a cluster may begin beside a server that has the database alone, and has what it leaves.
+
+    The processes of a server of several are started again by themselves, and would not get in any more.
+    """
+    return not where and server_of(other) == other
 
 
 def _is_only_here(host: str) -> bool:

@@ -12,7 +12,7 @@ other one or a third: whoever takes it raises the epoch, so that there are never
 import asyncio
 import logging
 import time
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine, Iterable, Iterator
 from typing import Any
 
 from prometheus_client import CollectorRegistry
@@ -31,6 +31,7 @@ from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
 from ..journal import database_of
 from ..metrics import merged
+from ..postgres.ownership import Leases
 from ..postgres.processes import is_known_dead
 from ..postgres.storage import PostgresStorage
 from ..versions import apart
@@ -40,13 +41,12 @@ from .ahead import FAILURES, Ahead, Served
 from .board import SPLITS, Board, Cluster, Tables, join, partitions_of_new
 from .claims import shares
 from .entrance import PartitionEntrance
-from .joining import admit, require_right_clock, served_by, server_of
+from .joining import admit, require_right_clock, server_of, watch_clock
 
 # Seconds before a partition that could not be taken is tried again: at first, and at most.
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
 # What may fail.
 READ_AHEAD, TAKE = "a partition cannot be read ahead", "a partition cannot be served"
-CLOCK = "clock of the machine"
 # What a copy of a database says that was made while it was served.
 APART = (
     "owners of partitions are not connected to this database: they have died, or it is a copy of theirs. They are not "
@@ -87,7 +87,8 @@ class Member:
         self._worker = worker
         self._database = database_of(settings)
         self._host = settings.cluster_host if settings.cluster else ""
-        self._board = Board(self._database, self._decide, worker, self._host)
+        self._leases = Leases()
+        self._board = Board(self._database, self._decide, self._leases, worker, self._host)
         self._supervisor = Supervisor(Clock(), self._turn_health, end_process)
         self._cluster = Cluster(0, "")
         self._addresses = Addresses("", None, settings.peer_ping_interval)
@@ -112,16 +113,15 @@ class Member:
         """
         settings = self._settings
         self._join(await asyncio.to_thread(join, self._database, partitions_of_new(settings)))
-        await asyncio.to_thread(admit, self._database, self._worker, self._host, settings.max_clock_difference)
+        await asyncio.to_thread(
+            admit, self._database, self._worker, self._host, settings.max_clock_difference, self._leases
+        )
         self._supervisor.every(0.0, "board", self._board.run)
         await self._looked.wait()
         apart = self._board.tables.apart().items()
         if owners := sorted(worker for worker, process in apart if not is_known_dead(process)):
             log.warning(APART, extra={"owners": ", ".join(owners)})
         await self._settle()  # what was free
-        if not settings.cluster:
-            await self._succeed()
-            await self._settle()
         log.info("serving", extra={"worker": self._worker, "partitions": len(self._served)})
 
     async def drain(self) -> None:
@@ -149,26 +149,12 @@ class Member:
         while self._busy:
             await asyncio.wait(self._busy.values())
 
-    async def _succeed(self) -> None:
-        """Wait until no other server has partitions. Raises LockedError if one renews its lease."""
-        seen: dict[int, str] = {}
-        while others := [
-            (number, owner)
-            for number, owner in self._board.tables.owners.items()
-            if not self._is_free(number) and not self._is_neighbour(owner.worker)
-        ]:
-            for number, owner in others:
-                if seen.setdefault(number, owner.until) != owner.until:
-                    raise served_by(self._database, owner.worker)
-            self._settled.clear()
-            await self._settled.wait()
-
     def _is_neighbour(self, worker: str) -> bool:
         """Whether a worker shares partitions with this one: without --cluster, only those of the same server do."""
         if server_of(worker) == server_of(self._worker):
             return True
         present = self._board.tables.workers.get(worker)
-        return self._settings.cluster and (present is None or present.host != "")
+        return self._settings.cluster and present is not None and present.host != ""
 
     def _is_of_neighbour(self, holder: str) -> bool:
         """Whether a partition is held by another worker that this one may take it over from."""
@@ -188,8 +174,17 @@ class Member:
                 self._busy[ALL].add_done_callback(lambda _: self._decide(self._board.tables))
             return
         self._addresses.learn(tables)
-        self._watch_clock()
+        watch_clock(self._supervisor, self._board.clock_difference, self._settings.max_clock_difference)
         self._notice_strangers()
+        if not self._settings.cluster or not (alone := tables.alone()):
+            self._share(tables)
+        else:
+            self._notice_idle(ALONE, alone)
+        self._looked.set()
+        self._settled.set()
+
+    def _share(self, tables: Tables) -> None:
+        """Begin to take, to read ahead and to let go what is this worker's, or not."""
         count = self._cluster.partitions
         holders = self._board.holders(count)
         own = tables.workers.get(self._worker)
@@ -202,14 +197,14 @@ class Member:
                 left = [each for each in workers if each != wanted[number]]
                 wanted[number] = shares(expected, left, tables.wishes)[number]
         if not leaving and not any(each.startswith(SPLITS) for each in wanted):
-            self._notice_idle(wanted)
+            self._notice_idle("" if self._worker in wanted else LEFT_OUT, wanted)
         for number, ahead in self._ahead.items():
             if wanted[number] != self._worker:
                 ahead.give_up()
         for number in range(count):
             if wanted[number] != self._worker or number in self._served or number in self._busy:
                 continue
-            if self._is_free(number):
+            if self._board.is_free(number):
                 if self._may_try(TAKE, number):
                     self._begin(number, self._take(number))
             elif not self._ahead and self._is_of_neighbour(holders[number]) and self._may_try(READ_AHEAD, number):
@@ -219,20 +214,11 @@ class Member:
             ready = (each for each in to_go if self._board.heir(each) == wanted[each])
             if (gone := next(ready, None)) is not None:
                 self._begin(gone, self._let_go(gone, wanted[gone]))
-        self._looked.set()
-        self._settled.set()
 
-    def _notice_idle(self, wanted: list[str]) -> None:
+    def _notice_idle(self, idle: str, owners: Iterable[str]) -> None:
         """Say it once when there is nothing to serve, which looks as if the server were broken."""
-        owners = self._board.tables.owners
-        alone = {
-            owner.worker if (owner := owners.get(number)) is not None and owner.alone and owner.connected else ""
-            for number, worker in enumerate(wanted)
-            if worker == self._worker
-        }
-        idle = LEFT_OUT if not alone else "" if "" in alone else ALONE
         if idle and idle != self._idle:
-            log.warning(idle, extra={"served_by": ", ".join(sorted(alone or set(wanted)))})
+            log.warning(idle, extra={"served_by": ", ".join(sorted(set(owners)))})
         self._idle = idle
 
     def _notice_strangers(self) -> None:
@@ -241,15 +227,6 @@ class Member:
         for worker in strangers.keys() - self._strangers:
             log.error(STRANGER, extra={"reason": apart(worker, strangers[worker])})
         self._strangers = set(strangers)
-
-    def _watch_clock(self) -> None:
-        """Say it when the clock of this machine has become wrong, or right again; what it serves keeps its time."""
-        try:
-            self._require_right_clock()
-        except StorageError as error:
-            self._supervisor.failed(CLOCK, error)
-        else:
-            self._supervisor.succeeded(CLOCK)
 
     def _turn_health(self, reason: str | None) -> None:
         for server in self._served.values():
@@ -261,12 +238,6 @@ class Member:
     def _may_try(self, what: str, number: int) -> bool:
         """Whether there is no reason to wait before something that has failed is tried again."""
         return time.monotonic() >= self._failed.get((what, number), (0.0, 0.0))[0]
-
-    def _is_free(self, number: int) -> bool:
-        """Whether a partition can be taken at once."""
-        owner = self._board.tables.owners.get(number)
-        free = owner is None or owner.free or self._board.lapsed(number) is not None
-        return free or (owner is not None and is_known_dead(owner.process))
 
     def _begin(self, number: int, work: Coroutine[Any, Any, None]) -> None:
         task = self._busy[number] = asyncio.get_running_loop().create_task(work)
@@ -321,6 +292,7 @@ class Member:
             partition=number,
             partitions=self._cluster.partitions,
             worker=self._worker,
+            leases=self._leases,
         )
         return Served(Server(own_settings(self._settings), entrance, storage, divisions), storage, entrance)
 
@@ -331,7 +303,6 @@ class Member:
         served = None if ahead is None else await ahead.finish()
         try:
             served = served or self._make(number)
-            served.storage.lapsed = self._board.lapsed(number)
             await served.server.start()
             await asyncio.to_thread(served.storage.announce, served.entrance.address)
         except FAILURES as error:

@@ -6,6 +6,7 @@ from dynhull_server.settings import Settings
 
 from ..gateway import Gateway
 from ..postgres.database import Database
+from ..postgres.ownership import Leases
 from .addresses import Addresses
 from .board import Board, Cluster, Tables, join
 
@@ -26,7 +27,7 @@ class ClusterGateway(Gateway):
         self._only = "" if settings.cluster else server
         self._addresses = self._addresses_of(settings)
         self._split = asyncio.Event()
-        self._board = Board(database, self._learn)
+        self._board = Board(database, self._learn, Leases())
         super().__init__(settings, cluster.partitions, self._addresses)
 
     async def start(self) -> None:

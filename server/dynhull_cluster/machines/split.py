@@ -25,8 +25,8 @@ from psycopg.errors import LockNotAvailable
 from dynhull_server.storage.port import LockedError, StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors, storage_error
-from ..postgres.ownership import CHANNEL, LEASE, REQUIRE, Ownership, taken_over, writer_name
-from ..postgres.processes import is_known_dead, this_process, this_worker
+from ..postgres.ownership import CHANNEL, REQUIRE, Leases, Ownership, taken_over, writer_name
+from ..postgres.processes import this_process, this_worker
 from ..postgres.reader import BegunReader
 from ..postgres.schema import PREPARING_SECONDS, partitions_of
 from ..postgres.splitting import require_together, split_rows
@@ -132,7 +132,7 @@ def _taken(database: Database, connection: Connection) -> Iterator[tuple[Ownersh
         LockedError: a server without --cluster has it, or the owner does not let go.
     """
     worker = f"{SPLITS}{this_worker()}"
-    owner = Ownership(database, 0, "", log.error, worker)
+    owner = Ownership(database, 0, log.error, worker)
     try:
         _withdraw(connection)
         connection.execute(f"LISTEN {CHANNEL}".encode())
@@ -153,7 +153,7 @@ def _withdraw(connection: Connection) -> None:
 def _take(database: Database, connection: Connection, owner: Ownership, worker: str) -> float:
     """Own partition 0, once its owner has let go; returns when that was seen."""
     begun = time.monotonic()
-    lease, renewed = "", begun
+    leases = Leases()
     while True:
         connection.execute(RENEW, [worker, False, this_process(), HOST, own_versions().text])
         tables = read(connection)
@@ -161,14 +161,10 @@ def _take(database: Database, connection: Connection, owner: Ownership, worker: 
             raise StorageError(apart(*min(strangers.items())))
         there = tables.owners.get(0)
         now = time.monotonic()
-        if there is not None and there.until != lease:
-            lease, renewed = there.until, now
-        lapsed = lease if now > renewed + LEASE else None
-        if there is None or there.free or lapsed is not None or is_known_dead(there.process):
-            with suppress(LockedError):  # another worker was faster
-                owner.take(lapsed)
-                return now
-        else:
+        with suppress(LockedError):  # of a worker that has it still, or was faster
+            owner.take(leases)
+            return now
+        if there is not None and not there.free:
             _ask(database, connection, worker, there, tables.workers.get(there.worker))
         if now > begun + PATIENCE:
             raise LockedError(f"the owner of {database} does not let go of it: see its log, and run the command again")
@@ -178,7 +174,7 @@ def _take(database: Database, connection: Connection, owner: Ownership, worker: 
 
 def _ask(database: Database, connection: Connection, worker: str, owner: Owner, present: Worker | None) -> None:
     """Have the owner let go for this worker. Raises LockedError if it never does."""
-    if owner.connected and (owner.alone or (present is not None and not present.host)):
+    if owner.connected and present is not None and not present.host:
         raise LockedError(
             f"{database} is served by {owner.worker} without --cluster, which nobody else can take over from: start "
             "`dynhull serve --cluster` beside it, then stop that server, whose hulls the cluster takes at once"

@@ -31,7 +31,7 @@ from .processes import is_known_dead, this_process, this_worker
 
 # Seconds of a lease, between renewals, and by which an owner ends its own lease earlier.
 LEASE, RENEWAL, MARGIN = 5.0, 1.0, 0.5
-# Seconds between looks whether the lease of another server is renewed.
+# Seconds between looks whether the lease of another server is renewed, for those who wait for that.
 LOOK = 0.25
 # Where it is said that a partition has changed hands.
 CHANNEL = "dynhull"
@@ -69,6 +69,31 @@ def _now() -> float:
     return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()
 
 
+class Leases:
+    """Which leases have ended: those that this process has seen for as long as a lease lasts, without a renewal."""
+
+    def __init__(self) -> None:
+        self._seen: dict[int, tuple[str, float]] = {}
+
+    def see(self, partition: int, until: str) -> None:
+        """Notice until when the owner of a partition has said last that it has it."""
+        if self._seen.get(partition, ("", 0.0))[0] != until:
+            self._seen[partition] = until, _now()
+
+    def seconds(self, partition: int) -> float:
+        """For how long the owner of a partition, or that it has none, has been seen as it is."""
+        seen = self._seen.get(partition)
+        return 0.0 if seen is None else _now() - seen[1]
+
+    def ended(self, partition: int) -> bool:
+        """Whether the lease that was seen last has ended."""
+        return self.seconds(partition) > LEASE
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._seen.clear()
+
+
 def writer_name(partition: int, epoch: int) -> str:
     """What the connection of an owner that commits is called."""
     return f"dynhull writer {partition}/{epoch}"
@@ -80,7 +105,6 @@ class Ownership:
     Args:
         database: the database.
         partition: the partition.
-        address: where callers reach the owner, for other servers.
         lost: called in the thread with the reason, when another server owns the partition or the thread has failed.
         worker: the name of the owner.
 
@@ -88,12 +112,9 @@ class Ownership:
         epoch: the epoch; 0 before `take`.
     """
 
-    def __init__(
-        self, database: Database, partition: int, address: str, lost: Callable[[str], None], worker: str = ""
-    ) -> None:
+    def __init__(self, database: Database, partition: int, lost: Callable[[str], None], worker: str = "") -> None:
         self._database = database
         self._partition = partition
-        self._address = address
         self._lost = lost
         self._worker = worker or this_worker()
         self._until = 0.0
@@ -118,26 +139,22 @@ class Ownership:
         with self._turn, self._working():
             return
 
-    def take(self, lapsed: str | None = None) -> None:
-        """Own the partition: at once if nobody does, or a process that has ended; else when the lease has ended.
+    def take(self, leases: Leases) -> None:
+        """Own the partition, if nobody does, or a process that has ended, or one whose lease has ended.
 
         Args:
-            lapsed: a lease that this process has seen for as long as it lasts, without a renewal.
+            leases: what this process has seen of leases; it sees that of the owner, too.
 
         Raises:
-            LockedError: another server renews its lease.
+            LockedError: another server owns the partition.
             StorageError: the database cannot be used.
         """
-        seen: str | None = None
-        since = _now()
-        while owner := self._try_to_take(seen if _now() > since + LEASE else lapsed):
-            if seen is None:
-                seen, since = owner.until, _now()
-            elif owner.until != seen:
-                raise LockedError(
-                    f"{self._database} is served by {owner.worker}: stop that server first, or choose another database"
-                )
-            time.sleep(LOOK)
+        with self._turn, self._working() as connection:
+            owner = self._try_to_take(connection, leases)
+        if owner is not None:
+            raise LockedError(
+                f"{self._database} is served by {owner.worker}: stop that server first, or choose another database"
+            )
         self._thread = threading.Thread(target=self._keep, name="lease", daemon=True)
         self._thread.start()
         threading.Thread(target=self._watch, name="lease watch", daemon=True).start()
@@ -207,24 +224,25 @@ class Ownership:
             [1000 * LOCK_SECONDS, writer_name(self._partition, 0)[:-1], until],
         )
 
-    def _try_to_take(self, ended: str | None) -> _Owner | None:
-        """Own the partition if it is free, or the lease is one that has `ended`; else its owner."""
-        with self._turn, self._working() as connection:
-            owner = self._owner(connection)
-            if owner and not owner.free and owner.until != ended and not is_known_dead(owner.process):
-                return owner
+    def _try_to_take(self, connection: Connection, leases: Leases) -> _Owner | None:
+        """Own the partition if its last owner has ended; else that owner."""
+        while (owner := self._owner(connection)) is None or self._has_ended(owner, leases):
             before = _now()
             try:
                 epoch = self._succeed(connection, owner)
             except LockNotAvailable:  # it was stopped inside of a transaction, which has locked the row
                 connection.execute("ROLLBACK")
                 self.end_writers(connection, until=0 if owner is None else owner.epoch)
-                return owner
-            if epoch is None:
-                return self._owner(connection)
-            self.epoch, self._until = epoch, before + LEASE - MARGIN
-            self._show(connection)
-            return None
+                continue
+            if epoch is not None:
+                self.epoch, self._until = epoch, before + LEASE - MARGIN
+                self._show(connection)
+                return None
+        return owner
+
+    def _has_ended(self, owner: _Owner, leases: Leases) -> bool:
+        leases.see(self._partition, owner.until)
+        return owner.free or leases.ended(self._partition) or is_known_dead(owner.process)
 
     def _owner(self, connection: Connection) -> _Owner | None:
         row = connection.execute(
@@ -235,8 +253,8 @@ class Ownership:
 
     def _succeed(self, connection: Connection, owner: _Owner | None) -> int | None:
         """Follow an owner, or nobody. The new epoch; None if another server was faster."""
-        own = self._worker, this_process(), self._address, LEASE
-        values = "%s, %s, %s, clock_timestamp() + make_interval(secs => %s)"
+        own = self._worker, this_process(), LEASE
+        values = "%s, %s, '', clock_timestamp() + make_interval(secs => %s)"
         if owner is None:
             sql = f"INSERT INTO owners VALUES (%s, 1, {values}) ON CONFLICT DO NOTHING"  # noqa: S608  (ours)
             return 1 if connection.execute(sql.encode(), [self._partition, *own]).rowcount else None

@@ -10,10 +10,16 @@ import errno
 import os
 import socket
 from pathlib import Path
+from secrets import token_hex
 
 PROC = Path("/proc")
 # Fields of /proc/PID/stat behind the name, see proc_pid_stat(5).
 STATE, THREADS, BEGUN = 0, 17, 19
+
+
+def this_server() -> str:
+    """A name for this server. Copies of a machine and containers have the same names and numbers, and so would two."""
+    return f"{socket.gethostname()}-{os.getpid()}-{token_hex(2)}"
 
 
 def this_worker() -> str:

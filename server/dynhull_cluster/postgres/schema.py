@@ -237,8 +237,13 @@ def require_partitions(connection: Connection, database: Database, partitions: i
     """Raise StorageError if the database, which has tables of dynhull, has another number of partitions."""
     present = partitions_of(connection, database)
     if present is not None and present != partitions:
-        remedy = f"start the server with --workers {present}, or with --cluster"
-        raise StorageError(f"{database} is divided among {present} workers: {remedy}")
+        raise divided_otherwise(database, present)
+
+
+def divided_otherwise(database: Database, partitions: int) -> StorageError:
+    """The error of a server that cannot serve so many partitions."""
+    remedy = f"start the server with --workers {partitions}, or with --cluster"
+    return StorageError(f"{database} is divided among {partitions} workers: {remedy}")
 
 
 def _end_owners(connection: Connection, database: Database, version: int) -> None:

@@ -38,7 +38,7 @@ from dynhull_server.storage.rows.totals import COPIES
 
 from .database import Connection, Database, as_storage_errors, storage_error
 from .follower import Follower
-from .ownership import REQUIRE, Ownership, taken_over, writer_name
+from .ownership import REQUIRE, Leases, Ownership, taken_over, writer_name
 from .reader import BegunReader, PostgresReader, Readers
 from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of, require_partitions
 
@@ -66,12 +66,8 @@ class PostgresStorage(RowStorage):
         durability: the durability of a commit.
         partition: the partition.
         partitions: the number of partitions of the database.
-        address: where callers reach this server, for others to see.
         worker: what others call this server.
-        lapsed: the lease of an owner before, which this process has seen to end.
-
-    Attributes:
-        lapsed: the same; it may be set until `open`.
+        leases: what this process has seen of leases.
     """
 
     def __init__(
@@ -82,17 +78,16 @@ class PostgresStorage(RowStorage):
         *,
         partition: int = 0,
         partitions: int = 1,
-        address: str = "",
         worker: str = "",
-        lapsed: str | None = None,
+        leases: Leases | None = None,
     ) -> None:
         super().__init__()
         self._database = database
         self._durability = durability
         self._partition = partition
         self._partitions = partitions
-        self._owner = Ownership(database, partition, address, lost, worker)
-        self.lapsed = lapsed
+        self._owner = Ownership(database, partition, lost, worker)
+        self._leases = leases or Leases()
         self._follower: Follower | None = None
         self._spare: Connection | None = None
         self._writer: Connection | None = None
@@ -160,7 +155,7 @@ class PostgresStorage(RowStorage):
         """Own the partition, and examine it."""
         with closing(self._prepared()) as connection, as_storage_errors():
             stack.callback(self._owner.release)
-            self._owner.take(self.lapsed)
+            self._owner.take(self._leases)
             connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
             require_partitions(connection, self._database, self._partitions)  # an owner before may have split it
             return examined(connection, self._partition, progress)
@@ -168,7 +163,7 @@ class PostgresStorage(RowStorage):
     def _take_followed(self, follower: Follower) -> Findings:
         """Own the partition, and follow what its last owner has left."""
         before = follower.epoch
-        self._owner.take(self.lapsed)
+        self._owner.take(self._leases)
         if self._owner.epoch != before + 1:
             raise StorageError(f"{self._place} is to be read anew: another server has owned it meanwhile")
         follower.go_on(self._owner.epoch)

@@ -5,12 +5,13 @@ source: they have the number and the sum of all rows.
 """
 
 import logging
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dynhull_server.storage.port import DamagedError, Progress, StorageError
+from dynhull_server.storage.port import DamagedError, LockedError, Progress, StorageError
 from dynhull_server.storage.rows.divided import Part, latest_epoch
 from dynhull_server.storage.rows.examine import Findings
 from dynhull_server.storage.rows.tables import COLUMNS, Insert, Reader
@@ -20,7 +21,7 @@ from dynhull_server.storage.worker_folders import parts_of, worker_folder, write
 
 from ..shards.epochs import owner_of
 from .database import Connection, Database, as_storage_errors
-from .ownership import Ownership, follow_owner
+from .ownership import LOOK, Leases, Ownership, follow_owner
 from .reader import PostgresReader
 from .schema import INSERTED_BYTES, hold, partitions_of, prepare, put_totals, queries_of
 from .storage import examined
@@ -115,10 +116,10 @@ def to_folder(database: Database, folder: Path, progress: Progress) -> Moved:
         partitions = _partitions(connection, database)
         if partitions > 1 and folder.exists() and any(folder.iterdir()):
             raise StorageError(f"{folder} is not empty")
-        owners = [Ownership(database, partition, "", log.error) for partition in range(partitions)]
-        for owner in owners:
+        owners = [Ownership(database, partition, log.error) for partition in range(partitions)]
+        for partition, owner in enumerate(owners):
             stack.callback(owner.release)
-            owner.take()
+            _take(partition, owner)
         connection.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
         for partition, owner in enumerate(owners):
             findings = examined(connection, partition, lambda *_: None)
@@ -152,6 +153,20 @@ def _rows(reader: Reader, progress: Progress) -> Iterator[Insert]:
             if not done % SENT_ROWS:
                 progress(done, total)
     progress(total, total)
+
+
+def _take(partition: int, owner: Ownership) -> None:
+    """Own a partition, perhaps only when the lease of a server has ended. Raises LockedError if that is renewed."""
+    leases, unchanged = Leases(), 0.0
+    while True:
+        try:
+            owner.take(leases)
+            return
+        except LockedError:
+            if (seconds := leases.seconds(partition)) < unchanged:
+                raise
+            unchanged = seconds
+        time.sleep(LOOK)
 
 
 def _while_owned(owner: Ownership, rows: Iterator[Insert]) -> Iterator[Insert]:
