@@ -7,7 +7,8 @@ network to it those of postgres_torture.py. The other faults:
 
 * a worker is killed, or stopped until its partitions are taken over, and then goes on
 * a gateway is killed
-* a machine stands still, as one of a hypervisor does, until its partitions are taken over, and then goes on
+* a machine stands still, as one of a hypervisor does, or does not reach the database, until its partitions are taken
+  over, and then goes on
 * a machine with its worker and its gateway is killed, or stopped as an operator does it, and started again
 * a machine is started again as another user, who sees no processes of others
 * partitions are to be moved when the worker that has one, or is to have it, is killed or stopped,
@@ -20,6 +21,7 @@ import argparse
 import os
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -35,18 +37,18 @@ sys.path.append(str(Path(__file__).parents[2] / "support"))
 sys.path.append(str(Path(__file__).parent))
 import postgres_torture
 import torture
-from actors import persist
 from blind import blind, may_blind
 from cluster import descendants, processes
 from pacing import pause
 from patience import PATIENCE, wait_until
 from promises import require
+from proxy import Proxy
 from small_disk import arguments, on_small_disk
 from tortured import Server
 
 PARTITIONS = 4
 OPTIONS = ("--cluster", "--partitions", str(PARTITIONS), "--grace", "10")
-ASKED = 20  # calls of a machine that stands still
+ASKED = 20  # calls of a machine that is left behind
 
 
 class Torture(postgres_torture.Torture):
@@ -59,8 +61,10 @@ class Torture(postgres_torture.Torture):
         options = (*OPTIONS, *certified(folder))
         tls = grpc.ssl_channel_credentials((folder / "ca.pem").read_bytes())
         super().__init__(folder, seed, breath, options, tls)
-        self._other = Server(folder, self._options, self._journal)
+        self._wires.append(Proxy(self._socket()))
+        self._other = Server(folder, self._options, self._journal_through(self._wires[1]))
         self._other.start()
+        self._wire_of = dict(zip([each.address for each in self._machines()], self._wires, strict=True))
         for machine in self._machines():
             self.readers.append(self._new_reader(machine.address))
             self.readers[-1].start()
@@ -99,28 +103,45 @@ class Torture(postgres_torture.Torture):
         require("taken over partition" in self.server.said(), self.server.said())
 
     def _suspend(self) -> None:
-        """The machine of the clients or the other one stands still until the other one has its partitions, and goes on.
+        """A machine stands still, as one of a hypervisor does, until the other one has its partitions, and goes on."""
+        stopped = self._left_behind()
+        for each in (standing := [stopped.process.pid, *descendants(stopped.process.pid)]):
+            os.kill(each, signal.SIGSTOP)
 
-        What was asked of it meanwhile is answered as of now.
-        """
+        def go_on() -> None:
+            for each in standing:
+                os.kill(each, signal.SIGCONT)
+
+        self._ask(stopped, go_on)
+
+    def _isolate(self) -> None:
+        """A machine that callers reach does not reach the database until the other one has its partitions."""
+        isolated = self._left_behind()
+        wire = self._wire_of[isolated.address]
+        wire.flowing.clear()
+        self._ask(isolated, wire.flowing.set)
+
+    def _left_behind(self) -> Server:
+        """The machine of the clients, or the other one, which is the other one then."""
         self._balanced()
         if self._random.random() < 0.5:
             self._turn()
-        stopped = [self._other.process.pid, *descendants(self._other.process.pid)]
-        with self.shared.channel(self._other.address) as channel:
-            stub, request = HullServiceStub(channel), pb.GetHullRequest(name=torture.HULL)
-            persist(stub.GetHull, request)
-            for each in stopped:
-                os.kill(each, signal.SIGSTOP)
-            self._begins()
+        return self._other
+
+    def _ask(self, machine: Server, go_on: Callable[[], None]) -> None:
+        """Ask a machine while the other one has its partitions, and have it go on: no answer is older than that."""
+        self._begins()
+        asked: list[grpc.Future] = []
+        with self.shared.channel(machine.address) as channel:
             try:
                 wait_until(lambda: len(self._serving()) == 1)
                 pause(self._random.uniform(0.1, 1.0))
                 acknowledged = self.acknowledged()
-                asked = [stub.GetHull.future(request, timeout=10) for _ in range(ASKED)]
+                request = pb.GetHullRequest(name=torture.HULL)
+                asked = [HullServiceStub(channel).GetHull.future(request, timeout=5) for _ in range(ASKED)]
+                pause(self._random.uniform(0.1, 1.0))
             finally:
-                for each in stopped:
-                    os.kill(each, signal.SIGCONT)
+                go_on()
             for call in asked:
                 if call.code() is grpc.StatusCode.OK:
                     revision = call.result().hull.revision
@@ -194,7 +215,8 @@ class Torture(postgres_torture.Torture):
         self._proxy.close()
         for machine in self._machines():
             machine.kill()
-        self._wire.close()
+        for wire in self._wires:
+            wire.close()
         self._database.stop()
 
 
@@ -219,6 +241,7 @@ KINDS = [
     "full_disk",
     "copy",
     "suspend",
+    "isolate",
 ]
 
 

@@ -81,11 +81,14 @@ class Torture(torture.Torture):
         self._database = PostgreSQL(home, SMALL)
         self._database.start()
         self._url = self._database.new_database()
-        self._wire = Proxy(self._socket())
-        host, _, port = self._wire.address.partition(":")
-        given = conninfo_to_dict(self._url)
-        self._journal = make_conninfo(dbname=given["dbname"], user=given["user"], host=host, port=port)
+        self._wires = [Proxy(self._socket())]
+        self._journal = self._journal_through(self._wires[0])
         super().__init__(folder, seed, breath, options, self._journal, tls)
+
+    def _journal_through(self, wire: Proxy) -> str:
+        host, _, port = wire.address.partition(":")
+        given = conninfo_to_dict(self._url)
+        return make_conninfo(dbname=given["dbname"], user=given["user"], host=host, port=port)
 
     def _socket(self) -> str:
         return f"{conninfo_to_dict(self._url)['host']}/.s.PGSQL.5432"
@@ -143,18 +146,23 @@ class Torture(torture.Torture):
 
     def _cut(self) -> None:
         """The connections to PostgreSQL are lost, and for a while there are no others."""
-        self._wire.server = ""
-        self._wire.cut()
+        for wire in self._wires:
+            wire.server = ""
+            wire.cut()
         pause(self._random.uniform(0, 6.0))
-        self._wire.server = self._socket()
+        for wire in self._wires:
+            wire.server = self._socket()
 
     def _hold(self) -> None:
         """Nothing arrives, in either direction; then it does, or the connections are lost."""
-        self._wire.flowing.clear()
+        for wire in self._wires:
+            wire.flowing.clear()
         pause(self._random.uniform(0.2, 6.0))
-        if self._random.random() < 0.5:
-            self._wire.cut()
-        self._wire.flowing.set()
+        is_lost = self._random.random() < 0.5
+        for wire in self._wires:
+            if is_lost:
+                wire.cut()
+            wire.flowing.set()
 
     def _copy(self) -> None:
         """A server on a physical copy of the database has what was acknowledged; what it takes never arrives here."""
@@ -235,7 +243,8 @@ class Torture(torture.Torture):
 
     def finish(self) -> None:
         super().finish()
-        self._wire.close()
+        for wire in self._wires:
+            wire.close()
         self._database.stop()
 
 
