@@ -192,6 +192,7 @@ kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, which Mave
 
 soak: fuzz fuzz-server fuzz-gateway properties robustness robustness-cluster workers shards cluster ray ends simulate  ## all that takes too long for every run, for hours; `make test` has a short run of each
 	PYTHONPATH=tests $(BIN)/python -m simulation mutants
+	$(BIN)/python tests/mutants/named.py
 
 N ?= 20
 BUSY ?= 0

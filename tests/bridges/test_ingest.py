@@ -270,7 +270,7 @@ def test_a_stream_that_was_created_again_under_hulls_by_subject(address: str, na
     options = (url, "--hull", f"{name}/{{1}}", "--x", "$.x", "--y", "$.y")
     publish(nats_port, name, [("a", {"x": 1, "y": 1})] * 3)
     assert ingested(address, *options)[-1]["points"] == 3
-    publish(nats_port, name, [("a", {"x": 1, "y": 1})] * 5, anew=True)
+    publish(nats_port, name, [(each, {"x": 1, "y": 1}) for each in "aaabb"], anew=True)
     refused(address, *options)
     refused(address, *options[:-1], "$['y']")
 
