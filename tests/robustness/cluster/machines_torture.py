@@ -135,7 +135,8 @@ class Torture(postgres_torture.Torture):
         with self.shared.channel(machine.address) as channel:
             try:
                 wait_until(lambda: len(self._serving()) == 1)
-                pause(self._random.uniform(0.1, 1.0))
+                before = self.acknowledged()
+                wait_until(lambda: self.acknowledged() > before + torture.POINT_WRITERS)
                 acknowledged = self.acknowledged()
                 request = pb.GetHullRequest(name=torture.HULL)
                 asked = [HullServiceStub(channel).GetHull.future(request, timeout=5) for _ in range(ASKED)]
