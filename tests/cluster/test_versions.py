@@ -17,7 +17,7 @@ from logged_process import logged_process
 from pacing import pause
 from patience import PATIENCE, wait_until
 from postgresql import PostgreSQL, query
-from server_process import finished
+from server_process import finished, server_process
 
 from dynhull_client import HullClient
 from dynhull_cluster.asking_frames import AskingFrames
@@ -92,6 +92,27 @@ def test_what_has_no_version_in_common_is_refused_and_gets_nothing(postgres: Pos
                 re.MULTILINE,
             )
         assert len(server.said(STRANGER)) == 1
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_split_refuses_what_is_of_another_version(postgres: PostgreSQL) -> None:
+    """Servers of another version would not have the new partitions; a later format has rows that are unknown here."""
+    url = postgres.new_database()
+    with server_process("--journal", url, "--scrub-cpu", "0", "--cluster", "--partitions", "1"):
+        pass
+
+    def refused(because: str) -> None:
+        said = dynhull("cluster", "split", 4, "--journal", url)
+        assert (said.exit_code, bool(re.search(because, said.stderr))) == (2, True), said.output
+        assert query(url, "SELECT partitions FROM format") == [(1,)]
+        assert not query(url, "SELECT FROM owners WHERE until > '-infinity'")
+        assert not query(url, "SELECT worker FROM workers WHERE starts_with(worker, 'split')")
+
+    with joined(url, "far/0", LATER):
+        wait_until(lambda: query(url, "SELECT worker FROM workers WHERE worker = 'far/0'"))
+        refused(APART.format("far/0"))
+    query(url, "UPDATE format SET format = 99")
+    refused("has format 99, this version reads formats ")
 
 
 def frame(number: int, kind: Kind, rest: bytes = b"") -> bytes:
