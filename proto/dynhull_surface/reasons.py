@@ -174,12 +174,18 @@ REASONS: Mapping[str, Reason] = {
     "TOKENS_CHANGED": Reason(
         Code.UNAVAILABLE, "UnavailableError", "Between processes of a server: the tokens have changed; a watch goes on."
     ),
+    "TOO_MANY_CALLS": Reason(
+        Code.UNAVAILABLE,
+        "UnavailableError",
+        "The connection has too many calls already; found by the SDK, which repeats the call as long as it may take.",
+        Repeat.ANY,
+    ),
     "UNAUTHENTICATED": Reason(
         Code.UNAUTHENTICATED, "UnauthenticatedError", "The server requires a token and knows none in the request."
     ),
 }
 
-# Refusals of a server that has not begun to do what was asked, as it starts or stops.
+# Refusals of a server that has not begun to do what was asked.
 NOT_BEGUN = frozenset(name for name, reason in REASONS.items() if reason.repeat is Repeat.ANY)
 
 # The exit codes of commands by the class of the error, for those that are not FAILED; subclasses have the same.

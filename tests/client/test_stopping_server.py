@@ -1,4 +1,4 @@
-"""A server that stops: gRPC cancels the calls that have arrived, and that the server has not begun."""
+"""Calls that a server has not begun: it stops or starts, or their connection has too many of them."""
 
 from collections.abc import Callable, Iterator
 from concurrent import futures
@@ -17,8 +17,11 @@ from dynhull_server.rpc.status import DrainingError, StartingError, error_status
 
 Ending = Callable[[grpc.ServicerContext], None]
 
+# What gRPC says of a call beyond those that a connection may have.
+CROWDED = "Stream removed (RST_STREAM (Received RST_STREAM with error code 7))"
 NOT_BEGUN: dict[str, Ending] = {
     "gRPC": lambda context: context.abort(grpc.StatusCode.CANCELLED, "CANCELLED"),
+    "crowded": lambda context: context.abort(grpc.StatusCode.UNAVAILABLE, CROWDED),
     "draining": lambda context: context.abort_with_status(to_status(error_status(DrainingError()))),
     "starting": lambda context: context.abort_with_status(to_status(error_status(StartingError()))),
 }
@@ -30,23 +33,25 @@ def begun(context: grpc.ServicerContext) -> None:
 
 
 class Stopping(HullServiceServicer):
-    """Ends each second call.
+    """Ends each call but every second one.
 
     Attributes:
         end: how.
+        every: which calls it does not end, in place of every second one.
         applied: the numbers of the batches that it was sent in streams.
         stopped: how many calls it has ended.
     """
 
     def __init__(self) -> None:
         self.end = NOT_BEGUN["gRPC"]
+        self.every = 2
         self.applied: list[int] = []
         self.stopped = 0
         self._calls = self._watches = 0
 
     def _may_stop(self, context: grpc.ServicerContext) -> None:
         self._calls += 1
-        if self._calls % 2:
+        if self._calls % self.every:
             self.stopped += 1
             self.end(context)
 
@@ -101,6 +106,22 @@ def test_calls_that_the_server_has_not_begun_are_repeated_whatever_they_are(
     assert servicer.stopped == 2
     with connect(address, retries=0) as client, pytest.raises(UnavailableError):
         client.apply("fleet", insert=[[1, 2]])
+
+
+def test_a_call_on_a_connection_that_has_too_many_is_repeated_as_long_as_it_may_take(
+    stopping: tuple[Stopping, str], connect: type[HullClient]
+) -> None:
+    servicer, address = stopping
+    servicer.end, servicer.every = NOT_BEGUN["crowded"], 4
+    with connect(address, retries=1) as client:
+        client.apply("fleet", insert=[[1, 2]])
+    assert servicer.stopped == 3
+    with (
+        connect(address, retries=0) as client,
+        pytest.raises(UnavailableError, match=r"has not begun the call: .*; try again") as caught,
+    ):
+        client.apply("fleet", insert=[[1, 2]])
+    assert caught.value.reason == "TOO_MANY_CALLS"
 
 
 def test_of_those_that_it_may_have_begun_batches_without_a_number_are_not(

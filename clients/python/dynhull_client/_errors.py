@@ -204,6 +204,9 @@ CANCELLED_HERE = "Locally cancelled by application!", "Channel closed!"
 # where too many wait. Of calls that they have begun, and do not complete in time, servers that stop say that all calls
 # are cancelled, with the code UNAVAILABLE.
 CANCELLED_UNBEGUN = "CANCELLED"
+# What gRPC says of calls that the server has refused before it has looked at them (RFC 9113, 8.7), because their
+# connection has too many.
+REFUSED_UNBEGUN = "(Received RST_STREAM with error code 7)"
 # What gRPC says of calls for which there is no connection.
 NOT_CONNECTED = "failed to connect to all addresses", "DNS resolution failed"
 # What gRPC says of an answer that is not one of gRPC; of the status 404 with the code of an unknown method.
@@ -223,6 +226,9 @@ def error_of(call: grpc.Call | grpc.RpcError, method: str, proxy: str | None = N
             why, reason = "ended the call, as one that stops", ""
         return UnavailableError(f"the server {why}", grpc.StatusCode.UNAVAILABLE, reason, {})
     message = call.details()
+    if status is None and call.code() == grpc.StatusCode.UNAVAILABLE and message and REFUSED_UNBEGUN in message:
+        why = "the server has not begun the call: too many of this connection wait there; try again"
+        return UnavailableError(why, grpc.StatusCode.UNAVAILABLE, "TOO_MANY_CALLS", {})
     if proxy is not None and message is not None and message.startswith(NOT_CONNECTED):
         message += f" (through the proxy {proxy})"
     if call.code() == grpc.StatusCode.UNIMPLEMENTED:

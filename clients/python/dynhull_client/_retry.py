@@ -16,6 +16,8 @@ FIRST_PAUSE = 0.1
 LONGEST_PAUSE = 5.0
 # A hull that is awaited is asked for this often: a missing hull costs the server little.
 LONGEST_PAUSE_FOR_A_HULL = 1.0
+# The refusal of a call whose connection has too many of them already. It passes as the others are answered.
+CROWDED = "TOO_MANY_CALLS"
 
 Answer = TypeVar("Answer")
 
@@ -53,6 +55,7 @@ class Attempts:
         self._deadline = None if timeout is None else monotonic() + timeout
         self._pauses = pauses(LONGEST_PAUSE_FOR_A_HULL if call.awaits_hull else LONGEST_PAUSE)
         self._left = retries
+        self._waits_in_a_crowd = retries > 0
         self._repeatable = call.repeatable
 
     def timeout(self) -> float | None:
@@ -71,7 +74,8 @@ class Attempts:
                 message = f"not within {self._timeout:g} s: {error}"
                 raise DeadlineError(message, grpc.StatusCode.DEADLINE_EXCEEDED, "", {}) from error
             return call, pause
-        self._left -= 1
+        if error.reason != CROWDED or not self._waits_in_a_crowd:
+            self._left -= 1
         safe = self._repeatable or error.reason in NOT_BEGUN or not_sent(error)
         if self._left < 0 or late or not passes(error) or not safe:
             raise self._explained(call, error) from None
