@@ -14,6 +14,7 @@ from brokers import broker, kafka
 from ingest_process import ingest_process, ingested
 from patience import PATIENCE, wait_until
 from ports import free_port
+from proxy import Proxy, proxy
 
 from dynhull_bridges.ingest import kafka as feeds
 from dynhull_bridges.ingest.feed import FeedError
@@ -25,10 +26,19 @@ POINT = json.dumps({"x": 1, "y": 1}).encode()
 
 
 @pytest.fixture(scope="module")
-def servers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def way(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxy]:
+    """The way to a broker, which has all clients take it."""
     port = free_port()
-    with broker(kafka(tmp_path_factory.mktemp("kafka"), port), port):
-        yield f"127.0.0.1:{port}"
+    with (
+        proxy(f"127.0.0.1:{port}") as way,
+        broker(kafka(tmp_path_factory.mktemp("kafka"), port, way.address), port),
+    ):
+        yield way
+
+
+@pytest.fixture(scope="module")
+def servers(way: Proxy) -> str:
+    return way.address
 
 
 @pytest.fixture
@@ -66,7 +76,7 @@ def made(servers: str, topic: str, partitions: int = 1) -> None:
 
 def known_id(servers: str, topic: str) -> bytes | None:
     try:
-        return asyncio.run(topic_id(servers, topic))
+        return asyncio.run(topic_id(servers, topic, 1000 * PATIENCE))
     except UnknownTopicOrPartitionError:
         return None
 
@@ -224,3 +234,21 @@ def test_what_the_topic_removed_before_it_was_read(address: str, servers: str, t
         assert "messages 4 to 8, 5 at most, were removed before they were read: --accept-gaps" in ingest.lines()[-1]
     said = ingested(address, *options(servers, topic, name), "--accept-gaps")[-1]
     assert (said["points"], said["lost"]) == (2, 5)
+
+
+@pytest.mark.parametrize("records", [0, 1], ids=["quiet", "busy"])
+def test_a_network_to_the_broker_that_swallows_bytes(
+    client: HullClient, address: str, way: Proxy, servers: str, topic: str, name: str, records: int
+) -> None:
+    """It is said, also where nothing comes; each record is a point once."""
+    made(servers, topic)
+    send(servers, topic, [POINT])
+    client.create_hull(name)
+    with ingest_process(address, *options(servers, topic, name), "--ping-interval", "1s") as ingest:
+        wait_until(lambda: client.last_sequence(name, f"kafka/{topic}/0") == 1)
+        way.silence()
+        send(servers, topic, [POINT] * records)
+        ingest.wait_for("no messages from the broker, trying again")
+        send(servers, topic, [POINT])
+        wait_until(lambda: client.last_sequence(name, f"kafka/{topic}/0") == 2 + records)
+    assert client.get_hull(name).info.points == 2 + records

@@ -38,8 +38,11 @@ def nats_server(folder: Path, port: int) -> list[object]:
     return [program("nats-server"), "-js", "-a", "127.0.0.1", "-p", port, "-sd", folder / "nats"]
 
 
-def kafka(folder: Path, port: int) -> list[object]:
-    """The command of a Kafka broker that is its own controller; `make kafka` brings its jars."""
+def kafka(folder: Path, port: int, reached_at: str | None = None) -> list[object]:
+    """The command of a Kafka broker that is its own controller; `make kafka` brings its jars.
+
+    It tells clients to connect to `reached_at`, or to itself.
+    """
     config = folder / "kafka.properties"
     controller = free_port()
     settings = {
@@ -48,6 +51,7 @@ def kafka(folder: Path, port: int) -> list[object]:
         "controller.quorum.voters": f"1@127.0.0.1:{controller}",
         "controller.listener.names": "CONTROLLER",
         "listeners": f"PLAINTEXT://127.0.0.1:{port},CONTROLLER://127.0.0.1:{controller}",
+        "advertised.listeners": f"PLAINTEXT://{reached_at or f'127.0.0.1:{port}'}",
         "log.dirs": folder / "log",
         "auto.create.topics.enable": "false",
         "offsets.topic.num.partitions": 1,

@@ -29,7 +29,8 @@ class Kafka:
         partition: the number of the partition.
         producer: the name under which hulls count the offsets; None for one of topic and partition.
         group: the group that keeps the offset.
-        ping_interval: seconds. One request is always under way, and it may take twice as long.
+        ping_interval: seconds. The broker answers twice a second while nothing comes; the connection is lost when it
+            has been silent for half as long again. Other requests may take three times as long.
     """
 
     def __init__(
@@ -41,7 +42,11 @@ class Kafka:
         group: str,
         ping_interval: float = PING_INTERVAL,
     ) -> None:
-        self._timeout = round(2000 * ping_interval)  # milliseconds
+        self._timeout = round(3000 * ping_interval)  # milliseconds
+        self._silence = 1.5 * ping_interval
+        self._wait = min(WAIT, round(250 * ping_interval))
+        self._heard = 0.0  # when the broker was heard last
+        self._answered: int | None = None  # when it was, by a clock that may be set
         self.name = f"kafka/{topic}/{partition}"
         self.producer: str | None = producer or producer_name("kafka", topic, str(partition))
         self._group = group
@@ -78,12 +83,12 @@ class Kafka:
         if after > end:
             raise made_again(f"{self.name} ends at offset {end}, but {after} offsets of it have been taken")
         consumer.seek(partition, max(after, oldest))
-        self._asked = monotonic()
+        self._asked = self._heard = monotonic()
         return Beginning(after, self._identity, oldest + 1)
 
     async def _id(self) -> int:
         """The id of the topic as a number of a batch: 63 of its bits, most of them random; 0 if it has none."""
-        found = await topic_id(self._servers, self._partition.topic)
+        found = await topic_id(self._servers, self._partition.topic, self._timeout)
         return 0 if found is None else int.from_bytes(found[:8]) >> 1
 
     async def read(self) -> Sequence[Message]:
@@ -93,7 +98,7 @@ class Kafka:
         """
         same = True
         try:
-            found = await self._connected.getmany(self._partition, timeout_ms=WAIT, max_records=MOST)
+            found = await self._connected.getmany(self._partition, timeout_ms=self._wait, max_records=MOST)
             if monotonic() - self._asked > ASK_EVERY:
                 self._asked = monotonic()
                 same = await self._id() == self._identity
@@ -102,8 +107,17 @@ class Kafka:
         if not same:
             raise FeedError("Kafka: the topic has another id")
         records = found.get(self._partition, ())
+        self._listen(bool(records))
         topic, captures = self._partition.topic, self._captures
         return [Message(topic, captures, each.value, each.offset + 1, key=each.key) for each in records]
+
+    def _listen(self, heard: bool) -> None:
+        """Raise FeedError if the broker has been silent for too long: aiokafka would ask again, without a word."""
+        answered = self._connected.last_poll_timestamp(self._partition)
+        if heard or answered != self._answered:
+            self._heard, self._answered = monotonic(), answered
+        elif (silent := monotonic() - self._heard) > self._silence:
+            raise FeedError(f"Kafka: the broker has said nothing for {silent:.0f} s")
 
     async def keep(self, messages: Sequence[Message]) -> None:
         """Commit the offset after the last one, unless the hull keeps it."""
@@ -174,7 +188,8 @@ class Topic:
             ValueError: the topic has no such partition, or the broker refuses for good.
             FeedError: no broker answers, or it refuses for now.
         """
-        admin = AIOKafkaAdminClient(bootstrap_servers=self._servers)
+        timeout = round(3000 * self._ping_interval)
+        admin = AIOKafkaAdminClient(bootstrap_servers=self._servers, request_timeout_ms=timeout)
         try:
             await admin.start()
             (described,) = await admin.describe_topics([self._name])

@@ -87,13 +87,13 @@ class _Describe(Request[_DescribeStruct]):  # type: ignore[misc]
         return request_struct_class([(bytes(LENGTH), self._topic, {})], False, False, False, {})
 
 
-async def topic_id(servers: str, topic: str) -> bytes | None:
-    """The id of a topic; None where the broker is older than ids.
+async def topic_id(servers: str, topic: str, timeout: int) -> bytes | None:
+    """The id of a topic; None where the broker is older than ids. Each request may take `timeout` milliseconds.
 
     Raises:
         KafkaError, OSError: the broker cannot be reached, or refuses, as where it has no such topic.
     """
-    client = AIOKafkaClient(bootstrap_servers=servers)
+    client = AIOKafkaClient(bootstrap_servers=servers, request_timeout_ms=timeout)
     try:
         await client.bootstrap()
         answer: Any = await client.send(client.get_random_node(), _Describe(topic))
