@@ -26,7 +26,7 @@ from dynhull_server.rpc.methods import (
     reflection_handlers,
 )
 from dynhull_server.rpc.metrics import CallCollector, Metrics
-from dynhull_server.rpc.places import Places
+from dynhull_server.rpc.places import Places, Unread
 from dynhull_server.settings import Settings
 
 from . import worker_link
@@ -76,7 +76,9 @@ class Gateway:
         metrics = self._metrics = Metrics()
         self.registry = metrics.registry
         streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
-        self._calls = Calls(self._entrance.authenticator(self._tokens), metrics, settings.max_message_bytes, streams)
+        unread = Unread(settings.max_unread_bytes_per_caller)
+        authenticate = self._entrance.authenticator(self._tokens)
+        self._calls = Calls(authenticate, metrics, settings.max_message_bytes, streams, unread)
         self._health = Health(
             Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
         )

@@ -39,7 +39,7 @@ from .rpc.methods import (
 )
 from .rpc.metrics import Metrics, StateCollector
 from .rpc.metrics_page import MetricsPage
-from .rpc.places import Places
+from .rpc.places import Places, Unread
 from .settings import Settings, is_loopback
 from .state.fences.faults import FenceFault
 from .state.limits import FenceLimits, Limits
@@ -120,7 +120,8 @@ class Server:
         self._tokens = token_file(settings)
         authenticate = self._entrance.authenticator(self._tokens)
         streams = Places("max_streams", settings.max_streams, settings.max_streams_per_caller)
-        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams, storage.entitled)
+        unread = Unread(settings.max_unread_bytes_per_caller)
+        self._calls = Calls(authenticate, self._metrics, settings.max_message_bytes, streams, unread, storage.entitled)
         self._health = Health(
             Places("max_health_calls", settings.max_health_calls, settings.max_health_calls_per_caller)
         )

@@ -114,6 +114,12 @@ class Settings(BaseModel):
     max_producers_per_caller: int = Field(1_000, ge=1, description="The same per token, or without tokens per address.")
     max_streams: int = Field(10_000, ge=1, description="Largest number of simultaneous streaming calls.")
     max_streams_per_caller: int = Field(2_500, ge=1, description="The same per token, or without tokens per address.")
+    max_unread_bytes_per_caller: int = Field(
+        256 * 2**20,
+        ge=1,
+        description="Largest size of what a caller of streams was sent and does not read, per token, or without tokens "
+        "per address.",
+    )
     max_health_calls: int = Field(1_000, ge=1, description="Largest number of simultaneous health checks and watches.")
     max_health_calls_per_caller: int = Field(32, ge=1, description="The same per address.")
     max_connections: int = Field(10_000, ge=1, description="Largest number of simultaneous connections.")

@@ -5,7 +5,9 @@ import asyncio
 import grpc
 import numpy as np
 from metrics import measured, scrape
+from patience import wait_until
 from refusal import refusal
+from server_process import server_process
 
 from dynhull_client import AsyncHullClient, HullClient, HullCopy
 from dynhull_client._messages import decode_event
@@ -105,6 +107,45 @@ def test_a_stream_whose_acknowledgements_are_not_read_is_not_read_either() -> No
         assert next(stream).result.revision == 1
         stream.cancel()
         assert taken < 1_000_000
+
+
+def test_what_a_caller_does_not_read_is_bounded() -> None:
+    """A stream ends whose next event would be too much; the others go on."""
+    with (
+        measured("--max-unread-bytes-per-caller", "100000", "--scrub-cpu", "0") as (server, address),
+        HullClient(server.address) as client,
+        grpc.insecure_channel(server.address, SMALL_WINDOW) as channel,
+    ):
+        client.create_hull("a")
+        client.apply("a", insert=ring(0))
+        stub = HullServiceStub(channel)
+        watches = []
+        for _ in range(STALLED):
+            watches.append(stub.Watch(pb.WatchRequest(name="a")))
+            next(watches[-1])
+        done = 0
+        while not (refused := scrape(address).get('dynhull_calls_total{code="RESOURCE_EXHAUSTED",method="Watch"}', 0)):
+            turn(client, done, done + 1)
+            done += 1
+            assert scrape(address)["dynhull_unread_bytes"] <= 100_000
+        assert refused < STALLED
+        wait_until(lambda: not all(watch.is_active() for watch in watches))
+        ended = next(watch for watch in watches if not watch.is_active())
+        code, info, _ = refusal(lambda: list(ended))
+        assert (code, info.metadata["limit"]) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "max_unread_bytes_per_caller")
+        for watch in watches:
+            watch.cancel()
+        wait_until(lambda: scrape(address)["dynhull_unread_bytes"] == 0)
+
+
+def test_a_message_that_is_larger_than_what_may_be_unread_is_sent_alone() -> None:
+    with server_process("--max-unread-bytes-per-caller", "1") as server, HullClient(server.address) as client:
+        client.create_hull("a")
+        with client.watch("a") as watch:
+            next(watch)
+            for i in range(3):
+                client.apply("a", insert=ring(i))
+                assert next(watch).revision == i + 1
 
 
 def test_a_watcher_that_takes_too_long_is_told() -> None:

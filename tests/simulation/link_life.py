@@ -24,7 +24,7 @@ from dynhull_server.rpc.calls import Calls
 from dynhull_server.rpc.hull_service import HullService
 from dynhull_server.rpc.methods import hull_handlers
 from dynhull_server.rpc.metrics import Metrics
-from dynhull_server.rpc.places import Places
+from dynhull_server.rpc.places import Places, Unread
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 from dynhull_server.state.batch import Applied, Batch
 from dynhull_server.state.errors import HullNotFoundError, NotStoredError, OutcomeUnknownError, SequenceGapError
@@ -65,7 +65,7 @@ class LinkedServer(ShellServer):
         metrics = Metrics()
         service = HullService(self._engine, metrics, create_on_write=True, max_watch_lag=math.inf)
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
-        calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places)
+        calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))
         calls.ready()
         frames = FrameServer([hull_handlers(service, calls)], {}, proof_of(PARTITION, WORKER, SECRET).encode())
         bound: Any = None

@@ -18,7 +18,7 @@ from dynhull_server.rpc.access import ANONYMOUS
 from dynhull_server.rpc.calls import Calls
 from dynhull_server.rpc.hull_service import HullService
 from dynhull_server.rpc.metrics import Metrics
-from dynhull_server.rpc.places import Places
+from dynhull_server.rpc.places import Places, Unread
 from dynhull_server.state.errors import HullNotFoundError, StoppingError
 
 from .clients import Client, Outline
@@ -44,7 +44,7 @@ class Queries:
         metrics = Metrics()
         self._service = HullService(engine, metrics, create_on_write=False, max_watch_lag=math.inf)
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
-        self._calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places)
+        self._calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))
         self._calls.ready()
 
     async def ask(self, client: Client, op: Operation) -> None:

@@ -26,7 +26,7 @@ from .access import (
 )
 from .call_counts import CallCounts
 from .metrics import Metrics
-from .places import Places
+from .places import Places, Unread
 from .refusal_log import RefusalLog
 from .status import ANSWERED, DrainingError, StartingError, error_status
 
@@ -151,16 +151,18 @@ class Call:
             raise asyncio.CancelledError from None
 
     async def write_within(self, seconds: float, message: Message | bytes) -> None:
-        """Send a message. Raises LimitExceededError if that takes longer, or the error of `end`.
+        """Send a message, or raise the error of `end`.
 
+        Raises LimitExceededError if that takes longer, or if the caller would have too much that it has not received.
         The client receives the message and then the error, because gRPC cannot cancel a message in part.
         """
         begun = time.monotonic()
         if not self._begun:  # otherwise a cut-off first message would leave unclear whether the call has begun
             self._begun = True
             await self._send_initial_metadata()
-        with self.cutoff():
-            await self.write(message)
+        data = message if isinstance(message, bytes) else self.serialize(message)
+        with self._calls.unread.sending(self.owner, len(data)), self.cutoff():
+            await self.write(data)
         if time.monotonic() - begun > seconds:
             raise LimitExceededError("max_watch_lag", seconds)
 
@@ -203,6 +205,7 @@ class Calls:
         metrics: counts the calls.
         max_message_bytes: the size of the largest message sent.
         streams: limits the streaming calls.
+        unread: limits what callers do not read.
         entitled: whether calls may be answered: not while another server may have other hulls.
     """
 
@@ -212,13 +215,16 @@ class Calls:
         metrics: Metrics,
         max_message_bytes: int,
         streams: Places,
+        unread: Unread,
         entitled: Callable[[], bool] = lambda: True,
     ) -> None:
         self.max_message_bytes = max_message_bytes
         self.streams = streams
+        self.unread = unread
         self._authenticate = authenticate
         self._entitled = entitled
         self._metrics = metrics
+        metrics.count_unread(unread)
         self._starting = True
         self._draining = False
         self._open: set[Call] = set()

@@ -21,6 +21,7 @@ from .background import background_families
 from .batch_counts import BatchCounts
 from .call_counts import CallCounts
 from .fence_families import fence_families
+from .places import Unread
 
 # Seconds, from the delay of a small batch to that of a batch that fills a message.
 BUCKETS = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
@@ -70,6 +71,11 @@ class Metrics:
             registry=self.registry,
         )
         self._watchers: dict[object, float | None] = {}
+
+    def count_unread(self, unread: Unread) -> None:
+        """Export what callers have not read."""
+        help_of_bytes = "Bytes of messages of streams that were sent, and that callers have not received yet."
+        Gauge("dynhull_unread_bytes", help_of_bytes, registry=self.registry).set_function(lambda: unread.total)
 
     def queried(self, counts: Mapping[tuple[str, str], int]) -> None:
         """Count reads of a Query call, by method and status."""

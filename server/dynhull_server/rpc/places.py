@@ -1,4 +1,4 @@
-"""Limits on the calls in progress, in total and per caller."""
+"""Limits on the calls in progress, in total and per caller, and on what callers do not read."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -39,3 +39,37 @@ class Places:
             self._taken[owner] -= 1
             if not self._taken[owner]:
                 del self._taken[owner]
+
+
+class Unread:
+    """The bytes of messages that were sent to owners, and that they have not received yet.
+
+    A message that is larger than the limit is sent to an owner who has received all others.
+
+    Args:
+        most_each: the limit per owner.
+
+    Attributes:
+        total: the bytes of all owners.
+    """
+
+    def __init__(self, most_each: int) -> None:
+        self.total = 0
+        self._most_each = most_each
+        self._each: Counter[str] = Counter()
+
+    @contextmanager
+    def sending(self, owner: str, size: int) -> Iterator[None]:
+        """Count a message during the block, or raise LimitExceededError if that would be too much."""
+        unread = self._each[owner]
+        if unread and unread + size > self._most_each:
+            raise LimitExceededError("max_unread_bytes_per_caller", self._most_each)
+        self._each[owner] += size
+        self.total += size
+        try:
+            yield
+        finally:
+            self.total -= size
+            self._each[owner] -= size
+            if not self._each[owner]:
+                del self._each[owner]
