@@ -24,7 +24,7 @@ from dynhull_server.settings import Settings
 from dynhull_server.storage.port import LockedError, StorageError
 from dynhull_server.storage.sqlite.disk import Disk
 from dynhull_server.storage.sqlite.folder import Folder
-from dynhull_server.storage.worker_folders import divide, worker_folder, write_manifest
+from dynhull_server.storage.worker_folders import begin_anew_if_copied, divide, worker_folder, write_manifest
 
 from .child_process import ChildProcess, StartFailedError, prepare
 from .machines.entrance import checked_certificate, require_own_address
@@ -70,6 +70,8 @@ async def _serve(settings: Settings) -> None:
             for number in range(workers):
                 with _locked(worker_folder(settings.data, number)):
                     pass
+            for note in begin_anew_if_copied(settings.data, workers):
+                log.warning("lost", extra={"what": note})
         sockets = socket_folder(settings.data if in_folder else None)
         opened.callback(shutil.rmtree, sockets, ignore_errors=True)
         own = settings.model_copy(update={"port": port})

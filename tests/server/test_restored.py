@@ -1,9 +1,14 @@
-"""A restored backup is another incarnation: nobody takes what is in it for what the server had before."""
+"""A restored backup is another incarnation: nobody takes what is in it for what the server had before.
 
+Nor what is in a folder that was copied while no server used it, and brought back later.
+"""
+
+import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import grpc
 import pytest
@@ -68,11 +73,46 @@ def numbered(name: str, sequence: int, uid: str = "") -> pb.ApplyRequest:
     return request
 
 
-@pytest.fixture(scope="module")
-def before(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
-    folder = tmp_path_factory.mktemp("restored")
+class Backup:
+    """By the commands for it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.server = MortalServer(folder, *shape_options())
+
+    def back_up(self) -> None:
+        """Keep what the server has."""
+        assert dynhull("backup", self.folder / "backup", "--data", self.folder / "data").exit_code == 0
+
+    def restore(self) -> None:
+        """Bring it back after the server was killed."""
+        (self.folder / "data").rename(self.folder / "lost")
+        self.bring_back()
+        checked = dynhull("check", self.folder / "data")
+        assert checked.exit_code == 0, checked.stderr
+
+    def bring_back(self) -> None:
+        """Make the folder anew."""
+        assert dynhull("restore", self.folder / "backup", "--data", self.folder / "data").exit_code == 0
+
+
+class CopiedFolder(Backup):
+    """By other programs, while no server uses the folder."""
+
+    def back_up(self) -> None:
+        self.server.kill()
+        shutil.copytree(self.folder / "data", self.folder / "backup", ignore=shutil.ignore_patterns("sockets"))
+        self.server.start()
+
+    def bring_back(self) -> None:
+        shutil.copytree(self.folder / "backup", self.folder / "data")
+
+
+@pytest.fixture(scope="module", params=[Backup, CopiedFolder], ids=lambda way: way.__name__)
+def before(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
     with ExitStack() as stack:
-        server = MortalServer(folder, *shape_options())
+        way = request.param(tmp_path_factory.mktemp("restored"))
+        server = way.server
         stack.callback(server.kill)
         clients = {kind: stack.enter_context(connect(server.address)) for kind, connect in CLIENTS.items()}
         client, copy = clients["sync"], HullCopy()
@@ -94,7 +134,7 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
                 put(writers[kind], number)
         client.apply("r/taken", insert=[[0, 0]])
         client.create_fence("r/near", "r/taken", other_hull="r/sync", near=100)
-        assert dynhull("backup", folder / "backup", "--data", folder / "data").exit_code == 0
+        way.back_up()
         for writer in writers.values():
             for number in range(BACKED_UP, BACKED_UP + GONE):
                 put(writer, number)
@@ -102,10 +142,7 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
         client.ack_fence("r/fence", "uptodate", 5)
         next(iter(client.watch("r/sync", copy=copy)))
         server.kill()
-        (folder / "data").rename(folder / "lost")
-        assert dynhull("restore", folder / "backup", "--data", folder / "data").exit_code == 0
-        checked = dynhull("check", folder / "data")
-        assert checked.exit_code == 0, checked.stderr
+        way.restore()
         server.start()
         yield Before(client, writers, copy, fence.uid, taken, server.address)
 

@@ -160,6 +160,9 @@ class _FaultyDisk(Disk):
         _fail(self.fault("stat"), OSError)
         return super().size(file)
 
+    def birth(self, _: Path) -> None:
+        """Not known: a folder is the same in all lives, though its files are copied from one to the next."""
+
     def open(self, file: Path) -> IO[bytes]:
         _fail(self.fault("open"), OSError)
         opened = super().open(file)

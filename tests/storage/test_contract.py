@@ -88,6 +88,12 @@ class MemoryDisk(Disk):
     def identity(self, _):
         return 0, 0
 
+    def birth(self, _):
+        """There is no file."""
+
+    def read(self, _):
+        """Nor any other."""
+
     def open(self, _):
         return io.BytesIO()
 

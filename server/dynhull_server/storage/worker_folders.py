@@ -7,7 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from .port import DamagedError, FormatError, StorageError
-from .sqlite.folder import DATABASE
+from .rows.incarnation import new_incarnation
+from .sqlite.disk import Disk
+from .sqlite.folder import DATABASE, Folder
+from .sqlite.origin import is_copied
+from .sqlite.storage import SQLiteStorage
 
 MANIFEST = "workers.json"
 FORMAT = 1
@@ -76,6 +80,25 @@ def divide(data: Path, workers: int) -> None:
         )
     data.mkdir(parents=True, exist_ok=True)
     write_manifest(data, workers, complete=False)
+
+
+def begin_anew_if_copied(data: Path, workers: int) -> list[str]:
+    """Where one of the databases is a copy of what was served before, make all of them another incarnation: the same.
+
+    A hull over shards has its uid in several of them. Returns messages about what was lost or changed.
+
+    Raises:
+        StorageError: one of them cannot be used.
+    """
+    folders = [worker_folder(data, number) for number in range(workers)]
+    notes: list[str] = []
+    if any(is_copied(Folder(each, Disk())) for each in folders):
+        incarnation = new_incarnation()
+        for each in folders:
+            storage = SQLiteStorage(each, incarnation=incarnation)
+            notes += storage.open(lambda *_: None).notes
+            storage.close()
+    return notes
 
 
 def write_manifest(data: Path, workers: int, *, complete: bool) -> None:

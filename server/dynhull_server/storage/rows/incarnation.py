@@ -56,8 +56,17 @@ def renewing(ledger: Ledger, incarnation: str) -> Iterator[Change | AnyStep]:
         yield ChangeFence(replace(fence.row, uid=_renewed(fence.row.uid, incarnation)))
 
 
+def anew(reader: Reader, ledger: Ledger, incarnation: str) -> Iterator[Iterable[Change | AnyStep]]:
+    """The changes, to be adopted one after the other, that make of a database one that may lack what callers have had.
+
+    Commit them together: half of them would leave fences without consumers.
+    """
+    yield renewing(ledger, incarnation)
+    yield from beginning_anew(reader, ledger)
+
+
 def beginning_anew(reader: Reader, ledger: Ledger) -> Iterator[list[Change | AnyStep]]:
-    """The changes, to be committed one after the other, after which the fences have one event, who is inside.
+    """The changes, to be adopted one after the other, after which the fences have one event, who is inside.
 
     The events that there were since the backup cannot be told, and those in it have perhaps been sent, with other uids.
     So a sequence is left out: to each consumer that was there, all events that it has not acknowledged are lost.

@@ -6,24 +6,23 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ...state.changes import Change
 from ...state.records import HullRow, HullSettings, Kept
 from ..port import NEWEST, DamagedError, FormatError, LockedError, Progress, StorageError
 from ..rows import divided
 from ..rows.divided import NoLongerKeptError, Part, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
-from ..rows.incarnation import beginning_anew, new_incarnation, renewing
-from ..rows.ledger import AnyStep, Group, Ledger
+from ..rows.incarnation import new_incarnation, renewing
+from ..rows.ledger import AnyStep, Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
 from .disk import Access, Disk, make_durable
 from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
-from .migration import make_tables, migrate
+from .migration import begin_anew, change, make_tables, migrate
 from .readers import SQLiteReader
-from .schema import PAGE_BYTES, renew_totals, sql_of
+from .schema import PAGE_BYTES, carry_out, renew_totals
 
 PAGES_A_STEP = 256
 # How often the folders of a server are opened to find what they have in common.
@@ -214,9 +213,7 @@ def write(source: str, target: Path, rows: Iterable[Insert], totals: Totals) -> 
         connection.execute("PRAGMA synchronous = OFF")  # it is made durable before it gets its name
         connection.execute("BEGIN IMMEDIATE")
         make_tables(connection)
-        for row in rows:
-            for sql, values in sql_of(row):
-                connection.execute(sql, values)
+        carry_out(connection, rows)
         renew_totals(connection, totals._replace(mode=STOPPED))
         findings = examine(connection, FORMAT, None, lambda *_: None)
         if findings.fatal:
@@ -373,13 +370,13 @@ def _finish(
     if findings.fatal:
         raise DamagedError(f"the data is damaged and was not copied: {'; '.join(findings.fatal)}")
     ledger = findings.ledger
-    _change(connection, ledger, _leading_back(SQLiteReader(connection, opened.version), ledger, lasts))
+    change(connection, ledger, _leading_back(SQLiteReader(connection, opened.version), ledger, lasts))
     if opened.version < FORMAT:
         migrate(connection, opened.version, ledger, findings.starts)
-    _change(connection, ledger, renewing(ledger, incarnation))
     if restores:
-        for changes in beginning_anew(SQLiteReader(connection), ledger):
-            _change(connection, ledger, changes)
+        begin_anew(connection, ledger, incarnation)
+    else:
+        change(connection, ledger, renewing(ledger, incarnation))
     renew_totals(connection, ledger.totals._replace(mode=STOPPED))
     connection.execute("COMMIT")
     return _report(findings, opened.notes)
@@ -389,15 +386,6 @@ def _leading_back(reader: SQLiteReader, ledger: Ledger, lasts: Mapping[int, int]
     """What drops that which hulls have beyond their last revisions."""
     for number, last in lasts.items():
         yield from dropping(reader, ledger.hulls[number], last)
-
-
-def _change(connection: sqlite3.Connection, ledger: Ledger, changes: Iterable[Change | AnyStep]) -> None:
-    """Carry out changes of rows."""
-    group = Group(ledger, changes)
-    for statement in group.statements:
-        for sql, values in sql_of(statement):
-            connection.execute(sql, values)
-    group.adopt()
 
 
 def _report(findings: Findings, notes: list[str]) -> Report:

@@ -7,6 +7,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO
 
+from .birth import birth
+
 # Seconds that a statement waits for locks of other connections, unless the connection says otherwise.
 LOCK_SECONDS = 30
 
@@ -54,6 +56,25 @@ class Disk:
         except FileNotFoundError:
             return None
         return stat.st_dev, stat.st_ino
+
+    def birth(self, file: Path) -> int | None:
+        """When a file was made, which another file under the same name does not share; None if that is not known."""
+        return birth(file)
+
+    def read(self, file: Path) -> bytes | None:
+        """The content of a small file, None if it does not exist."""
+        try:
+            return file.read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def write(self, file: Path, content: bytes) -> None:
+        """Give a small file this content, durably; after a crash it has this or the one before."""
+        part = file.with_name(f"{file.name}.part")
+        part.write_bytes(content)
+        make_durable(part)
+        part.replace(file)
+        make_durable(file.parent)
 
     def open(self, file: Path) -> IO[bytes]:
         """Open a file for reading, or for `sync`."""

@@ -1,13 +1,16 @@
-"""Creation of the tables, and migration from older formats. Each function runs inside a transaction."""
+"""Creation of the tables, migration from older formats, and other incarnations; each inside a transaction."""
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
+from ...state.changes import Change
 from ..rows.fence_runs import Start
 from ..rows.hull_rows import values
-from ..rows.ledger import Ledger
+from ..rows.incarnation import anew
+from ..rows.ledger import AnyStep, Group, Ledger
 from ..rows.totals import Totals
-from .schema import ADD_COMMITS, FENCE_TABLES, INSERT, SCHEMAS, TABLES, renew_totals, stamp
+from .readers import SQLiteReader
+from .schema import ADD_COMMITS, FENCE_TABLES, INSERT, SCHEMAS, TABLES, carry_out, renew_totals, stamp
 
 
 def make_tables(connection: sqlite3.Connection) -> None:
@@ -46,3 +49,17 @@ def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger, starts
         ledger.totals = ledger.totals.plus(0, 0, start.weight, 1)
     renew_totals(connection, ledger.totals)
     stamp(connection)
+
+
+def begin_anew(connection: sqlite3.Connection, ledger: Ledger, incarnation: str) -> None:
+    """Make another incarnation of a database, whose fences begin with who is inside. O(hulls, fences and who is in)."""
+    for changes in anew(SQLiteReader(connection), ledger, incarnation):
+        change(connection, ledger, changes)
+    renew_totals(connection, ledger.totals)
+
+
+def change(connection: sqlite3.Connection, ledger: Ledger, changes: Iterable[Change | AnyStep]) -> None:
+    """Change rows, but not the totals in the database."""
+    group = Group(ledger, changes)
+    carry_out(connection, group.statements)
+    group.adopt()

@@ -1,7 +1,7 @@
 """The tables of each format, and the statements to fill them."""
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ..rows.tables import COLUMNS, FORMAT, TOTALS_COLUMNS, Insert, Remove, Replace, Statement
@@ -198,6 +198,13 @@ def sql_of(statement: Statement) -> Iterator[tuple[str, tuple[Any, ...]]]:
                 yield f"DELETE FROM {table} WHERE rowid = ?", (place,)  # noqa: S608  (ours)
         case Replace(place, checksum, payload):
             yield REPLACE_EVENTS, (checksum, payload, place)
+
+
+def carry_out(connection: sqlite3.Connection, statements: Iterable[Statement]) -> None:
+    """Carry out changes of rows, in their order."""
+    for statement in statements:
+        for sql, values in sql_of(statement):
+            connection.execute(sql, values)
 
 
 def found(connection: sqlite3.Connection) -> tuple[int, int, dict[str, str | None]]:

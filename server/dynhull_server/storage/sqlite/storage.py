@@ -21,6 +21,7 @@ from ..durability import Durability
 from ..port import Contents, DamagedError, LockedError, NotCommittedError, Progress, Step, StorageError
 from ..refusals import Meaning
 from ..rows.examine import Findings
+from ..rows.incarnation import new_incarnation
 from ..rows.ledger import Group, Ledger
 from ..rows.storage import RowStorage
 from ..rows.tables import FORMAT
@@ -28,10 +29,11 @@ from ..rows.totals import MODES, STOPPED, Totals, totals_from
 from .disk import LOCK_SECONDS, Access, Disk
 from .examination import examine, format_of, load
 from .folder import Folder
-from .migration import make_tables, migrate
+from .migration import begin_anew, make_tables, migrate
+from .origin import is_copied, note
 from .readers import Readers, SQLiteReader
 from .refusals import meaning_of
-from .schema import PAGE_BYTES, UPDATE_TOTALS, renew_totals, sql_of
+from .schema import PAGE_BYTES, UPDATE_TOTALS, carry_out, renew_totals
 
 CHECKPOINT_BYTES = 16 * 2**20  # the size of the log that starts a checkpoint
 LONGEST_LOG_BYTES = 64 * 2**20  # a longer log is truncated when it restarts
@@ -39,6 +41,11 @@ START_PATIENCE_MS = 1000  # waiting for others at the start, before it is tried 
 PATIENCE_MS = 10  # waiting for writers and readers before the log restarts; meanwhile no commit begins
 
 SYNCHRONOUS = {Durability.SYNC: "FULL", Durability.INTERVAL: "NORMAL", Durability.NONE: "OFF"}
+
+IS_COPY = (
+    "it is a copy of the file that was served last, and may lack what was committed since: hulls and fences have other "
+    "uids, fences begin with who is inside, and writers with numbers that it lacks end with RESTORED"
+)
 
 # A write failed, so no complete frame has a commit mark.
 NOTHING_WRITTEN = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE)
@@ -60,12 +67,20 @@ class SQLiteStorage(RowStorage):
         path: the folder, created if it is missing.
         durability: the durability of a commit.
         disk: the disk it is on.
+        incarnation: makes it another incarnation, whether it is a copy or not; None only if it is one.
     """
 
-    def __init__(self, path: Path, durability: Durability = Durability.SYNC, disk: Disk | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        durability: Durability = Durability.SYNC,
+        disk: Disk | None = None,
+        incarnation: str | None = None,
+    ) -> None:
         super().__init__()
         self._folder = Folder(path, disk or Disk())
         self._durability = durability
+        self._incarnation = incarnation
         self._writer: sqlite3.Connection | None = None
         self._housekeeping = Lock()
         self._log_in_doubt = False
@@ -154,9 +169,7 @@ class SQLiteStorage(RowStorage):
             if connection is None:
                 connection = self._writer = self._connect_writer()
             connection.execute("BEGIN IMMEDIATE")
-            for statement in group.statements:
-                for sql, values in sql_of(statement):
-                    connection.execute(sql, values)
+            carry_out(connection, group.statements)
             connection.execute(UPDATE_TOTALS, group.totals.row)
         except BaseException as error:
             self._roll_back()
@@ -285,6 +298,12 @@ class SQLiteStorage(RowStorage):
             renew_totals(connection, findings.ledger.totals)
         connection.execute("COMMIT")
         self._write(Group(self._in_mode(MODES[self._durability]), findings.repairs))
+        if (self._ledger.hulls or self._ledger.fences) and (self._incarnation or is_copied(self._folder)):
+            connection.execute("BEGIN IMMEDIATE")
+            begin_anew(connection, self._ledger, self._incarnation or new_incarnation())
+            connection.execute("COMMIT")
+            findings.notes.append(IS_COPY)
+        note(self._folder)
         connection.execute(f"PRAGMA busy_timeout = {1000 * LOCK_SECONDS}")
         self._set_synchronous(connection)
 
