@@ -20,6 +20,7 @@ from refusal import refusal
 from server_process import shape_options
 
 from dynhull_client import (
+    Batch,
     Circle,
     FenceReplacedError,
     HullClient,
@@ -186,6 +187,17 @@ def test_numbers_that_do_not_say_of_which_hull_they_are(before: Before, stub: Hu
     ):
         _, info, _ = refusal(partial(stub.Apply, numbered(name, GONE, of)))
         assert info.reason == reason
+
+
+def test_batches_to_several_hulls(before: Before) -> None:
+    """The next number would be taken by all of them, and be that of another batch than before."""
+    uids = {f"r/{kind}": writer.uid for kind, writer in before.writers.items()}
+    revisions = [before.client.get_hull(name).info.revision for name in uids]
+    batches = {name: Batch(insert=[[0, 0]]) for name in uids}
+    with pytest.raises(RestoredError) as caught:
+        before.client.transfer(batches, producer="before", sequence=BACKED_UP + 1, uids=uids)
+    assert (caught.value.last, caught.value.metadata["batch"]) == (BACKED_UP, "0")
+    assert [before.client.get_hull(name).info.revision for name in uids] == revisions
 
 
 def test_rows_over_http_are_numbered_by_producers_too(before: Before) -> None:

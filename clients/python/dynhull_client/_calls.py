@@ -438,6 +438,7 @@ def transfer(
     producer: str = "",
     sequence: int = 0,
     may_skip: bool = False,
+    uids: Mapping[str, str] | None = None,
     timeout: float | None = None,
 ) -> Call[dict[str, Applied]]:
     """Apply a batch to each of 2 to 16 hulls: all of them, as one revision each, or none.
@@ -454,9 +455,12 @@ def transfer(
         producer: as for `apply`.
         sequence: as for `apply`; counted in each of the hulls.
         may_skip: as for `apply`.
+        uids: the uids of hulls whose producer has this number, by hull: RestoredError if a backup of one of them was
+            restored since then.
         timeout: seconds, instead of the client's.
     """
-    parts = [pb.HullBatch(name=name, batch=batch.message) for name, batch in batches.items()]
+    uids = uids or {}
+    parts = [pb.HullBatch(name=name, batch=batch.message, uid=uids.get(name)) for name, batch in batches.items()]
     request = pb.ApplyTogetherRequest(batches=parts, producer=producer, sequence=sequence, may_skip=may_skip)
 
     def decode(response: pb.ApplyTogetherResponse) -> dict[str, Applied]:

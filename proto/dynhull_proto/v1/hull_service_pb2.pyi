@@ -185,12 +185,14 @@ class ApplyTogetherRequest(_message.Message):
     def __init__(self, batches: _Optional[_Iterable[_Union[HullBatch, _Mapping]]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ...) -> None: ...
 
 class HullBatch(_message.Message):
-    __slots__ = ("name", "batch")
+    __slots__ = ("name", "batch", "uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     BATCH_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     batch: _batch_pb2.Batch
-    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ...) -> None: ...
+    uid: str
+    def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class ApplyTogetherResponse(_message.Message):
     __slots__ = ("results",)

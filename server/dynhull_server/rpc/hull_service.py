@@ -134,12 +134,17 @@ class HullService:
             call.access.require_write(name)
         write = decode_together(request, names, call.message_bytes, call.owner)
         try:
+            for index, each in enumerate(request.batches):
+                if each.uid and self._engine.has(each.name):
+                    write.refused = index
+                    await require_present(self._engine.get(each.name), request.producer, each.uid)
+            write.refused = None
             results = await self._engine.apply_together(write)
         except ANSWERED as error:
             self._metrics.batches.refused()
             if write.refused is None:
                 raise
-            reason = gap_explained(error, self._engine, names[write.refused], "")
+            reason = gap_explained(error, self._engine, names[write.refused], request.batches[write.refused].uid)
             raise PartRefusedError(write.refused, reason) from None
         response = pb.ApplyTogetherResponse()
         for applied in results:
