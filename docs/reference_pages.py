@@ -13,6 +13,9 @@ import mkdocs_gen_files
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto, FileDescriptorSet
 from grpc_tools import protoc
 
+import dynhull_client
+from dynhull_surface.reasons import REASONS, Code, Exit, exit_of, http_of, repeat_of
+
 PROTO = Path(__file__).parent.parent / "proto"
 LABELS = {
     "TYPE_" + name: name.lower() for name in ("BOOL", "BYTES", "DOUBLE", "INT32", "INT64", "STRING", "UINT32", "UINT64")
@@ -43,6 +46,30 @@ def named(name: str, command: Any) -> Iterator[str]:
     for parts in (getattr(command, "commands", {}), getattr(command, "beside", {})):
         for part, inner in parts.items():
             yield from named(f"{name} {part}", inner)
+
+
+def errors() -> Iterator[str]:
+    yield "# Errors\n"
+    yield "A refused request has changed nothing, unless its reason says otherwise. Messages are for people and may"
+    yield "change; reasons are for programs. Numbered batches are those of a producer, such as a writer of the SDK.\n"
+    yield "| reason | what has happened | class of the SDK | gRPC | HTTP | exit code | may be sent again |"
+    yield "| --- | --- | --- | --- | --- | --- | --- |"
+    for name, reason in REASONS.items():
+        code, error = reason.code.name, reason.error
+        ends = exit_of(getattr(dynhull_client, error)).value
+        cells = name, reason.meaning, f"`{error}`", code, http_of(name, code), ends, repeat_of(name, code).value
+        yield f"| {' | '.join(map(str, cells))} |"
+    yield "\n## Without a reason\n"
+    yield "What gRPC itself and proxies answer. With all other codes the class is `DynhullError`.\n"
+    yield "| gRPC | class of the SDK | HTTP | exit code | may be sent again |\n| --- | --- | --- | --- | --- |"
+    for each in Code:
+        if each.error != "DynhullError":
+            ends = exit_of(getattr(dynhull_client, each.error)).value
+            yield f"| {each.name} | `{each.error}` | {each.http} | {ends} | {each.repeat.value} |"
+    yield "\n## Exit codes of commands\n\n| code | meaning |\n| --- | --- |"
+    for exit_code in Exit:
+        yield f"| {exit_code.value} | {exit_code.meaning} |"
+    yield ""
 
 
 def described() -> FileDescriptorSet:
@@ -121,6 +148,6 @@ def cell(comments: Comments, *path: int) -> str:
     return " ".join(text(comments, *path).split()).replace("|", "\\|")
 
 
-for page, lines in (("commands", commands()), ("protocol", protocol())):
+for page, lines in (("commands", commands()), ("protocol", protocol()), ("errors", errors())):
     with mkdocs_gen_files.open(f"reference/{page}.md", "w") as file:
         file.write("\n".join(lines))
