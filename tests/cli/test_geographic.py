@@ -1,11 +1,15 @@
 """Geographic hulls from the command line."""
 
+import csv
 import json
 import re
 
+import numpy as np
 import pytest
 from command_line import dynhull
 from odd_places import NO_PLACES, TAKEN, TOO_FAR
+
+from dynhull_client import HullClient
 
 FIJI = "lon,lat,key\n177.4,-17.8,Nadi\n178.4,-18.1,Suva\n-179.9,-16.8,Taveuni\n179.4,-16.4,Labasa\n"
 
@@ -137,12 +141,13 @@ def test_a_plane_that_gets_longitudes_and_latitudes_is_warned_about_once(name, f
 
 
 @pytest.mark.usefixtures("served")
-def test_a_load_of_places_all_over_the_globe_is_refused_with_advice(name, tmp_path):
+def test_places_all_over_the_globe_are_bad_rows_with_advice(name, tmp_path):
     file = tmp_path / "world.csv"
     file.write_text("lon,lat\n" + "".join(f"{lon},0\n" for lon in range(-180, 180, 10)))
-    done = run("load", name, file, code=2)
-    assert "degrees from the centre" in done.stderr
-    assert "--replace --plane loads degrees as points of a plane" in done.stderr
+    for options, code in ((["--max-bad", "3"], 2), (["--resume"], 0)):
+        done = run("load", name, file, *options, code=code)
+        assert "degrees from the centre" in done.stderr
+        assert "--replace --plane loads degrees as points of a plane" in done.stderr
     run("load", name, file, "--replace", "--plane")
 
 
@@ -188,14 +193,17 @@ def test_rows_that_are_no_places_are_left_out(name, tmp_path, suffix):
         file.write_text("\n".join(json.dumps({"lon": lon, "lat": lat}) for lon, lat in rows))
     done = run("load", name, file)
     assert "2 bad rows" in done.stderr
-    assert "point 2: the latitude is 113.4, not from -90 to 90 degrees; the longitude comes first" in done.stderr
-    assert "point 4: the longitude is 361.0, not from -360 to 360 degrees" in done.stderr
+    first = 2 if suffix == "csv" else 1
+    assert (
+        f"line {first + 1}: the latitude is 113.4, not from -90 to 90 degrees; the longitude comes first" in done.stderr
+    )
+    assert f"line {first + 3}: the longitude is 361.0, not from -360 to 360 degrees" in done.stderr
     assert listed(name)["points"] == 3
     known = run("load", name, file, "--again", "--key", "lon", code=2) if suffix == "csv" else None
     assert known is None or "have no keys" in known.stderr
     plain = tmp_path / "plain.csv"
     plain.write_text("x,y\n7,8\n9,95\n")
-    assert "point 2: the latitude is 95.0" in run("load", name, plain).stderr  # the hull is on the globe
+    assert "line 3: the latitude is 95.0" in run("load", name, plain).stderr  # the hull is on the globe
     run("load", f"{name}-plane", plain)
     assert listed(f"{name}-plane")["points"] == 2
 
@@ -224,3 +232,38 @@ def test_odd_places_are_refused_and_change_nothing(name):
     places = [f"{lon},{lat}" for (lon, lat), _ in TAKEN]
     run("insert", name, "--", *places)
     assert listed(name)["points"] == len(TAKEN)
+
+
+@pytest.mark.parametrize("keyed", [False, True])
+def test_a_place_that_the_hull_does_not_reach_is_a_bad_row(served, name, tmp_path, keyed):
+    """Two batches, two such rows in the first, one in the second; killed trackers send (0, 0)."""
+    rng = np.random.default_rng(44)
+    rows = [
+        f"v{row},{lon:.5f},{lat:.5f}" for row, (lon, lat) in enumerate(rng.uniform((177, -19), (179, -16), (9000, 2)))
+    ]
+    bad = {5: "x,0,0", 17: "y,1,0", 8700: "z,0,0"}
+    for row, text in bad.items():
+        rows[row] = text
+    file, kept = tmp_path / "fiji.csv", tmp_path / "bad.csv"
+    file.write_text("id,lon,lat\n" + "\n".join(rows) + "\n")
+    key = ["--key", "id"] if keyed else []
+    dry = run("load", name, file, "--dry-run", *key)
+    assert dry.stdout.startswith(f"{name}: 8,997 points would be loaded")
+    refused = run("load", name, file, "--max-bad", "1", *key, code=2)
+    assert "more than 1 bad row (--max-bad)" in refused.stderr
+    run("delete", name, "--yes")
+    done = run("load", name, file, "--bad-rows", kept, *key)
+    assert done.stdout == f"{name}: 8,997 points loaded, 8,997 in the hull\n"
+    for said in (dry, done):
+        places = [line for line in said.stderr.splitlines() if line.startswith("  line")]
+        assert [line.split(":")[0] for line in places] == ["  line 7", "  line 19", "  line 8702"]
+        assert all("degrees from the centre" in line for line in places)
+    written = list(csv.DictReader(kept.read_text().splitlines()))
+    texts = ["0.0,0.0", "1.0,0.0", "0.0,0.0"]
+    assert (
+        [each["row"] for each in written] == [f"{a},{b}" for a, b in zip(texts, "xyz", strict=True)] if keyed else texts
+    )
+    again = run("load", name, file, "--resume", *key)
+    assert again.stdout == f"{name}: 0 points loaded\n"
+    with HullClient(served) as client:
+        assert client.get_hull(name).revision == 2

@@ -140,7 +140,7 @@ def test_a_table_of_keys_is_loaded_once(served, name, tmp_path):
         dynhull("create", name, "--keyed", "str", "--event-order", "--max-age", "1h", "--clock", "data").exit_code == 0
     )
     done = dynhull("load", name, file, "--key", "id", "--time", "seen")
-    assert (done.exit_code, done.stdout) == (0, f"{name}: 3 points loaded, 2 in the hull\n")
+    assert (done.exit_code, done.stdout) == (0, f"{name}: 3 points loaded (2 new, 1 moved), 2 in the hull\n")
     assert "line 5: seen is '2026-03-01T12:00:00', without a time zone: add Z for UTC, or an offset" in done.stderr
     assert "line 6: id is missing" in done.stderr
     points, times, revision = entities(served, name)
@@ -237,3 +237,56 @@ def test_keys_of_every_format(served, name, tmp_path):
     dynhull("insert", plain, "1,1")
     done = dynhull("load", plain, tmp_path / "p.json", "--key", "id")
     assert (done.exit_code, "have no keys: leave out --key" in done.stderr) == (2, True)
+
+
+AHEAD = """id,seen,x,y
+a,2026-03-01T12:00:00Z,0,0
+b,2099-01-01T00:00:00Z,9,9
+c,2026-03-01T12:00:01Z,4,0
+d,2098-01-01T00:00:00Z,9,9
+a,2026-03-01T11:00:00Z,7,7
+c,2026-03-01T10:00:00Z,1,1
+"""
+
+
+@pytest.mark.usefixtures("served")
+def test_a_time_that_the_hull_refuses_is_a_bad_row_and_every_count_is_told(name, tmp_path):
+    file = tmp_path / "seen.csv"
+    file.write_text(AHEAD)
+    options = ["--event-order", "--max-age", "90m", "--clock", "data", "--max-skew", "1m"]
+    assert dynhull("create", name, "--keyed", "str", *options).exit_code == 0
+    load = ["load", name, file, "--key", "id", "--time", "seen"]
+    dry = dynhull(*load, "--dry-run")
+    assert dry.stdout.startswith(f"{name}: 4 points would be loaded, x from 0.0 to 7.0"), dry.stderr
+    done = dynhull(*load)
+    assert done.stdout == f"{name}: 2 points loaded (2 new, 1 stale, 1 late), 2 in the hull\n", done.stderr
+    for said in (dry, done):
+        assert "2 bad rows left out:\n" in said.stderr
+        lines = [line for line in said.stderr.splitlines() if line.startswith("  line")]
+        assert [line.partition(", if")[0].partition(": the latest")[0] for line in lines] == [
+            f"  line {line}: time is {year}-01-01T00:00:00Z: further ahead of the server's clock than this hull allows"
+            for line, year in ((3, 2099), (5, 2098))
+        ]
+    counts = json.loads(dynhull(*load, "--again", "--json").stdout)
+    none = "deleted", "missing", "skipped", "clamped", "evicted", "held", "released", "dropped"
+    some = {"inserted": 0, "moved": 2, "stale": 1, "late": 1}
+    assert counts == {"name": name, "loaded": 2, "bad_rows": 2, "points": 2, **some, **dict.fromkeys(none, 0)}
+
+
+def test_a_batch_of_refused_rows_only_keeps_its_number(served, name, tmp_path):
+    """A key that comes again begins a batch: the first and the third batch have no row that the hull takes."""
+    bad, good = "a,2099-01-01T00:00:00Z,9,9\n", "a,2026-03-01T12:00:00Z,{0},{0}\n"
+    rows = [bad, good.format(1), bad, good.format(2), good.format(3)]
+    file = tmp_path / "seen.csv"
+    file.write_text("id,seen,x,y\n" + "".join(rows))
+    options = ["--max-age", "90m", "--clock", "data", "--max-skew", "1m"]
+    assert dynhull("create", name, "--keyed", "str", *options).exit_code == 0
+    load = ["load", name, file, "--key", "id", "--time", "seen", "--producer", "p"]
+    assert dynhull(*load).stdout == f"{name}: 3 points loaded (1 new, 2 moved), 1 in the hull\n"
+    with HullClient(served) as client:
+        assert client.last_sequence(name, "p") == 5
+    done = dynhull(*load, "--resume")
+    assert (done.exit_code, done.stdout) == (0, f"{name}: 0 points loaded\n")
+    file.write_text("id,seen,x,y\n" + bad)
+    done = dynhull("load", name, file, "--key", "id", "--time", "seen")
+    assert (done.exit_code, "has no points\n1 bad row left out:\n  line 2: time is 2099" in done.stderr) == (2, True)

@@ -22,6 +22,16 @@ ROW = re.compile(r"\b(?:puts\.keys|removes|releases|drops) row (\d+)")
 
 def in_options(error: "InvalidRequestError") -> str:
     """The message of an error, with options in place of the fields of the request that it names."""
+    return _named(error, _words(error.field or "", error.row))
+
+
+def of_row(error: "InvalidRequestError") -> str:
+    """The message of an error about one row of a batch, without the row."""
+    found = find(error.field or "")
+    return _named(error, (found and found.name.row) or error.field or "row")
+
+
+def _named(error: "InvalidRequestError", words: str) -> str:
     field = error.field or ""
     named = field if error.row is None else f"{field}[{error.row}]"
     message = str(error)
@@ -32,7 +42,7 @@ def in_options(error: "InvalidRequestError") -> str:
         return message
     problem = ROW.sub(lambda row: f"key {int(row[1]) + 1}", message.removeprefix(f"{named} is {shown}: "))
     problem = re.sub("|".join(WORDS), lambda word: WORDS[word[0]], problem)
-    return f"{_words(field, error.row)} is {WORDS.get(shown, shown)}: {problem}"
+    return f"{words} is {WORDS.get(shown, shown)}: {problem}"
 
 
 def _words(field: str, row: int | None) -> str:

@@ -51,10 +51,10 @@ def keys_for(client: HullClient, name: str, keys: Sequence[str]) -> list[str] | 
     return [integer_key(key, f"key {row}") for row, key in enumerate(keys, start=1)]
 
 
-def known_hull(client: HullClient, name: str) -> HullInfo | None:
+def known_hull(client: HullClient, name: str, *, timeout: float | None = None) -> HullInfo | None:
     """The hull, None if there is no such hull."""
     try:
-        first = next(client.list_hulls(name), None)
+        first = next(client.list_hulls(name, timeout=timeout), None)
     except InvalidRequestError as error:
         raise ValueError(f"the name of the hull {str(error).removeprefix('prefix ')}") from None
     return first if first is not None and first.name == name else None

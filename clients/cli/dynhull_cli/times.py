@@ -96,6 +96,11 @@ class TimeReader:
         return micros
 
 
+def shown_time(micros: int) -> str:
+    """A time as ISO 8601."""
+    return (EPOCH + timedelta(microseconds=micros)).isoformat().replace("+00:00", "Z")
+
+
 def unit_of(number: Decimal) -> TimeUnit:
     """The unit in which a number since 1970 is a time of our age."""
     return next((unit for unit, limit in LIMITS.items() if abs(number) < limit), TimeUnit.NANOSECONDS)

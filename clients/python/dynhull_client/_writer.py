@@ -100,9 +100,9 @@ class Writer:
             keys: n keys to put, in a keyed hull; as for `HullClient.put`.
             points: (n, 2) positions of the keys.
             times: (n,) event times of the keys or of the points to insert.
-            only: as for `HullClient.put`.
-            ttl: as for `HullClient.put`.
-            expire_times: as for `HullClient.put`.
+            only: the keys to put, only new or only known ones; as for `HullClient.put`.
+            ttl: the time after which the keys leave; as for `HullClient.put`.
+            expire_times: (n,) the times at which the keys leave; as for `HullClient.put`.
             sequence: with `may_skip`, the number of these changes, greater than all before; without it, None.
 
         Returns:

@@ -1,7 +1,7 @@
 """Rows that cannot be read as points: counts them, shows the first ones, and can write all to a file."""
 
 import csv
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TextIO
@@ -9,7 +9,13 @@ from typing import TextIO
 from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
 from ..plural import plural
 from .chunks import BadRow, Chunk, Rows
+from .refusals import TOO_FAR
 from .source import Source
+
+ADVICE = (
+    "A hull on the globe has points within 85 degrees of its centre. `dynhull create NAME --geographic "
+    "--center LON,LAT` makes one about another; --replace --plane loads degrees as points of a plane."
+)
 
 
 class BadRows:
@@ -18,6 +24,7 @@ class BadRows:
     def __init__(self, file: TextIO | None, most: int | None) -> None:
         self.count = 0
         self._first: list[BadRow] = []
+        self._too_far = False
         self._most = most
         self._writer = None if file is None else csv.writer(file)
         if self._writer is not None:
@@ -26,15 +33,18 @@ class BadRows:
     def left_out(self, chunks: Iterable[Chunk]) -> Iterator[Rows]:
         """The good rows of the chunks."""
         for chunk in chunks:
-            self._add(chunk.bad)
+            self.add(chunk.bad)
             yield chunk.rows
 
     def report(self) -> list[str]:
         """Lines for the user: how many there are, and the first ones."""
-        return bad_rows_left_out([f"{each.place}: {each.reason}" for each in self._first], self.count)
+        left_out = bad_rows_left_out([f"{each.place}: {each.reason}" for each in self._first], self.count)
+        return [*left_out, ADVICE] if self._too_far else left_out
 
-    def _add(self, rows: list[BadRow]) -> None:
+    def add(self, rows: Sequence[BadRow]) -> None:
+        """Count and keep bad rows; ValueError if there are too many."""
         self.count += len(rows)
+        self._too_far |= any(TOO_FAR in each.reason for each in rows)
         self._first += rows[: SHOWN_BAD_ROWS - len(self._first)]
         if self._writer is not None:
             self._writer.writerows((each.place, each.reason, each.text) for each in rows)

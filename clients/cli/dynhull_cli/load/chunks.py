@@ -1,18 +1,21 @@
 """Points as they are read: a chunk of good rows at a time, and what is wrong with the bad ones."""
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull.arrays import Points as Points
 
 CHUNK_ROWS = 8192
+LINE = "line"
 
 Position = tuple[float, float]
 Key = str | int
+Numbers = npt.NDArray[np.int64]
 Row = TypeVar("Row")
 
 
@@ -31,12 +34,16 @@ class Rows:
 
     Attributes:
         points: (n, 2) finite points.
+        numbers: (n,) the numbers of their rows in the file, from 1,
+        unit: and what is counted: lines, say.
         keys: the key of each; None without a column of keys.
         times: the time of each in microseconds since 1970; None without a column of times.
         expires: the time at which each leaves, None for never; None where none leaves.
     """
 
     points: Points
+    numbers: Numbers
+    unit: str
     keys: list[Key] | None = None
     times: list[int] | None = None
     expires: list[int | None] | None = None
@@ -48,6 +55,8 @@ class Rows:
         keys, times, expires = self.keys, self.times, self.expires
         return Rows(
             self.points[rows],
+            self.numbers[rows],
+            self.unit,
             None if keys is None else keys[rows],
             None if times is None else times[rows],
             None if expires is None else expires[rows],
@@ -61,10 +70,21 @@ class Rows:
         leave = [row for row, time in enumerate(self.expires) if time is not None]
         return [replace(self.at(stay), expires=None), self.at(leave)]
 
+    def without(self, bad: Collection[int]) -> "Rows":
+        """The rows but for some, given by their numbers in this."""
+        return self.at([row for row in range(len(self)) if row not in bad]) if bad else self
+
+    def bad(self, row: int, reason: str) -> BadRow:
+        """One of the rows as a bad one; its text is made of what was read."""
+        labels = (None if each is None else each[row] for each in (self.keys, self.times, self.expires))
+        text = ",".join(str(each) for each in (*self.points[row].tolist(), *labels) if each is not None)
+        return BadRow(f"{self.unit} {self.numbers[row]}", reason, text)
+
     def at(self, rows: list[int]) -> "Rows":
         """Some rows, given by their numbers."""
         columns: list[Any] = [self.keys, self.times, self.expires]
-        return Rows(self.points[rows], *(None if each is None else [each[row] for row in rows] for each in columns))
+        kept = self.points[rows], self.numbers[rows], self.unit
+        return Rows(*kept, *(None if each is None else [each[row] for row in rows] for each in columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,32 +100,38 @@ Labels = tuple[Key | None, int | None, int | None]
 
 
 def picked(
-    rows: Iterable[tuple[str, Row]],
+    unit: str,
+    rows: Iterable[tuple[int, Row]],
     positions: Callable[[Row], Sequence[Position]],
     text: Callable[[Row], str] = str,
     labels: Callable[[Row], Labels] | None = None,
 ) -> Chunk:
-    """Make a chunk from rows with their places.
+    """Make a chunk from rows with their numbers, of lines, say: the `unit`.
 
     `positions` returns the points of a row, and `labels` their key, time and time to leave; they raise ValueError if it
     has none.
     `text` returns its text for messages.
     """
     points: list[Position] = []
+    numbers: list[int] = []
     columns: tuple[list[Any], ...] = [], [], []
     bad = []
-    for place, row in rows:
+    for number, row in rows:
         try:
             found = positions(row)
             of_row = () if labels is None else labels(row)
         except ValueError as reason:
-            bad.append(BadRow(place, str(reason), text(row)))
+            bad.append(BadRow(f"{unit} {number}", str(reason), text(row)))
             continue
         points.extend(found)
+        numbers.extend([number] * len(found))
         for column, label in zip(columns, of_row, strict=False):
             column.extend([label] * len(found))
     known: Iterable[Any] = (column if any(each is not None for each in column) else None for column in columns)
-    return Chunk(Rows(np.array(points, np.float64).reshape(-1, 2), *known), bad)
+    return Chunk(
+        Rows(np.array(points, np.float64).reshape(-1, 2), np.array(numbers, np.int64), unit, *known),
+        bad,
+    )
 
 
 def cut(rows: Iterable[Row], size: int) -> Iterator[list[Row]]:
@@ -153,4 +179,7 @@ def _joined(parts: list[Rows]) -> Rows:
     expires: list[int | None] | None = None
     if any(part.expires is not None for part in parts):
         expires = list(chain.from_iterable(part.expires or [None] * len(part) for part in parts))
-    return Rows(np.concatenate([part.points for part in parts]), keys, times, expires)
+    points, numbers = (
+        np.concatenate(each) for each in zip(*((part.points, part.numbers) for part in parts), strict=True)
+    )
+    return Rows(points, numbers, parts[0].unit, keys, times, expires)

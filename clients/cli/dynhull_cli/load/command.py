@@ -127,7 +127,8 @@ def load(
     """
     from ..keyed_rows import known_hull
     from .bad_rows import BadRows, open_bad_rows
-    from .loading import load_points, producer_name, report_reading, require_readable
+    from .loading import hull_if_served, load_points, producer_name, report_reading, require_readable
+    from .refusals import Expected
     from .source import integers_of_any_size, open_source
 
     _check(decimal, replace=replace, resume=resume, again=again)
@@ -138,25 +139,30 @@ def load(
     options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires)
     if file is None and sys.stdin.isatty():
         raise ValueError("no file: give its name, or - to type the points in")
-    there = cache(partial(known_hull, client, name))
-    integers = not dry_run and key is not None and _has_integer_keys(there(), name)
+    there = cache(partial(hull_if_served if dry_run else known_hull, client, name))
+    integers = key is not None and _has_integer_keys(there(), name)
     with (
         integers_of_any_size(),
         open_source(STANDARD_INPUT if file is None else file, format, options, integer_keys=integers) as opened,
         open_bad_rows(bad_rows, opened) as bad_file,
     ):
         bad = BadRows(bad_file, max_bad)
-        known = (lambda: None) if dry_run or replace else there
+        known = (lambda: None) if replace else there
         source = dataclasses.replace(opened, geographic=lambda: _frame(known(), geographic))
+
+        def expected() -> Expected:
+            on_globe = source.geographic()
+            return Expected(known(), on_globe=source.degrees if on_globe is None else on_globe)
+
         if dry_run:
-            report_reading(name, source, bad, as_json)
+            report_reading(name, source, bad, expected, as_json)
             return
         if replace:
-            require_readable(source, max_bad)
+            require_readable(source, max_bad, expected)
         producer = producer or (None if again else producer_name(source))
         if resume and producer is None:
             raise ValueError(f"{source.name} has no name to resume by: give --producer NAME, the same each time")
-        loaded, points = load_points(
+        sending = load_points(
             client,
             name,
             source,
@@ -168,11 +174,14 @@ def load(
             resume=resume,
             replace=replace,
         )
+    loaded, counts, points = sending.counts.taken, sending.counts, sending.points
     if as_json:
-        typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad.count, points=points))
+        typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad.count, points=points, **counts))
     else:
+        more = f" ({counts})" if str(counts) else ""
         typer.echo(
-            f"{name}: {plural(loaded, 'point')} loaded" + ("" if points is None else f", {points:,} in the hull")
+            f"{name}: {plural(loaded, 'point')} loaded{more}"
+            + ("" if points is None else f", {points:,} in the hull")
         )
 
 

@@ -11,39 +11,32 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from dynhull_client import (
-    Applied,
-    DynhullError,
-    HullClient,
-    HullExistsError,
-    HullNotFoundError,
-    InvalidRequestError,
-    Writer,
-)
+from dynhull_client import DeadlineError, DynhullError, HullClient, HullExistsError, HullNotFoundError, UnavailableError
 
 from ..json_lines import json_line
+from ..keyed_rows import known_hull
 from ..plural import plural
 from .bad_rows import BadRows
-from .chunks import Points, Rows, blocks
+from .chunks import Chunk, Points, Rows, blocks
+from .refusals import Expected
+from .sending import LoadedBeforeError, Sending
 from .source import Source
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from dynhull.keys import KeyType
     from dynhull_client import HullInfo
 
 BATCH_POINTS = 8192  # part of the promise of --resume: the number of a batch says which points are in it
+ANSWER = 1.0  # seconds
 PRODUCER_DIGITS = 32  # of the file's digest
 
 
-class LoadedBeforeError(ValueError):
-    """The hull has batches of this load already."""
+def report_reading(name: str, source: Source, bad: BadRows, expected: Callable[[], Expected], as_json: bool) -> None:
+    """Read the input to its end and print what a load would add; ValueError where the input is unusable.
 
-
-def report_reading(name: str, source: Source, bad: BadRows, as_json: bool) -> None:
-    """Read the input to its end and print what a load would add; ValueError where the input is unusable."""
-    count, corners = _read_through(source, bad)
+    `expected`, called once there are points, is what the server would refuse.
+    """
+    count, corners = _read_through(source, bad, expected)
     _print_notes([*source.notes, *bad.report()])
     if as_json:
         typer.echo(json_line(name=name, points=count, bad_rows=bad.count, bounds=corners.ravel()))
@@ -53,11 +46,21 @@ def report_reading(name: str, source: Source, bad: BadRows, as_json: bool) -> No
         typer.echo(f"{name}: {plural(count, 'point')} would be loaded, {where}; nothing was changed")
 
 
-def require_readable(source: Source, max_bad: int | None) -> None:
+def hull_if_served(client: HullClient, name: str) -> "HullInfo | None":
+    """The hull; None if there is no such hull, or no server that answers at once, which is said."""
+    try:
+        return known_hull(client, name, timeout=ANSWER)
+    except DynhullError as error:
+        away = isinstance(error, UnavailableError | DeadlineError)
+        _print_notes([f"{f'no answer from {client.address}' if away else error}: read as for a new hull"])
+        return None
+
+
+def require_readable(source: Source, max_bad: int | None, expected: Callable[[], Expected]) -> None:
     """Read the input to its end and rewind it; ValueError where it is unusable or can be read only once."""
     if source.size is None:
         raise ValueError(f"--replace reads its input twice, and {source.name} is a pipe: write it to a file first")
-    _read_through(source, BadRows(None, max_bad))
+    _read_through(source, BadRows(None, max_bad), expected)
     source.rewind()
 
 
@@ -79,53 +82,61 @@ def load_points(
     geographic: bool | None,
     resume: bool,
     replace: bool,
-) -> tuple[int, int | None]:
+) -> Sending:
     """Create the hull where it is missing, and add the points that earlier runs of the same load did not add.
 
     A new hull is geographic if `geographic` says so or, without it, if the input does. `known` returns the hull that
     was there before, None without one.
 
     Returns:
-        The number of points added, and the number in the hull afterwards; None where nothing was left to add.
+        What became of the rows.
 
     Raises:
         ValueError: the input is unusable, or was loaded before.
         DynhullError: the server refused a request or did not answer.
     """
     with closing(source.chunks()) as chunks:
-        parts = map(Rows.by_expiry, blocks(bad.left_out(chunks), BATCH_POINTS))
-        batches = filter(len, chain.from_iterable(parts))
+        batches = _batches(chunks, bad)
         first = next(batches, None)  # before the hull is created: there may be no points at all
         if first is None:
             raise ValueError(_no_points(source, bad))
         _print_notes(source.notes)
-        on_globe = _make(client, name, source, known, geographic, silent=resume, replace=replace)
-        writer = client.writer(
-            name, producer=producer, batch_points=BATCH_POINTS, stop_on_error=True, patience=patience
-        )
+        _make(client, name, source, known, geographic, silent=resume, replace=replace)
+        sending = Sending(client, name, producer, patience, resume=resume, bad=bad)
         with (
             _resumable("--resume in place of --replace" if replace else "--resume", producer),
-            _advised(on_globe),
             _progress(source) as read,
         ):
-            loaded, acknowledged = _send(writer, chain([first], batches), resume, read)
+            sending.run(chain([first], batches), read)
+    if not sending.rows and not sending.known:  # all rows were refused
+        raise ValueError(_no_points(source, bad))
     _print_notes(bad.report())
-    return loaded, None if acknowledged is None else acknowledged.points
+    return sending
 
 
-def _read_through(source: Source, bad: BadRows) -> tuple[int, Points]:
+def _read_through(source: Source, bad: BadRows, expected: Callable[[], Expected]) -> tuple[int, Points]:
     """Returns the number of points, and the least and the greatest x and y; ValueError where the input is unusable."""
     count = 0
     corners = np.array([[np.inf, np.inf], [-np.inf, -np.inf]])
+    refusals: Expected | None = None
     with closing(source.chunks()) as chunks, _progress(source) as read:
-        for points in (rows.points for rows in bad.left_out(chunks)):
+        for rows in _batches(chunks, bad):
+            read(len(rows))
+            refusals = refusals or expected()
+            refused = refusals.refused(rows)
+            bad.add([rows.bad(row, refused[row]) for row in sorted(refused)])
+            points = rows.without(refused).points
             count += len(points)
-            read(len(points))
             if len(points):
                 corners = np.array([np.minimum(corners[0], points.min(0)), np.maximum(corners[1], points.max(0))])
     if not count:
         raise ValueError(_no_points(source, bad))
     return count, corners
+
+
+def _batches(chunks: Iterable[Chunk], bad: BadRows) -> Iterator[Rows]:
+    """The good rows as they are sent."""
+    return filter(len, chain.from_iterable(map(Rows.by_expiry, blocks(bad.left_out(chunks), BATCH_POINTS))))
 
 
 def _no_points(source: Source, bad: BadRows) -> str:
@@ -146,8 +157,8 @@ def _make(
     *,
     silent: bool,
     replace: bool,
-) -> bool:
-    """Create the hull unless it exists. Returns whether it is geographic."""
+) -> None:
+    """Create the hull unless it exists."""
     keyed: KeyType | None = None
     if source.options.key is not None:
         keyed = "int" if source.integer_keys else "str"
@@ -164,7 +175,7 @@ def _make(
             typer.echo(f"{error}: adding to it", err=True)
         info = known() or client.get_hull(name).info
         _check_frame(info, source, geographic)
-        return info.geographic
+        return
     if on_globe:
         what = " and ".join(source.axes) or "x and y"
         typer.echo(f"{name}: a new hull on the globe: {what} are degrees; --plane makes it a plane", err=True)
@@ -172,7 +183,6 @@ def _make(
         typer.echo(
             f"{name}: a new hull in the plane, in square degrees; --geographic makes it one on the globe", err=True
         )
-    return on_globe
 
 
 def _check_frame(info: "HullInfo", source: Source, geographic: bool | None) -> None:
@@ -186,48 +196,6 @@ def _check_frame(info: "HullInfo", source: Source, geographic: bool | None) -> N
             "`dynhull create NAME --geographic` makes a hull on the globe",
             err=True,
         )
-
-
-@contextmanager
-def _advised(on_globe: bool) -> Iterator[None]:
-    """When a point is too far from the others for a hull on the globe, print what can be done."""
-    try:
-        yield
-    except InvalidRequestError as error:
-        if on_globe and "degrees from the centre" in str(error):
-            typer.echo(
-                "A hull on the globe has points within 85 degrees of its centre. `dynhull create NAME --geographic "
-                "--center LON,LAT` makes one about another; --replace --plane loads degrees as points of a plane.",
-                err=True,
-            )
-        raise
-
-
-def _send(
-    writer: Writer, batches: Iterable[Rows], resume: bool, read: Callable[[int], None]
-) -> tuple[int, Applied | None]:
-    """Send each batch that was not applied before; returns the number of points sent and the last outcome."""
-    loaded, outcome = 0, None
-    with writer:
-        known = writer.sequence
-        if known and not resume:
-            raise LoadedBeforeError(
-                "loaded before, at least in part: --resume loads what is missing, --again all points once more, "
-                "--replace deletes the hull first"
-            )
-        for number, rows in enumerate(batches, start=1):
-            if number > known:
-                outcome = _put(writer, rows)
-                loaded += len(rows)
-            read(len(rows))
-        writer.flush()
-    return loaded, None if outcome is None else outcome.result()
-
-
-def _put(writer: Writer, rows: Rows) -> "Future[Applied]":
-    if rows.keys is None:
-        return writer.put(insert=rows.points, times=rows.times)
-    return writer.put(keys=rows.keys, points=rows.points, times=rows.times, expire_times=rows.expires)
 
 
 @contextmanager

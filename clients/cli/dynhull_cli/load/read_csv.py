@@ -6,7 +6,7 @@ import numpy as np
 
 from ..columns import column_index, coordinate, decimal_mark, plain
 from ..csv_table import CsvFormat, CsvTable, UnclearTableError, csv_table, numbered
-from .chunks import CHUNK_ROWS, Chunk, Chunks, Labels, Points, Position, Rows, cut, picked
+from .chunks import CHUNK_ROWS, LINE, Chunk, Chunks, Labels, Points, Position, Rows, cut, picked
 from .labels import label_reader
 from .options import Format
 from .source import Source
@@ -49,29 +49,33 @@ def _chunks(table: CsvTable, decimal: str | None, labels: Callable[[list[str]], 
         if decimal is None:
             texts = (row[place] for row in rows for place in (table.x, table.y) if place < len(row))
             decimal = decimal_mark(texts, table.delimiter)
-        yield _chunk(rows, line, table, decimal, labels)
-        line = table.next_line()
+        following = table.next_line()
+        yield _chunk(rows, line, following, table, decimal, labels)
+        line = following
 
 
 def _chunk(
     rows: list[list[str]],
     line: int,
+    following: int,
     table: CsvTable,
     decimal: str,
     labels: Callable[[list[str]], Labels] | None,
 ) -> Chunk:
-    """The points of rows that begin on that line."""
+    """The points of rows that begin on that line; `following` is the one after them."""
     places = table.x, table.y
     points = None if labels is not None else _all_points(rows, places, decimal, len(table.names))
     if points is not None:
-        return Chunk(Rows(points))
+        plain = following - line == len(rows)  # no row has several lines
+        lines = range(line, following) if plain else [at for at, _ in numbered(rows, line)]
+        return Chunk(Rows(points, np.array(lines, np.int64), LINE))
 
     def positions(row: list[str]) -> list[Position]:
         table.require_no_more_fields(row)
         x, y = (coordinate(row[place] if place < len(row) else None, table.names[place], decimal) for place in places)
         return [(x, y)]
 
-    return picked(((f"line {at}", row) for at, row in numbered(rows, line)), positions, ",".join, labels)
+    return picked(LINE, numbered(rows, line), positions, ",".join, labels)
 
 
 def _all_points(rows: list[list[str]], places: tuple[int, int], decimal: str, columns: int) -> Points | None:

@@ -12,7 +12,7 @@ import ijson
 from ..columns import coordinate_columns
 from ..peek import peek
 from ..plural import plural
-from .chunks import CHUNK_ROWS, Chunks, Labels, Position, cut, picked
+from .chunks import CHUNK_ROWS, LINE, Chunks, Labels, Position, cut, picked
 from .geometry import json_text, number, position, positions
 from .labels import label_reader
 from .source import Source
@@ -64,11 +64,12 @@ def read_ndjson(source: Source) -> Chunks:
     """Chunks of points, one row per line."""
     _skip_byte_order_mark(source.file)
     read = _row_reader(source)
-    lines = ((f"line {i}", line) for i, line in enumerate(source.file, start=1) if not line.isspace())
-    parsed = ((place, _Line(line)) for place, line in lines)
+    lines = ((i, line) for i, line in enumerate(source.file, start=1) if not line.isspace())
+    parsed = ((i, _Line(line)) for i, line in lines)
     labels = _labels(source)
     for rows in cut(parsed, CHUNK_ROWS):
         yield picked(
+            LINE,
             rows,
             lambda line: read(line.value),
             lambda line: line.text,
@@ -76,14 +77,13 @@ def read_ndjson(source: Source) -> Chunks:
         )
 
 
-def _read_items(source: Source, path: str, place: str, read: Callable[[Any], list[Position]]) -> Chunks:
+def _read_items(source: Source, path: str, unit: str, read: Callable[[Any], list[Position]]) -> Chunks:
     labels = _labels(source)
-    items = _numbered_items(source, path, place)
-    for rows in cut(((f"{place} {i}", item) for i, item in items), CHUNK_ROWS):
-        yield picked(rows, read, json_text, labels)
+    for rows in cut(_numbered_items(source, path, unit), CHUNK_ROWS):
+        yield picked(unit, rows, read, json_text, labels)
 
 
-def _numbered_items(source: Source, path: str, place: str) -> Iterator[tuple[int, Any]]:
+def _numbered_items(source: Source, path: str, unit: str) -> Iterator[tuple[int, Any]]:
     """The items with their numbers from 1; ValueError on one line where the file is not JSON.
 
     Integers of any size are exact, other numbers are Decimals.
@@ -95,7 +95,7 @@ def _numbered_items(source: Source, path: str, place: str) -> Iterator[tuple[int
     except ijson.JSONError as error:
         lines = "; if each line is a row or a feature, add --format ndjson" if "trailing garbage" in str(error) else ""
         raise ValueError(
-            f"{source.name} is not valid JSON after {plural(read, place)}: {_cause(error)}{lines}"
+            f"{source.name} is not valid JSON after {plural(read, unit)}: {_cause(error)}{lines}"
         ) from None
 
 

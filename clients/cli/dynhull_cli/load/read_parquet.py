@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..columns import column_index, coordinate, coordinate_columns
-from .chunks import CHUNK_ROWS, Chunk, Chunks, Labels, Position, Rows, picked
+from .chunks import CHUNK_ROWS, Chunk, Chunks, Labels, Numbers, Position, Rows, picked
 from .geometry import positions
 from .labels import label_reader
 from .source import Source
@@ -20,6 +20,7 @@ BUFFER_BYTES = 2**20  # without one, and with pre_buffer, whole row groups are i
 GEO_KEY = b"geo"  # of the schema's metadata, by the GeoParquet specification
 WKB_POINTS = np.dtype([("order", "u1"), ("type", "<u4"), ("xy", "<f8", (2,))])
 LITTLE_ENDIAN, POINT = 1, 1
+ROW = "row"
 
 
 def read_parquet(source: Source) -> Chunks:
@@ -79,15 +80,14 @@ def _labels_of(
 def _chunk(arrays: list[Any], names: list[str], first: int, labels: Callable[[int], Labels] | None) -> Chunk:
     points = np.stack([each.cast(pa.float64()).to_numpy(zero_copy_only=False) for each in arrays], axis=1)
     if labels is None and np.isfinite(points).all():
-        return Chunk(Rows(points + 0.0))
+        return Chunk(Rows(points + 0.0, _numbers(first, len(points)), ROW))
     rows = list(zip(*(each.to_pylist() for each in arrays), strict=True))
 
     def position(row: int) -> list[Position]:
         x, y = map(coordinate, (None if value is None else str(value) for value in rows[row]), names)
         return [(x, y)]
 
-    places = ((f"row {first + row}", row) for row in range(len(rows)))
-    return picked(places, position, lambda row: str(rows[row]), labels)
+    return picked(ROW, enumerate(range(len(rows)), first), position, lambda row: str(rows[row]), labels)
 
 
 def _geometry_column(name: str, schema: Any) -> str | None:
@@ -125,14 +125,13 @@ def _of_binaries(
 ) -> Chunk:
     points = None if labels is not None else _wkb_points(rows)
     if points is not None:
-        return Chunk(Rows(points))
+        return Chunk(Rows(points, _numbers(first, len(points)), ROW))
 
     def of_row(row: int) -> list[Position]:
         data = rows[row]
         return positions(None if data is None else decode(data), every_vertex)
 
-    places = ((f"row {first + row}", row) for row in range(len(rows)))
-    return picked(places, of_row, lambda row: _hex(rows[row]), labels)
+    return picked(ROW, enumerate(range(len(rows)), first), of_row, lambda row: _hex(rows[row]), labels)
 
 
 def _wkb_points(rows: list[bytes | None]) -> Any:
@@ -142,6 +141,10 @@ def _wkb_points(rows: list[bytes | None]) -> Any:
     found = np.frombuffer(b"".join(filter(None, rows)), WKB_POINTS)
     usual = (found["order"] == LITTLE_ENDIAN).all() and (found["type"] == POINT).all()
     return found["xy"] + 0.0 if usual and np.isfinite(found["xy"]).all() else None
+
+
+def _numbers(first: int, count: int) -> Numbers:
+    return np.arange(first, first + count)
 
 
 def _hex(data: bytes | None) -> str:

@@ -79,13 +79,11 @@ class Source:
 
     def chunks(self) -> Chunks:
         """The points; those that are no places are bad rows. ValueError where the input is not of this format."""
-        read = 0
         with closing(_reader(self.format)(self)) as chunks:
             for chunk in chunks:
                 known = self.geographic()
                 on_globe = self.degrees if known is None else known
-                yield places_only(chunk, read) if on_globe else chunk
-                read += len(chunk.rows)
+                yield places_only(chunk) if on_globe else chunk
 
     def rewind(self) -> None:
         """Return to the beginning; not possible with a pipe."""
