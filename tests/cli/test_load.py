@@ -100,7 +100,7 @@ BAD_CSV_REASONS = [
     ("line 10", "y is missing"),
 ]
 BAD_LINES = """{"x": 1, "y": 2}
-{"x": "1", "y": 2}
+{"x": "one", "y": 2}
 {"x": 1
 7
 {"y": 2}
@@ -109,7 +109,7 @@ BAD_LINES = """{"x": 1, "y": 2}
 [8, 9]
 """
 BAD_LINES_REASONS = [
-    ("line 2", 'x is "1", not a number'),
+    ("line 2", "x is 'one', not a number"),
     ("line 3", "not valid JSON at column 9: Expecting ',' delimiter"),
     ("line 4", "neither an object nor an array"),
     ("line 5", "x is missing"),

@@ -82,11 +82,13 @@ FEATURES = (
     b'{"type": "Feature", "geometry": {"type": "Point", "coordinates": [null, 1]}, "properties": null}]}'
 )
 BAD = [
-    (NDJSON, b'[1, 2]\n\n{"x": 1, "y": "2"}\n', 400, 1, "y", '"2"'),
+    (NDJSON, b'[1, 2]\n\n{"x": 1, "y": "two"}\n', 400, 1, "y", '"two"'),
+    (NDJSON, b'{"x": 1, "y": 2, "time": "2026-01-01T00:00:00"}\n', 400, 0, "time", '"2026-01-01T00:00:00"'),
+    (NDJSON, b'{"x": 1, "y": 2, "expires": "2026-01-01T00:00:00Z"}\n', 400, 0, "expires", None),
     (NDJSON, b'[1, 2]\n[1, "2"]\n', 400, 1, "y", '"2"'),
     (NDJSON, b'{"key": "a", "x": 1, "y": 2}\n{"key": 1, "x": 1, "y": 2}\n', 400, 1, "key", None),
     (NDJSON, b'{"key": "a", "x": 1, "y": 2}\n', 409, 0, "key", None),
-    (NDJSON, b"[1, 2]\n[1, 2, 3]\n", 400, 1, None, None),
+    (NDJSON, b"[1, 2]\n[1]\n", 400, 1, None, None),
     (NDJSON, b"[1, 2]\n[1, 2\n", 400, 1, None, None),
     (NDJSON, b"[1, NaN]\n", 400, 0, None, None),
     (NDJSON, b"[1, 2]\n\xff\xfe\n", 400, 1, None, None),
@@ -245,3 +247,81 @@ def test_nothing_is_lost_or_doubled_when_the_server_is_killed(tmp_path) -> None:
     assert attempts > 1
     assert done["last_sequence"] == ROWS
     assert np.isfinite(done["repeated"])
+
+
+UNIX = 1767225600  # 2026-01-01T00:00:00Z
+GRAMMAR = [
+    (NDJSON, b'{"key": "a", "longitude": 1, "latitude": "2", "time": %d, "speed": 7}' % UNIX),
+    (NDJSON, b'{"key": "a", "lng": 1, "lat": 2, "time": %d000, "deep": {"x": 1}}' % UNIX),
+    (NDJSON, b'{"key": "a", "Easting": 1, "Northing": 2, "time": "2026-01-01T01:00:00+01:00"}'),
+    (NDJSON, f'{{"type": "Feature", "id": "a", "geometry": {{"type": "Point", "coordinates": [1, 2]}}, "properties": '
+     f'{{"time": {UNIX}}}}}'.encode()),
+    (CSV, b"key,lng,lat,time,speed\na,1,2,%d,7\n" % UNIX),
+    (CSV, b"key,long,lat,time\na, 1,2 ,2026-01-01 00:00Z\n"),
+    (SEQUENCE, FEATURE.replace('"properties": {}', f'"properties": {{"time": {UNIX}.0}}').encode()),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "body"), GRAMMAR)
+def test_a_row_is_read_alike_in_every_kind_of_body(gateway: Gateway, keyed: str, kind: str, body: bytes) -> None:
+    done = gateway.post(f"/hulls/{keyed}/rows", body, kind)
+    assert (done.status, done.json.get("inserted")) == (200, 1), done.json
+    found = gateway.get(f"/hulls/{keyed}/entities").json
+    assert (found["keys"], found["points"], found["times"]) == (["a"], [[1, 2]], ["2026-01-01T00:00:00.000000Z"])
+
+
+def test_rows_say_when_keys_leave_and_which_keys_are_put(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "str", "max_age": 86400, "clock": "data"})
+    at = f"/hulls/{name}/rows"
+    rows = f"key,x,y,time,expires\na,0,0,{UNIX},{UNIX + 5}\nb,1,1,{UNIX},{UNIX + 50}\n"
+    assert gateway.post(f"{at}?time_unit=s", rows.encode(), CSV).json["inserted"] == 2
+    more = f"key,x,y,time\nb,9,9,{UNIX}\nc,2,2,{UNIX}\n"
+    done = gateway.post(f"{at}?only=absent&ttl=20", more.encode(), CSV).json
+    assert (done["inserted"], done["skipped"]) == (1, 1)
+    gateway.post(at, f"key,x,y,time\nd,3,3,{UNIX + 10}\n".encode(), CSV)
+    assert gateway.get(f"/hulls/{name}/entities").json["keys"] == ["b", "c", "d"]
+    gateway.post(at, f"key,x,y,time\nd,3,3,{UNIX + 30}\n".encode(), CSV)
+    assert gateway.get(f"/hulls/{name}/entities").json["keys"] == ["b", "d"]
+    wrong = gateway.post(f"{at}?ttl=20", b"x,y\n1,2\n", CSV)
+    assert (wrong.status, "ttl" in wrong.json["detail"]) == (400, True)
+
+
+@pytest.mark.parametrize("numbered", [False, True])
+def test_bad_rows_are_left_out_as_far_as_they_may_be(gateway: Gateway, name: str, numbered: bool) -> None:
+    """Rows that cannot be read, that are not like the others, and that the server refuses: in each of three batches."""
+    gateway.post("/hulls", {"name": name, "geographic": True, "center": [0, 0]})
+    lines = [b"[%d, %d]" % (number % 60, number % 61) for number in range(ROWS)]
+    bad = {
+        0: b"[178, 0]",
+        7: b"[1",
+        8191: b"[0, 91]",
+        9000: b'{"key": "a", "x": 1, "y": 2}',
+        9001: b"[90, 0]",
+        ROWS - 1: b"7",
+    }
+    for row, line in bad.items():
+        lines[row] = line
+    at, body = f"/hulls/{name}/rows", b"\n".join(lines)
+    header = {"Idempotency_Key": "bad:1"} if numbered else {}
+    short = gateway.post(f"{at}?max_bad=2", body, NDJSON, **header).json
+    assert (short["status"], short["row"], short["applied"]) in [(400, 8191, 0), (400, 9000, 0)]
+    done = gateway.post(f"{at}?max_bad=6", body, NDJSON, **header).json
+    assert (done["rows"], done["inserted"], done["bad_rows"], done["batches"]) == (ROWS, ROWS - 6, 6, 3)
+    assert sorted(each["row"] for each in done["bad"]) == sorted(bad)
+    assert {each["row"]: each["value"] for each in done["bad"]}[8191] == "[0.0, 91.0]"
+    assert all(each["detail"] for each in done["bad"])
+    if numbered:
+        again = gateway.post(f"{at}?max_bad=6", body, NDJSON, **header).json
+        assert (again["repeated"], again["inserted"], again["last_sequence"]) == (ROWS, 0, ROWS)
+        rest = gateway.post(f"{at}?max_bad=1", b"[178, 0]", NDJSON, Idempotency_Key=f"bad:{ROWS + 1}").json
+        assert (rest["bad_rows"], rest["inserted"]) == (1, 0)
+        last = gateway.post(at, b"[1, 1]", NDJSON, Idempotency_Key=f"bad:{ROWS + 2}").json
+        assert (last["rows"], last["inserted"]) == (1, 1), "a batch of bad rows has its number, too"
+    assert size(gateway, name) == ROWS - 6 + numbered
+
+
+def test_bad_features_are_left_out(gateway: Gateway, plane: str) -> None:
+    done = gateway.post(f"/hulls/{plane}/rows?max_bad=1", FEATURES, GEOJSON).json
+    assert (done["rows"], done["inserted"], done["bad_rows"]) == (3, 2, 1)
+    (bad,) = done["bad"]
+    assert (bad["row"], bad["field"]) == (2, "/features/1/geometry/coordinates/0")

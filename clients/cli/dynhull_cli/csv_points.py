@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .columns import are_degrees, column_index, coordinate, decimal_mark, why_no_place
 from .csv_table import CsvFormat, CsvTable, csv_table, numbered
 from .plural import plural
+from .reading.columns import are_degrees, column_index, decimal_mark, why_no_place
+from .reading.values import coordinate
 
 SHOWN_BAD_ROWS = 5
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import IO, Any
 
-from .columns import coordinate_columns, has_pair, is_number
 from .peek import peek
+from .reading.columns import coordinate_columns, has_pair
+from .reading.values import is_number
 
 DELIMITERS = "\t;,| "  # the first of these in the first line, outside quotes, separates the columns
 DELIMITER_NAMES = {"tab": "\t", "\\t": "\t", "space": " "}

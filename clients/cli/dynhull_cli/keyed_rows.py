@@ -10,7 +10,8 @@ import numpy as np
 
 from dynhull_client import HullClient, HullInfo, InvalidRequestError, Points
 
-from .columns import plain
+from .reading.labels import integer_key
+from .reading.values import plain
 from .rows import STANDARD_INPUT
 
 FIELDS = 3
@@ -58,17 +59,6 @@ def known_hull(client: HullClient, name: str, *, timeout: float | None = None) -
     except InvalidRequestError as error:
         raise ValueError(f"the name of the hull {str(error).removeprefix('prefix ')}") from None
     return first if first is not None and first.name == name else None
-
-
-def integer_key(key: Any, place: str) -> int:
-    """A key that is an integer; ValueError names the place."""
-    if isinstance(key, int) and not isinstance(key, bool):
-        return key
-    if not isinstance(key, str) or not key.strip().isdecimal():
-        raise ValueError(
-            f"{place} is {key!r}, not an integer from 0 to 2**64 - 1, and the keys of the hull are integers"
-        )
-    return int(key)
 
 
 def _lines(arguments: list[str] | None) -> Any:

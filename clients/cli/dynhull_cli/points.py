@@ -64,7 +64,7 @@ def put(
     by `dynhull create vehicles --keyed str`. Use `dynhull load --key` for files and for more than fits into one batch.
     """
     from .keyed_rows import keyed_rows, keys_for
-    from .times import TimeReader
+    from .reading.times import TimeReader
 
     keys, points = keyed_rows(row)
     times = None if time is None else [TimeReader("--time").read(time)] * len(keys)

@@ -18,7 +18,13 @@ OF_SEVERAL = re.compile(r"batches\[(\d+)\]\.")
 BATCH = re.compile(r"(?:batches\[(\d+)\]\.)?batch(?:\.(.*))?")
 SDK = re.compile(r"(\w+)(?: row (\d+))? is .*?: (.*)", re.DOTALL)
 OF_KIND = re.compile(r"(?:batches\[\d+\]\.)?batch\.(inserts|deletes|puts\.keys|removes)")
-COLUMNS = {"puts.keys": "key", "removes": "key", "puts.times": "time", "insert_times": "time"}
+COLUMNS = {
+    "puts.keys": "key",
+    "removes": "key",
+    "puts.times": "time",
+    "insert_times": "time",
+    "puts.expire_times": "expires",
+}
 HINT_OF_ROWS = (
     'a row with a key is {"key": KEY, "x": X, "y": Y}, and one without [X, Y]; ?keys=none, str or int leaves keys out '
     "or converts them"
@@ -79,7 +85,7 @@ def of_refused_rows(error: DynhullError | ValueError, applied: int) -> Response:
         return of_refusal(error, applied=applied)
     row = applied + (error.row or 0)
     column = COLUMNS.get(batch[2])
-    value = None if error.row is None or error.value is None else _as_json(error.value)
+    value = value_of(error)
     place = f"row {row}, {column}" if column else f"row {row}"
     detail = f"{place}: {problem_of(error)}"
     if error.reason == "KEY_REPEATED":
@@ -105,6 +111,11 @@ def problem_of(error: DynhullError) -> str:
     for value in (error.value, repr(error.value)):
         text = text.removeprefix(f"{place} is {value}: ")
     return text
+
+
+def value_of(error: DynhullError) -> str | None:
+    """The value of a row at fault, as JSON; None if no row is."""
+    return None if error.row is None or error.value is None else _as_json(error.value)
 
 
 def _cause(error: DynhullError, path: list[str | int], body: Any) -> Cause:

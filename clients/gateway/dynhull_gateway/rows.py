@@ -1,30 +1,32 @@
 """Rows of bodies: points and keys as newline-delimited JSON, CSV and GeoJSON."""
 
 import csv
-import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from datetime import datetime
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, NotRequired
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic_core import from_json
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic_core import from_json, to_json
 from typing_extensions import TypedDict
+
+from dynhull_cli.reading.columns import pair_of
+from dynhull_cli.reading.labels import LabelReader, key_of
+from dynhull_cli.reading.values import BadValueError, coordinate, number
 
 from .invalid import detail, path_in
 from .problems import cut, pointer, shown
-from .schemas import Key, Number, Point, Time
+from .schemas import Key, Number, Point
 
-FORBID = ConfigDict(extra="forbid")
-KEY_AND_TIME = "key", "time"
+LABELS = "key", "time", "expires"
 COLUMNS = "x", "y"
 
 
 class Row(NamedTuple):
-    """A point, a key, or both."""
+    """A point, a key, or both; times are in microseconds since 1970."""
 
     key: str | int | None
     point: Sequence[float] | None
-    time: datetime | None
+    time: int | None = None
+    expires: int | None = None
 
 
 class RowError(Exception):
@@ -38,117 +40,178 @@ class RowError(Exception):
         self.value = value
 
 
+class Found(NamedTuple):
+    """The rows of some texts: None for each that cannot be taken, and why."""
+
+    rows: list[Row | None]
+    bad: list[RowError]
+
+    def add_bad(self, detail: str, field: str | None, value: str | None, part: int = 0) -> None:
+        """Add a row that cannot be read. `part`: of several rows in it, the one at fault."""
+        self.bad.append(RowError(len(self.rows) + part, detail, field, value))
+        self.rows.append(None)
+
+    def refuse(self, row: int, detail: str, field: str | None, value: str | None = None) -> None:
+        """Make a row that was read a bad one."""
+        self.bad.append(RowError(row, detail, field, value))
+        self.rows[row] = None
+
+
+Reader = Callable[[Sequence[bytes]], Found]
+"""Reads some texts of a body, which are complete. RowError if nothing of the body can be read."""
+
+
 class XY(TypedDict):
     """A row with x and y."""
 
-    __pydantic_config__ = FORBID  # type: ignore[misc]
-    key: NotRequired[Key]
-    time: NotRequired[Time]
+    __pydantic_config__ = ConfigDict(extra="ignore")  # type: ignore[misc]
     x: Number
     y: Number
+    key: NotRequired[Key]
+    time: NotRequired[Any]
+    expires: NotRequired[Any]
 
 
 class LonLat(TypedDict):
     """A row with lon and lat."""
 
-    __pydantic_config__ = FORBID  # type: ignore[misc]
-    key: NotRequired[Key]
-    time: NotRequired[Time]
+    __pydantic_config__ = ConfigDict(extra="ignore")  # type: ignore[misc]
     lon: Number
     lat: Number
+    key: NotRequired[Key]
+    time: NotRequired[Any]
+    expires: NotRequired[Any]
 
-
-class KeyOnly(TypedDict):
-    """A row that names a key to remove."""
-
-    __pydantic_config__ = FORBID  # type: ignore[misc]
-    key: Key
-
-
-Reader = Callable[[Sequence[bytes]], list[Row]]
-"""Reads some texts of a body, which are complete; RowError names the first that cannot be read."""
 
 POINT = TypeAdapter(Point).validate_json
 X_Y = TypeAdapter(XY).validate_json
 LON_LAT = TypeAdapter(LonLat).validate_json
-KEY_ONLY = TypeAdapter(KeyOnly).validate_json
 
 
-def ndjson(lines: Sequence[bytes]) -> list[Row]:
-    """Lines of [x, y], {"x": ..., "y": ...} or {"lon": ..., "lat": ...}, with "key" and "time" if wanted."""
-    rows = []
-    line = b""
-    try:
-        for line in lines:  # the row at fault
-            if line.startswith(b"["):
-                rows.append(Row(None, POINT(line), None))
-            elif b'"lat"' in line:
-                place = LON_LAT(line)
-                rows.append(Row(place.get("key"), (place["lon"], place["lat"]), place.get("time")))
-            else:
-                given = X_Y(line)
-                rows.append(Row(given.get("key"), (given["x"], given["y"]), given.get("time")))
-    except ValidationError as error:
-        raise _row_error(len(rows), error) from None
-    return rows
+class Ndjson:
+    """Lines of JSON: arrays of x and y, objects, or points and features of GeoJSON.
 
+    Objects have coordinates with any of the names that columns have, and "key", "time" and "expires" if wanted. Other
+    members are left out. With `delete`, a key alone is a row.
+    """
 
-def ndjson_to_delete(lines: Sequence[bytes]) -> list[Row]:
-    """Lines of points as in `ndjson`, or of {"key": ...}."""
-    rows: list[Row] = []
-    for line in lines:
+    def __init__(self, labels: LabelReader, *, delete: bool) -> None:
+        self._labels = labels
+        self._delete = delete
+        self._geojson = GeoJson(labels)
+
+    def __call__(self, lines: Sequence[bytes]) -> Found:
+        """The rows of some lines."""
+        found = Found([], [])
+        for line in lines:
+            try:  # the usual rows, without a look at each value
+                if line.startswith(b"["):
+                    found.rows.append(Row(None, POINT(line)))
+                    continue
+                given: Any
+                if b'"x"' in line:
+                    given = X_Y(line)
+                    point = given["x"], given["y"]
+                else:
+                    given = LON_LAT(line)
+                    point = given["lon"], given["lat"]
+                if "time" not in given and "expires" not in given:
+                    found.rows.append(Row(given.get("key"), point))
+                    continue
+            except ValidationError:
+                pass
+            self._read(line, found)
+        return found
+
+    def _read(self, line: bytes, found: Found) -> None:
+        """Read any line."""
         try:
-            rows += [Row(KEY_ONLY(line)["key"], None, None)] if b'"key"' in line else ndjson([line])
-        except ValidationError as error:
-            raise _row_error(len(rows), error) from None
-        except RowError as error:
-            raise RowError(len(rows), error.detail, error.field, error.value) from None
-    return rows
+            value = from_json(line, allow_inf_nan=False)
+        except ValueError as error:
+            found.add_bad(f"not JSON: {error}", None, _text(line))
+            return
+        if isinstance(value, dict) and ("coordinates" in value or "geometry" in value or "features" in value):
+            self._geojson.read(line, found)
+            return
+        try:
+            found.rows.append(self._row(value))
+        except BadValueError as error:
+            found.add_bad(error.problem, error.name, None if error.value is None else shown(error.value))
+        except (ValueError, TypeError) as error:
+            found.add_bad(str(error), None, _text(line))
+
+    def _row(self, value: Any) -> Row:
+        if isinstance(value, list) and len(value) >= len(COLUMNS):
+            return Row(None, [number(each, name) for each, name in zip(value, COLUMNS, strict=False)])
+        if not isinstance(value, dict):
+            raise ValueError("must be an object, or an array of two numbers")
+        key, time, expires = self._labels(*(value.get(name) for name in LABELS))
+        names = pair_of(value)
+        if names is None and self._delete and key is not None:
+            return Row(key, None)
+        x, y = names or COLUMNS
+        return Row(key, (coordinate(value.get(x), x), coordinate(value.get(y), y)), time, expires)
 
 
 class Csv:
-    """Lines of CSV: first the names of the columns, x and y or lon and lat, and key and time if there are any.
+    """Lines of CSV: first the names of the columns, of the coordinates and of key, time and expires if there are any.
 
     A row is one line, with as many fields as the first. Columns with other names are left out.
     """
 
-    _NAMES = (("x", "y"), ("lon", "lat"), ("longitude", "latitude"))
-
-    def __init__(self, *, delete: bool) -> None:
+    def __init__(self, labels: LabelReader, *, delete: bool) -> None:
+        self._labels = labels
         self._delete = delete
-        self._columns: dict[str, int] | None = None
         self._fields = 0
+        self._point: tuple[tuple[str, int], tuple[str, int]] | None = None
+        self._places: list[int | None] = []
+        self._labelled = False
 
-    def __call__(self, lines: Sequence[bytes]) -> list[Row]:
+    def __call__(self, lines: Sequence[bytes]) -> Found:
         """The rows of some lines."""
-        if self._columns is None:
-            if not lines:
-                return []
-            (first,) = _cells(lines[:1])
-            self._columns = self._named([each.strip().lower() for each in first])
-            self._fields = len(first)
+        found = Found([], [])
+        if not self._fields and lines:
+            self._name(_cells(lines[0]))
             lines = lines[1:]
-        columns = self._columns
-        rows: list[Row] = []
-        for row in _cells(lines):
-            if len(row) != self._fields:
-                detail = f"{len(row)} fields in a table of {self._fields} columns"
-                raise RowError(len(rows), detail, None, cut(",".join(row)))
-            rows.append(_typed({name: row[column] for name, column in columns.items()}, len(rows)))
-        return rows
+        for line in lines:
+            try:
+                cells = _cells(line)
+                if len(cells) != self._fields:
+                    raise RowError(0, f"{len(cells)} fields in a table of {self._fields} columns", None, _text(line))
+                found.rows.append(self._row(cells))
+            except BadValueError as error:
+                found.add_bad(error.problem, error.name, None if error.value is None else cut(str(error.value)))
+            except RowError as error:
+                found.add_bad(error.detail, error.field, error.value)
+            except (ValueError, TypeError) as error:
+                found.add_bad(str(error), None, _text(line))
+        return found
 
-    def _named(self, header: list[str]) -> dict[str, int]:
+    def _row(self, cells: list[str]) -> Row:
+        point = None
+        if self._point is not None:
+            (x, first), (y, second) = self._point
+            point = coordinate(cells[first], x), coordinate(cells[second], y)
+        if not self._labelled:
+            return Row(None, point)
+        key, time, expires = self._labels(*(None if place is None else cells[place] for place in self._places))
+        return Row(key, point, time, expires)
+
+    def _name(self, first: list[str]) -> None:
+        header = [each.strip().lower() for each in first]
         twice = next((name for name in header if header.count(name) > 1), None)
         if twice is not None:
             raise RowError(0, f"the first line names the column {twice!r} twice", "header", cut(",".join(header)))
-        columns: dict[str, int] = {name: header.index(name) for name in KEY_AND_TIME if name in header}
-        pair = next((pair for pair in self._NAMES if set(pair) <= set(header)), None)
-        if pair is not None:
-            columns |= {"x": header.index(pair[0]), "y": header.index(pair[1])}
-        elif not (self._delete and "key" in columns):
-            detail = "the first line must name the columns, separated by commas: x,y or lon,lat, and key, time"
+        self._fields = len(header)
+        self._places = [header.index(name) if name in header else None for name in LABELS]
+        self._labelled = any(place is not None for place in self._places)
+        names = pair_of(header)
+        if names is not None:
+            x, y = names
+            self._point = (x, header.index(x)), (y, header.index(y))
+        elif not (self._delete and "key" in header):
+            detail = "the first line must name the columns, separated by commas: x,y or lon,lat, and key, time, expires"
             raise RowError(0, detail, "header", cut(",".join(header)))
-        return columns
 
 
 class PointGeometry(BaseModel):
@@ -168,19 +231,13 @@ class MultiPointGeometry(BaseModel):
 Geometry = Annotated[PointGeometry | MultiPointGeometry, Field(discriminator="type")]
 
 
-class FeatureProperties(BaseModel):
-    """The property that is read."""
-
-    time: AwareDatetime | None = None
-
-
 class PointFeature(BaseModel):
-    """A feature; its id is the key."""
+    """A feature; its id is the key, and its properties have the times."""
 
     type: Literal["Feature"]
     id: Key | None = None
     geometry: Geometry
-    properties: FeatureProperties | None = None
+    properties: dict[str, Any] | None = None
 
 
 class PointCollection(BaseModel):
@@ -194,123 +251,90 @@ Geo = Annotated[PointCollection | PointFeature | PointGeometry | MultiPointGeome
 GEOJSON: TypeAdapter[Geo] = TypeAdapter(Geo)
 
 
-def geojson(texts: Sequence[bytes]) -> list[Row]:
+class GeoJson:
     """Texts of GeoJSON: points and multipoints, features of these, or a collection."""
-    rows: list[Row] = []
-    for text in texts:
+
+    def __init__(self, labels: LabelReader) -> None:
+        self._labels = labels
+
+    def __call__(self, texts: Sequence[bytes]) -> Found:
+        """The rows of some texts."""
+        found = Found([], [])
+        for text in texts:
+            self.read(text, found)
+        return found
+
+    def read(self, text: bytes, found: Found, within: tuple[str | int, ...] = ()) -> None:
+        """Add the rows of one text. `within`: the way to it in the body."""
         try:
-            rows += _of_geojson(GEOJSON.validate_json(text))
+            geo = GEOJSON.validate_json(text)
         except ValidationError as error:
-            raise _geojson_error(len(rows), text, error) from None
-    return rows
+            self._refuse(text, error, found, within)
+            return
+        if not isinstance(geo, PointCollection):
+            self._add(geo, found, within)
+            return
+        for index, feature in enumerate(geo.features):
+            self._add(feature, found, ("features", index))
+
+    def _add(self, geo: Any, found: Found, within: tuple[str | int, ...]) -> None:
+        key, time, expires = None, None, None
+        if isinstance(geo, PointFeature):
+            properties = geo.properties or {}
+            try:
+                key, time, expires = self._labels(geo.id, properties.get("time"), properties.get("expires"))
+            except BadValueError as error:
+                found.add_bad(error.problem, pointer((*within, "properties", error.name)), shown(error.value))
+                return
+            geo = geo.geometry
+        positions = [geo.coordinates] if isinstance(geo, PointGeometry) else geo.coordinates
+        found.rows.extend(Row(key, (x, y), time, expires) for x, y, *_ in positions)
+
+    def _refuse(self, text: bytes, error: ValidationError, found: Found, within: tuple[str | int, ...]) -> None:
+        """Add what is wrong with a text; of a collection with features, one by one."""
+        first = error.errors()[0]
+        if first["type"] == "json_invalid":
+            found.add_bad(detail(first), None, _text(text))
+            return
+        body = from_json(text)
+        path = path_in(body, first["loc"], absent=first["type"] == "missing")
+        if path[:1] == ["features"] and len(path) > 1:
+            for index, feature in enumerate(body["features"]):
+                self.read(to_json(feature), found, ("features", index))
+            return
+        value = None if first["type"] == "missing" else shown(first["input"])
+        found.add_bad(detail(first), pointer((*within, *path)) or None, value, _part(body, path))
 
 
-def _of_geojson(geo: Geo) -> Iterator[Row]:
-    match geo:
-        case PointCollection():
-            for feature in geo.features:
-                yield from _of_geojson(feature)
-        case PointFeature():
-            time = None if geo.properties is None else geo.properties.time
-            for row in _of_geojson(geo.geometry):
-                yield Row(geo.id, row.point, time)
-        case PointGeometry():
-            yield Row(None, (geo.coordinates[0], geo.coordinates[1]), None)
-        case MultiPointGeometry():
-            yield from (Row(None, (x, y), None) for x, y, *_ in geo.coordinates)
-
-
-def with_keys(rows: Iterable[Row], kind: str | None) -> list[Row]:
+def with_keys(found: Found, kind: Literal["str", "int"] | None) -> Found:
     """The rows with keys of a kind, "str" or "int"; None for without."""
-    return [row._replace(key=_key(row.key, kind, number)) for number, row in enumerate(rows)]
+    for place, row in enumerate(found.rows):
+        if row is not None and row.key is not None:
+            try:
+                found.rows[place] = row._replace(key=None if kind is None else key_of(row.key, "key", kind))
+            except ValueError:
+                found.refuse(place, "must be an integer", "key", shown(row.key))
+    found.bad.sort(key=lambda error: error.row)
+    return found
 
 
-def _key(key: str | int | None, kind: str | None, row: int) -> str | int | None:
-    if key is None or kind is None:
-        return None
-    if kind == "str":
-        return str(key)
-    if isinstance(key, str) and not INTEGER.fullmatch(key):
-        raise RowError(row, "must be an integer", "key", shown(key))
-    return int(key)
-
-
-def _cells(lines: Sequence[bytes]) -> Iterator[list[str]]:
-    number = 0
+def _cells(line: bytes) -> list[str]:
     try:
-        for line in lines:
-            yield from csv.reader([line.decode()], strict=True)
-            number += 1
+        return next(csv.reader([line.decode()], strict=True), [])
     except UnicodeDecodeError as error:
-        raise RowError(number, f"not UTF-8: {error.reason}", None, _text(error.object)) from None
+        raise RowError(0, f"not UTF-8: {error.reason}", None, _text(line)) from None
     except csv.Error as error:
-        raise RowError(number, f"not CSV: {error}", None, _text(lines[number])) from None
+        raise RowError(0, f"not CSV: {error}", None, _text(line)) from None
 
 
-def _typed(found: dict[str, str], row: int) -> Row:
-    point = None
-    if "x" in found:
-        point = (_coordinate(found["x"], "x", row), _coordinate(found["y"], "y", row))
-    time = found.get("time") or None
-    try:
-        when = None if time is None else TIME.validate_python(time)
-    except ValidationError as error:
-        raise RowError(row, detail(error.errors()[0]), "time", cut(time or "")) from None
-    return Row(found.get("key"), point, when)
-
-
-def _coordinate(text: str, field: str, row: int) -> float:
-    if "_" in text:  # notation of Python: 1_000
-        raise RowError(row, "must be a valid number", field, cut(text))
-    try:
-        return COORDINATE.validate_python(text)
-    except ValidationError as error:
-        raise RowError(row, detail(error.errors()[0]), field, cut(text)) from None
-
-
-INTEGER = re.compile(r"\s*[+-]?[0-9]{1,4300}\s*")  # as many digits as the interpreter reads
-COORDINATE: TypeAdapter[float] = TypeAdapter(Annotated[float, Field(allow_inf_nan=False)])
-TIME: TypeAdapter[datetime] = TypeAdapter(Time)
-
-
-def _row_error(row: int, error: ValidationError) -> RowError:
-    """The first error of a line of JSON, with the name of the column."""
-    first = error.errors()[0]
-    if first["type"] == "json_invalid":
-        return RowError(row, detail(first), None, _text(first["input"]))
-    place = next(iter(first["loc"]), None)
-    field = COLUMNS[place] if isinstance(place, int) and place < len(COLUMNS) else place
-    value = None if first["type"] == "missing" else shown(first["input"])
-    return RowError(row, detail(first), None if field is None else str(field), value)
-
-
-def _geojson_error(row: int, text: bytes, error: ValidationError) -> RowError:
-    """The first error of a text of GeoJSON, with a JSON pointer to it; `row`: the number of the text's first row."""
-    first = error.errors()[0]
-    if first["type"] == "json_invalid":
-        return RowError(row, detail(first), None, _text(text))
-    body = from_json(text)
-    path = path_in(body, first["loc"], absent=first["type"] == "missing")
-    value = None if first["type"] == "missing" else shown(first["input"])
-    return RowError(row + _rows_before(body, path), detail(first), pointer(path) or None, value)
-
-
-def _rows_before(body: Any, path: Sequence[str | int]) -> int:
-    """The rows of GeoJSON before the place that a path leads to: a multipoint has several."""
+def _part(body: Any, path: Sequence[str | int]) -> int:
+    """The position of a multipoint to which a path through a feature leads."""
     match path:
-        case ["features", int(number), *rest]:
-            return sum(map(_size, body["features"][:number])) + _rows_before(body["features"][number], rest)
         case ["geometry", *rest]:
-            return _rows_before(body["geometry"], rest)
+            return _part(body["geometry"], rest)
         case ["coordinates", int(number), *_] if body.get("type") == "MultiPoint":
             return number
     return 0
-
-
-def _size(feature: Any) -> int:
-    """The rows of a feature that can be read."""
-    geometry = feature["geometry"]
-    return len(geometry["coordinates"]) if geometry["type"] == "MultiPoint" else 1
 
 
 def _text(line: Any) -> str:

@@ -433,10 +433,21 @@ class Transferred(Response):
     results: dict[str, Applied]
 
 
+class BadRow(Response):
+    """A row that was left out."""
+
+    row: int = Field(description="Its number in the body, counted from 0.")
+    detail: str = Field(description="What is wrong with it.")
+    field: str | None = Field(None, description="The column or member at fault.")
+    value: str | None = Field(None, description="The value at fault.")
+
+
 class Uploaded(Response):
     """The effect of a body of rows: the sums over its batches, and the hull after the last one."""
 
-    rows: int = Field(description="Rows of the body, all of them applied, now or by an earlier request.")
+    rows: int = Field(
+        description="Rows of the body: applied, now or by an earlier request, or bad and left out (max_bad)."
+    )
     repeated: int = Field(description="Rows that an earlier request had applied.")
     batches: int
     revision: int | None = Field(description="Of the last batch; null if there was nothing to apply.")
@@ -453,6 +464,8 @@ class Uploaded(Response):
     held: int
     released: int
     dropped: int
+    bad_rows: int = Field(description="Rows left out because they cannot be read, or the server refuses them.")
+    bad: list[BadRow] = Field(description="The first ten of these.")
     last_sequence: int | None = Field(description="With an Idempotency-Key, the number of the last row.")
 
 

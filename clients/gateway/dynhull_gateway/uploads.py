@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request
 
+from dynhull_cli.reading.labels import LabelReader
+from dynhull_cli.reading.times import TimeUnit
 from dynhull_client import DynhullError
 
 from . import rows, schemas
@@ -14,7 +16,7 @@ from .callers import Caller
 from .points import numbered
 from .problems import ProblemError, problem
 from .refusals import of_refused_rows
-from .rows import Reader, RowError
+from .rows import LABELS, Reader, RowError
 from .schemas import HullPath, IdempotencyKey, MaySkip
 from .texts import LINE, RECORD, texts
 from .upload import Upload, numbering
@@ -54,6 +56,18 @@ Coalesce = Annotated[
     bool, Query(description="Whether only the last of several positions of a key in a batch of 8192 rows is applied.")
 ]
 
+MaxBad = Annotated[int, Query(ge=0, le=2**31 - 1, description="Bad rows that are left out; one more ends the call.")]
+TimeUnits = Annotated[
+    TimeUnit | None,
+    Query(description="Unit of times that are numbers: s, ms, us or ns; by default by the size of the first one."),
+]
+OnlyKeys = Annotated[
+    Literal["absent", "present"] | None, Query(description="Which keys are put: only new ones, or only known ones.")
+]
+TimeToLive = Annotated[
+    float | None, Query(gt=0, le=1e9, allow_inf_nan=False, description="Seconds after which the keys leave.")
+]
+
 
 @router.post("/hulls/{name}/rows", response_model=schemas.Uploaded, openapi_extra=BODY)
 async def upload_rows(
@@ -63,46 +77,55 @@ async def upload_rows(
     delete: Delete = False,
     keys: KeyKind = "auto",
     coalesce: Coalesce = False,
+    max_bad: MaxBad = 0,
+    time_unit: TimeUnits = None,
+    only: OnlyKeys = None,
+    ttl: TimeToLive = None,
     idempotency_key: IdempotencyKey = None,
     may_skip: MaySkip = False,
 ) -> Any:
     """Insert points or put keys, one a row, from a body of any length: newline-delimited JSON, CSV or GeoJSON.
 
-    The rows are applied in batches of up to 8192 while the body arrives. A row that cannot be read ends the call: the
-    problem names it, and how many rows before it were applied. With an Idempotency-Key, the body can be sent again, or
-    continued after the last number that was applied: no row is applied twice.
+    The rows are applied in batches of up to 8192 while the body arrives. A row that cannot be read, or that the server
+    refuses, ends the call, unless it is one of `max_bad` that may be left out: the problem names it, and how many rows
+    before it were applied. With an Idempotency-Key, the body can be sent again, or continued after the last number that
+    was applied: no row is applied twice.
     """
     kind = require_type(request, TYPES)
     if delete and kind.startswith("application/geo+json") and keys != "none":
         keys = "none"
     producer, first = numbered(idempotency_key)
     numbers = await numbering(client, name, producer, first, may_skip=may_skip) if producer else None
-    upload = Upload(client, name, numbers, delete=delete, keep_last=coalesce)
+    upload = Upload(
+        client,
+        name,
+        numbers,
+        delete=delete,
+        keep_last=coalesce,
+        max_bad=max_bad,
+        conditions={"only": only, "ttl": ttl},
+    )
+    labels = LabelReader(*LABELS, unit=time_unit, optional=True)
     try:
-        return await _uploaded(request, upload, _reader(kind, delete=delete), TYPES[kind], keys)
+        return await _uploaded(request, upload, _reader(kind, labels, delete=delete), TYPES[kind], keys)
     finally:
         request.app.state.figures.rows.inc(upload.settled)
 
 
-async def _uploaded(request: Request, upload: Upload, read: Reader, mark: bytes | None, keys: str) -> Any:
-    at = 0
+async def _uploaded(request: Request, upload: Upload, read: Reader, mark: bytes | None, keys: Any) -> Any:
     try:
-        async for found in _found(request, mark):
-            at = upload.read
-            read_rows = read(found)
-            if keys != "auto":
-                read_rows = rows.with_keys(read_rows, None if keys == "none" else keys)
-            await upload.add(read_rows)
-            at = upload.read
+        async for some in _texts(request, mark, upload):
+            found = read(some)
+            await upload.add(found if keys == "auto" else rows.with_keys(found, None if keys == "none" else keys))
         return await upload.finish()
     except RowError as error:
         await upload.close()
         return problem(
             HTTPStatus.BAD_REQUEST,
-            f"row {at + error.row}{f', {error.field}' if error.field else ''}: {error.detail}",
+            f"row {error.row}{f', {error.field}' if error.field else ''}: {error.detail}",
             reason="INVALID_FIELD",
             field=error.field,
-            row=at + error.row,
+            row=error.row,
             value=error.value,
             applied=upload.settled,
         )
@@ -116,18 +139,22 @@ async def _uploaded(request: Request, upload: Upload, read: Reader, mark: bytes 
         await upload.close()
 
 
-async def _found(request: Request, mark: bytes | None) -> AsyncIterator[list[bytes]]:
+async def _texts(request: Request, mark: bytes | None, upload: Upload) -> AsyncIterator[list[bytes]]:
     """The texts of the body: lines, records, or all of it."""
     if mark is None:
         yield [await request.body()]
         return
-    async for found in texts(request.stream(), mark):
-        yield found
+    try:
+        async for found in texts(request.stream(), mark):
+            yield found
+    except RowError as error:  # a text is too long
+        error.row += upload.read
+        raise
 
 
-def _reader(kind: str, *, delete: bool) -> Reader:
+def _reader(kind: str, labels: LabelReader, *, delete: bool) -> Reader:
     if kind == "text/csv":
-        return rows.Csv(delete=delete)
+        return rows.Csv(labels, delete=delete)
     if kind.startswith("application/geo+json"):
-        return rows.geojson
-    return rows.ndjson_to_delete if delete else rows.ndjson
+        return rows.GeoJson(labels)
+    return rows.Ndjson(labels, delete=delete)

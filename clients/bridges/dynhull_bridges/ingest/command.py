@@ -8,7 +8,7 @@ import typer
 
 from dynhull_cli.connected import Connect, connecting, fail
 from dynhull_cli.durations import duration
-from dynhull_cli.times import TimeUnit
+from dynhull_cli.reading.times import TimeUnit
 from dynhull_surface.reasons import Exit
 
 from ..command import LogForm

@@ -16,7 +16,7 @@ from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy, KeyValueConfig
 from nats.js.errors import BadRequestError, BucketNotFoundError, KeyNotFoundError
 from nats.js.kv import KeyValue
 
-from dynhull_cli.times import EPOCH
+from dynhull_cli.reading.times import EPOCH
 
 from ..nats_connection import closed, connected
 from ..refusals.nats import NATS, code_of

@@ -2,17 +2,18 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import suppress
 from datetime import timedelta
 from hashlib import sha256
 from typing import Any, NamedTuple
 
 import orjson
 
-from dynhull_cli.columns import are_degrees, is_number, plain
-from dynhull_cli.times import EPOCH, NAMES, TimeReader, TimeUnit
+from dynhull_cli.reading.columns import are_degrees
+from dynhull_cli.reading.labels import key_of
+from dynhull_cli.reading.times import EPOCH, NAMES, TimeReader, TimeUnit
+from dynhull_cli.reading.values import BadValueError, coordinate, is_number
 
-from .expressions import MISSING, is_fixed, is_in_document, last_name, value_of
+from .expressions import MISSING, Value, is_fixed, is_in_document, last_name, value_of
 from .feed import Message
 
 EARLIEST, LATEST = 1990, 2100  # years in which positions are taken
@@ -119,28 +120,27 @@ class Mapping:
     def _row(self, message: Message, document: Any) -> Row:
         key, time = self._key_of(message, document), None
         if self._time is not None:
-            found = _present(self._time(message, document), "time")
+            found = _found(self._time, message, document)
             time = self.times.read(found)
             if not self._timed:
                 self._timed = True
                 self._look_at(found, time)
-        x = _number(self._x(message, document), "x")
-        y = _number(self._y(message, document), "y")
+        x = coordinate(_found(self._x, message, document), "x")
+        y = coordinate(_found(self._y, message, document), "y")
         return Row(self._name(message, document), key, x, y, time)
 
     def _name(self, message: Message, document: Any) -> str:
         hull = self._hull(message, document)
+        if hull is MISSING or hull is None:
+            raise BadValueError("the hull", "is missing")
         if not isinstance(hull, str):
-            raise ValueError(f"the hull is {_shown(hull)}, not a string")
+            raise BadValueError("the hull", "not a string", hull)
         return hull
 
     def _key_of(self, message: Message, document: Any) -> Any:
         if self._key is None:
             return None
-        key = self._key(message, document)
-        if not isinstance(key, (str, int)) or isinstance(key, bool):
-            raise ValueError(f"the key is {_shown(key)}, not a string or an integer")
-        return key
+        return key_of(_found(self._key, message, document), "the key")
 
     def _look_at(self, found: Any, time: int) -> None:
         """Warn if a number is a time of another age, in this unit."""
@@ -149,24 +149,6 @@ class Mapping:
             self.warning = f"time: {found} {NAMES[unit]} since 1970 are {when.isoformat()}: is --time-unit right?"
 
 
-def _number(value: Any, name: str) -> float:
-    number = value
-    if isinstance(value, str):
-        with suppress(ValueError):  # it is no number, which is said below
-            number = float(plain(value))
-    if not isinstance(number, (int, float)) or isinstance(number, bool):
-        raise ValueError(f"{name} is {_shown(value)}, not a number")
-    number = float(number)
-    if not math.isfinite(number):
-        raise ValueError(f"{name} is {_shown(value)}, not finite")
-    return number + 0.0
-
-
-def _present(value: Any, name: str) -> Any:
-    if value is MISSING or value is None:
-        raise ValueError(f"{name} is missing")
-    return value
-
-
-def _shown(value: Any) -> str:
-    return "missing" if value is MISSING or value is None else repr(value)[:100]
+def _found(value: Value, message: Message, document: Any) -> Any:
+    found = value(message, document)
+    return None if found is MISSING else found

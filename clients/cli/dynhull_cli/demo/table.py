@@ -10,8 +10,8 @@ import numpy as np
 
 from dynhull.globe import Gnomonic
 
-from ..columns import are_degrees
 from ..csv_points import PointFile, Row, read_points
+from ..reading.columns import are_degrees
 from .scene import Frame, Points
 
 if TYPE_CHECKING:

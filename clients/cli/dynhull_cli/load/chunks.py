@@ -10,11 +10,12 @@ import numpy.typing as npt
 
 from dynhull.arrays import Points as Points
 
+from ..reading.labels import Key, Labels
+
 CHUNK_ROWS = 8192
 LINE = "line"
 
 Position = tuple[float, float]
-Key = str | int
 Numbers = npt.NDArray[np.int64]
 Row = TypeVar("Row")
 
@@ -96,7 +97,6 @@ class Chunk:
 
 
 Chunks = Generator[Chunk, None, None]
-Labels = tuple[Key | None, int | None, int | None]
 
 
 def picked(

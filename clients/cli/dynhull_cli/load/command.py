@@ -11,7 +11,7 @@ import typer
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..plural import plural
-from ..times import TimeUnit
+from ..reading.times import TimeUnit
 from .options import STANDARD_INPUT, Format, Options
 
 if TYPE_CHECKING:
@@ -180,8 +180,7 @@ def load(
     else:
         more = f" ({counts})" if str(counts) else ""
         typer.echo(
-            f"{name}: {plural(loaded, 'point')} loaded{more}"
-            + ("" if points is None else f", {points:,} in the hull")
+            f"{name}: {plural(loaded, 'point')} loaded{more}" + ("" if points is None else f", {points:,} in the hull")
         )
 
 

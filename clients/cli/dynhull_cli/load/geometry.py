@@ -1,16 +1,13 @@
 """Points of GeoJSON geometries."""
 
-import json
-import math
-from decimal import Decimal
 from itertools import chain
 from typing import Any
 
+from ..reading.values import number
 from .chunks import Position
 
 NESTED = {"MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}  # lists of lists ...
 CLOSED = {"Polygon", "MultiPolygon"}
-LONGEST_TEXT = 200
 
 
 def positions(geometry: Any, every_vertex: bool) -> list[Position]:
@@ -43,31 +40,8 @@ def position(value: Any) -> Position:
     """An array of x, y and perhaps more; ValueError where it is none."""
     if not isinstance(value, list) or len(value) < 2:
         raise ValueError("not two coordinates")
-    return number(value[0], "x"), number(value[1], "y")
-
-
-def number(value: Any, name: str) -> float:
-    """A finite number; ValueError where it is none."""
-    if value is None:
-        raise ValueError(f"{name} is missing")
-    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
-        raise ValueError(f"{name} is {json_text(value)}, not a number")
-    try:
-        rounded = float(value)
-    except OverflowError:  # of an integer
-        rounded = math.inf
-    if not math.isfinite(rounded):
-        raise ValueError(f"{name} is {_shortened(str(value))}, not finite")
-    return rounded + 0.0
-
-
-def json_text(value: Any) -> str:
-    """A value as it stands in the file, shortened."""
-    return _shortened(json.dumps(value, default=float))
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
+    x, y = value[:2]
+    return number(x, "x"), number(y, "y")
 
 
 def _list(value: Any) -> list[Any]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from ..times import TimeUnit
+from ..reading.times import TimeUnit
 
 STANDARD_INPUT = "-"
 

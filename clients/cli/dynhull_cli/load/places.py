@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..columns import GREATEST_LATITUDE, GREATEST_LONGITUDE, why_no_place
+from ..reading.columns import GREATEST_LATITUDE, GREATEST_LONGITUDE, why_no_place
 from .chunks import Chunk
 
 

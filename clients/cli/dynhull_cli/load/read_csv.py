@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..columns import column_index, coordinate, decimal_mark, plain
 from ..csv_table import CsvFormat, CsvTable, UnclearTableError, csv_table, numbered
-from .chunks import CHUNK_ROWS, LINE, Chunk, Chunks, Labels, Points, Position, Rows, cut, picked
-from .labels import label_reader
+from ..reading.columns import column_index, decimal_mark
+from ..reading.labels import Labels
+from ..reading.values import coordinate, plain
+from .chunks import CHUNK_ROWS, LINE, Chunk, Chunks, Points, Position, Rows, cut, picked
 from .options import Format
 from .source import Source
 
@@ -29,7 +30,7 @@ def read_csv(source: Source) -> Chunks:
 
 def _labels(source: Source, table: CsvTable) -> Callable[[list[str]], Labels] | None:
     """Reads the labels of a row; None if there are no columns of them."""
-    read = label_reader(source)
+    read = source.label_reader()
     if read is None:
         return None
     places = [

@@ -9,12 +9,13 @@ from typing import IO, Any
 
 import ijson
 
-from ..columns import coordinate_columns
 from ..peek import peek
 from ..plural import plural
-from .chunks import CHUNK_ROWS, LINE, Chunks, Labels, Position, cut, picked
-from .geometry import json_text, number, position, positions
-from .labels import label_reader
+from ..reading.columns import coordinate_columns
+from ..reading.labels import Labels
+from ..reading.values import coordinate, json_text
+from .chunks import CHUNK_ROWS, LINE, Chunks, Position, cut, picked
+from .geometry import position, positions
 from .source import Source
 
 PREFIX = 4096  # bytes, which show the kind of JSON
@@ -127,7 +128,7 @@ class _Line:
 
 def _labels(source: Source) -> Callable[[Any], Labels] | None:
     """Reads the labels of a row from its members or, of a feature, from its id and properties."""
-    read = label_reader(source)
+    read = source.label_reader()
     if read is None:
         return None
     names = [name for _, name in source.options.labels]
@@ -168,7 +169,7 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
             members = names[i], names[j]
             if not source.axes:
                 source.axes.extend(members)
-        return [(number(value.get(members[0]), members[0]), number(value.get(members[1]), members[1]))]
+        return [(coordinate(value.get(members[0]), members[0]), coordinate(value.get(members[1]), members[1]))]
 
     return read
 

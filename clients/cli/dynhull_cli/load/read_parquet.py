@@ -9,10 +9,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..columns import column_index, coordinate, coordinate_columns
-from .chunks import CHUNK_ROWS, Chunk, Chunks, Labels, Numbers, Position, Rows, picked
+from ..reading.columns import column_index, coordinate_columns
+from ..reading.labels import Labels
+from ..reading.values import coordinate
+from .chunks import CHUNK_ROWS, Chunk, Chunks, Numbers, Position, Rows, picked
 from .geometry import positions
-from .labels import label_reader
 from .source import Source
 from .wkb import decode
 
@@ -64,7 +65,7 @@ def _label_columns(
         None if name is None else names[column_index(source.name, names, option, name)]
         for option, name in source.options.labels
     ]
-    return columns, label_reader(source)
+    return columns, source.label_reader()
 
 
 def _labels_of(

@@ -8,7 +8,7 @@ import numpy as np
 from dynhull.globe import REACH, Gnomonic
 
 from ..fields import of_row
-from ..times import shown_time
+from ..reading.times import shown_time
 from .chunks import Points, Rows
 
 if TYPE_CHECKING:

@@ -10,15 +10,19 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, TYPE_CHECKING, Any, cast
 
-from ..columns import LONGITUDE_LATITUDE, are_degrees
 from ..csv_table import UTF16_MARKS
 from ..peek import peek
+from ..reading.columns import LONGITUDE_LATITUDE, are_degrees
+from ..reading.labels import LabelReader
 from .chunks import Chunks
 from .interruptible import InterruptibleInput, can_be_interrupted
 from .options import STANDARD_INPUT, Format, Options
 from .places import places_only
+
+if TYPE_CHECKING:
+    from dynhull.keys import KeyType
 
 DIGESTED_BYTES = 2**20
 GZIP_MARK = b"\x1f\x8b"
@@ -84,6 +88,17 @@ class Source:
                 known = self.geographic()
                 on_globe = self.degrees if known is None else known
                 yield places_only(chunk) if on_globe else chunk
+
+    def label_reader(self) -> LabelReader | None:
+        """Checks the labels of its rows; None if the options name no such column.
+
+        The first number among the times decides their unit, which is noted, unless the options give one.
+        """
+        names = [column for _, column in self.options.labels]
+        if not any(names):
+            return None
+        kind: KeyType = "int" if self.integer_keys else "str"
+        return LabelReader(*names, kind=kind, unit=self.options.time_unit, noted=self.notes.append)
 
     def rewind(self) -> None:
         """Return to the beginning; not possible with a pipe."""

@@ -1,10 +1,11 @@
-"""Finds the columns of coordinates by name, and reads the numbers in them."""
+"""Finds the columns of coordinates by name."""
 
-import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from dynhull.arrays import COLUMN_NAMES
+
+from .values import is_number
 
 LONGITUDE_LATITUDE = "longitude", "latitude"
 DEGREES = [pair for pair in COLUMN_NAMES if pair[1] in ("lat", "latitude")]
@@ -67,34 +68,11 @@ def decimal_mark(texts: Iterable[str], delimiter: str) -> str:
     return "," if any("," in each for each in numbers) and not any("." in each for each in numbers) else "."
 
 
-def coordinate(text: str | None, column: str, decimal: str = ".") -> float:
-    """Read a finite number with this decimal mark; ValueError says what is wrong with anything else."""
-    if not text:
-        raise ValueError(f"{column} is missing")
-    try:
-        value = float(plain(text, decimal))
-    except ValueError:
-        mark = f" with the decimal mark {decimal!r}" if "," in text else ""
-        raise ValueError(f"{column} is {text!r}, not a number{mark}") from None
-    if not math.isfinite(value):
-        raise ValueError(f"{column} is {text!r}, not finite")
-    return value + 0.0
-
-
-def is_number(text: str) -> bool:
-    """Whether a text is a number, with either decimal mark; NaN and the infinities count."""
-    try:
-        float(plain(text, "," if "," in text else "."))
-    except ValueError:
-        return False
-    return True
-
-
-def plain(text: str, decimal: str = ".") -> str:
-    """The text with a point as decimal mark, for `float`; ValueError for notation of Python, such as 1_000."""
-    if "_" in text or (decimal == "," and "." in text):
-        raise ValueError
-    return text.replace(decimal, ".")
+def pair_of(columns: Iterable[str]) -> tuple[str, str] | None:
+    """The names of the columns of x and y, if a pair of known names is among them."""
+    names = list(columns)
+    pair = _pair(names)
+    return None if pair is None else (names[pair[0]], names[pair[1]])
 
 
 def _pair(columns: Sequence[str]) -> tuple[int, int] | None:

@@ -5,6 +5,8 @@ from decimal import Decimal, InvalidOperation
 from enum import StrEnum
 from typing import Any
 
+from .values import BadValueError
+
 
 class TimeUnit(StrEnum):
     """The units of times that are numbers."""
@@ -16,7 +18,9 @@ class TimeUnit(StrEnum):
 
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+MICROSECOND = timedelta(microseconds=1)
 LARGEST_TIME = 2**53  # microseconds: the years 1685 to 2255
+NOT_OF_THESE_YEARS = "not from the years 1685 to 2255"
 LARGEST_EXPONENT = 30  # of a number: far beyond these years in any unit
 MICROSECONDS = {
     TimeUnit.SECONDS: Decimal(1_000_000),
@@ -57,19 +61,21 @@ class TimeReader:
             return self._of_datetime(value, value.isoformat())
         text = "" if value is None else str(value).strip()
         if not text:
-            raise ValueError(f"{self._name} is missing")
+            raise BadValueError(self._name, "is missing")
+        if text[4:5] == "-" and text[:4].isdecimal():  # a date, which Decimal takes long to refuse
+            return self._of_text(text)
         try:
             number = Decimal(text)
         except InvalidOperation:
             return self._of_text(text)
         if not number.is_finite() or "_" in text:
-            raise ValueError(f"{self._name} is {text!r}, not a time")
+            raise BadValueError(self._name, "not a time", text)
         return self._of_number(number, text)
 
     def _of_number(self, number: Decimal, text: str) -> int:
         unit = unit_of(number) if self.unit is None else self.unit
         if number.adjusted() > LARGEST_EXPONENT or abs(number) * MICROSECONDS[unit] > LARGEST_TIME:
-            raise ValueError(f"{self._name} is {text!r} {NAMES[unit]}, not from the years 1685 to 2255")
+            raise BadValueError(self._name, f"as {NAMES[unit]} {NOT_OF_THESE_YEARS}", text)
         micros = int((number * MICROSECONDS[unit]).to_integral_value("ROUND_FLOOR"))
         if self.unit is None:
             self.unit = unit
@@ -81,18 +87,17 @@ class TimeReader:
 
     def _of_text(self, text: str) -> int:
         try:
-            return self._of_datetime(datetime.fromisoformat(text), text)
-        except ValueError as error:
-            if str(error).startswith(self._name):
-                raise
-            raise ValueError(f"{self._name} is {text!r}, neither ISO 8601 with a time zone nor a number") from None
+            time = datetime.fromisoformat(text)
+        except ValueError:
+            raise BadValueError(self._name, "neither ISO 8601 with a time zone nor a number", text) from None
+        return self._of_datetime(time, text)
 
     def _of_datetime(self, value: datetime, text: str) -> int:
         if value.tzinfo is None:
-            raise ValueError(f"{self._name} is {text!r}, without a time zone: add Z for UTC, or an offset")
-        micros = (value - EPOCH) // timedelta(microseconds=1)
+            raise BadValueError(self._name, "without a time zone: add Z for UTC, or an offset", text)
+        micros = (value - EPOCH) // MICROSECOND
         if abs(micros) > LARGEST_TIME:
-            raise ValueError(f"{self._name} is {text!r}, not from the years 1685 to 2255")
+            raise BadValueError(self._name, NOT_OF_THESE_YEARS, text)
         return micros
 
 

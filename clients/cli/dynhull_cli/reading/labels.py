@@ -1,0 +1,83 @@
+"""The keys and times of rows, and the times at which they leave."""
+
+from collections.abc import Callable
+from decimal import Decimal
+from typing import Any
+
+from dynhull.keys import KeyType, as_key
+
+from .times import TimeReader, TimeUnit
+from .values import BadValueError
+
+Key = str | int
+Labels = tuple[Key | None, int | None, int | None]
+"""The key of a row, its time and the time at which it leaves, in microseconds since 1970; None for what it has not."""
+
+
+class LabelReader:
+    """Checks the labels of rows.
+
+    Args:
+        key, time, expires: the names of their columns or members; None for rows that have none.
+        kind: that of the keys; None for the kind that they have.
+        unit: the unit of times that are numbers; None for that which the first one seems to have.
+        noted: called with a line about that unit.
+        optional: whether rows may have no key, which is not an empty one, and no time. They may always have no time at
+            which they leave.
+    """
+
+    def __init__(
+        self,
+        key: str | None,
+        time: str | None,
+        expires: str | None = None,
+        *,
+        kind: KeyType | None = None,
+        unit: TimeUnit | None = None,
+        noted: Callable[[str], object] | None = None,
+        optional: bool = False,
+    ) -> None:
+        self._key, self._kind, self._optional, self._noted = key, kind, optional, noted
+        self._time = None if time is None else TimeReader(time, unit)
+        self._expires = None if expires is None else TimeReader(expires, unit)
+
+    def __call__(self, key: Any, time: Any, expires: Any = None) -> Labels:
+        """The labels of a row; BadValueError says what is wrong with them."""
+        return (
+            None if self._key is None or (self._optional and key is None) else key_of(key, self._key, self._kind),
+            None if self._time is None or (self._optional and _absent(time)) else self._read(self._time, time),
+            None if self._expires is None or _absent(expires) else self._read(self._expires, expires),
+        )
+
+    def _read(self, times: TimeReader, value: Any) -> int:
+        time = times.read(value)
+        if times.note is not None and self._noted is not None:
+            self._noted(times.note)
+            times.note = None
+        return time
+
+
+def key_of(value: Any, name: str, kind: KeyType | None = None) -> Key:
+    """A key; BadValueError if it is missing, or cannot be one of this kind."""
+    if _absent(value):
+        raise BadValueError(name, "is missing")
+    value = float(value) if isinstance(value, Decimal) else value
+    if kind == "int":
+        return as_key(integer_key(value, name), "int", name)
+    if isinstance(value, bool | float | list | dict):
+        raise BadValueError(name, "not a string" if kind == "str" else "not a string or an integer", value)
+    return as_key(value if kind is None else str(value), kind or ("int" if isinstance(value, int) else "str"), name)
+
+
+def integer_key(key: Any, place: str) -> int:
+    """A key that is an integer; BadValueError names the place."""
+    if isinstance(key, int) and not isinstance(key, bool):
+        return key
+    if not isinstance(key, str) or not key.strip().isdecimal():
+        problem = "not an integer from 0 to 2**64 - 1, and the keys of the hull are integers"
+        raise BadValueError(place, problem, key)
+    return int(key)
+
+
+def _absent(value: Any) -> bool:
+    return value is None or value == ""
