@@ -78,6 +78,19 @@ def test_each_message_is_a_position_of_a_key(client: HullClient, address: str, n
     assert said[-1]["points"] == 1
 
 
+def test_the_log_says_what_became_of_each_position(client: HullClient, address: str, name: str, nats_port: int) -> None:
+    """The time of 2099 is refused and kept aside; the others are new, stale and too old for the window."""
+    client.create_hull(name, keyed="str", ordering="event_time", max_age=5400, clock="data", max_skew=60)
+    times = [("a", "2026-03-01T12:00:00Z"), ("b", "2099-01-01T00:00:00Z"), ("a", "2026-03-01T11:00:00Z"),
+             ("c", "2026-03-01T10:00:00Z"), ("c", "2026-03-01T12:00:01Z"), ("a", "2026-03-01T12:00:01Z")]  # fmt: skip
+    publish(nats_port, name, [(key, {"x": 1, "y": 2, "at": at}) for key, at in times])
+    options = ("--hull", name, "--key", "{1}", "--x", "$.x", "--y", "$.y", "--time", "$.at")
+    said = ingested(address, f"nats://127.0.0.1:{nats_port}/{name}/{name}.*", *options)
+    counts = {"inserted": 2, "moved": 1, "stale": 1, "late": 1}
+    ended = {each: value for each, value in said[-1].items() if each not in ("timestamp", "seconds", "level", "logger")}
+    assert ended == {"event": "stopped", "points": 5, "bad": 1, **counts}
+
+
 def test_messages_without_contents_delete_keys(client: HullClient, address: str, name: str, nats_port: int) -> None:
     """In the order of the log, and once: a key that comes back afterwards stays."""
     at = {"lon": 1, "lat": 2}
@@ -147,7 +160,7 @@ BAD = {
     b"": "the message is empty",
     b"[1, 2]": "the key is missing",
     b'{"id": 1.5, "x": 1, "y": 1}': "the key is 1.5, not a string or an integer",
-    b'{"id": "a", "x": 1}': "y is missing, not a number",
+    b'{"id": "a", "x": 1}': "y is missing",
     b'{"id": "a", "x": "east", "y": 1}': "x is 'east', not a number",
     b'{"id": "a", "x": "inf", "y": 1}': "x is 'inf', not finite",
     b'{"id": "", "x": 1, "y": 1}': "keys row 0 is ",

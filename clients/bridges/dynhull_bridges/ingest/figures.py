@@ -2,6 +2,9 @@
 
 from prometheus_client import CollectorRegistry, Counter, Gauge
 
+from dynhull_client import Applied
+from dynhull_surface.counts import COUNTS
+
 from ..metrics_page import serve_page
 
 
@@ -16,6 +19,7 @@ class Figures:
 
         self.messages = counter("messages", "Messages read.")
         self.points = counter("points", "Points acknowledged by the server.")
+        self.counts = {name: counter(name, f"Of the points, {text}.") for name, text in COUNTS.items()}
         self.bad = counter("bad", "Messages that could not be taken.")
         self.lost = counter("lost", "Messages, at most, that the broker removed before they were read.")
         self.restarts = counter("restarts", "Times that the feed began again after an error of the broker.")
@@ -23,8 +27,14 @@ class Figures:
 
     def add(self, feed: str) -> None:
         """Show a feed from the start, not only after its first message."""
-        for each in (self.messages, self.points, self.bad, self.lost, self.restarts):
+        for each in (self.messages, self.points, *self.counts.values(), self.bad, self.lost, self.restarts):
             each.labels(feed)
+
+    def add_counts(self, feed: str, applied: Applied) -> None:
+        """Add those of a batch."""
+        for name, counter in self.counts.items():
+            if count := getattr(applied, name):
+                counter.labels(feed).inc(count)
 
     def serve(self, host: str, port: int) -> int:
         """Serve the page from another thread, and return its port."""

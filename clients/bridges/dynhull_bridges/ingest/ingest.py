@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 import structlog
 
 from dynhull_client import AsyncHullClient, RestoredError
+from dynhull_surface.counts import COUNTS
 
 from ..waiting import SERVER_AWAY, Absence, growing_pauses, unless
 from .bad import BadMessages, TooManyBadError
@@ -131,7 +132,8 @@ async def run(
     seconds = max(ended, default=0.0) - min(begun, default=0.0)
     known = sum(each.known for each in pumps)
     lost = sum(each.lost for each in pumps)
-    more = {**({"lost": lost} if lost else {}), **({"known_before": known} if known else {})}
+    counts = {name: sum(each.counts[name] for each in pumps) for name in COUNTS}
+    more = {name: count for name, count in {**counts, "lost": lost, "known_before": known}.items() if count}
     log.info("stopped", points=points, seconds=round(max(0.0, seconds), 3), bad=bad.count, **more)
     return bool(pumps) and all(each.at_end for each in pumps)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import structlog
 
 from dynhull_client import (
+    Applied,
     AsyncHullClient,
     DeadlineError,
     DynhullError,
@@ -65,7 +66,7 @@ class Lane:
         degrees: whether rows seem to be longitudes and latitudes.
         create: settings of the hull if there is none; None to create none.
         bad: called with each message that is refused, and why.
-        settled: called when a chunk is settled, with the number of its rows that were applied.
+        settled: called when a chunk is settled, with the number of its rows that were sent, and their effect.
         away: notes that the server does not answer; all lanes share it.
         named_by_messages: whether the name comes from messages, which are bad then if no hull can have it.
     """
@@ -81,7 +82,7 @@ class Lane:
         degrees: bool,
         create: dict[str, Any] | None,
         bad: Callable[[Message, Exception], None],
-        settled: Callable[[int], None],
+        settled: Callable[[int, Applied | None], None],
         away: Absence,
         named_by_messages: bool,
     ) -> None:
@@ -187,7 +188,7 @@ class Lane:
         self.known += len(chunk.points) - (0 if rest is None else len(rest.points))
         if rest is None:
             self._away.ends()
-            self._settled(0)
+            self._settled(0, None)
             return
         self._flying.append(rest)
         sequence = rest.number if self._producer is not None else None
@@ -220,7 +221,7 @@ class Lane:
             self._away.ends()
             self._flying.popleft()
             chunk.settle()
-            self._settled(len(chunk.points))
+            self._settled(len(chunk.points), outcome.result())
         elif self._failure is None and isinstance(error, Exception):
             self._failure = error
         self._news.set()
@@ -256,7 +257,7 @@ class Lane:
             self._bad(chunk.messages[0][0], error)
             del self._waiting[place]
             chunk.settle()
-            self._settled(0)
+            self._settled(0, None)
             return
         row = error.row if isinstance(error, DynhullError) else None
         parts = chunk.split(row)
@@ -271,7 +272,7 @@ class Lane:
                 for message, _ in chunk.messages:
                     self._bad(message, error)
                 chunk.settle()
-                self._settled(0)
+                self._settled(0, None)
             self._waiting.clear()
             self._room.set()
             self._news.clear()

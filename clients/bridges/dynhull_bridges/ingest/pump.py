@@ -9,7 +9,8 @@ from typing import Any
 
 import structlog
 
-from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
+from dynhull_cli.counts import Counts
+from dynhull_client import Applied, AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
 
 from ..waiting import Absence, unless
 from .bad import BadMessages
@@ -69,6 +70,7 @@ class Pump:
     ) -> None:
         self.reached = 0  # the number of the last message read
         self.points = 0  # acknowledged
+        self.counts = Counts()  # what became of them
         self.lost = 0  # messages, at most, that the broker removed before they were read
         self.at_end = False  # whether no message was left, and all were taken
         self.begun = self.ended = monotonic()  # when the first message was read, and the last point acknowledged
@@ -274,8 +276,11 @@ class Pump:
         self._sending.append(self._group.create_task(lane.run(), name=f"ingest into {hull}"))
         return lane
 
-    def _settled(self, rows: int) -> None:
+    def _settled(self, rows: int, applied: Applied | None) -> None:
         self.points += rows
+        if applied is not None:
+            self.counts.add(applied)
+            self._figures.add_counts(self._feed.name, applied)
         self.ended = monotonic()
         self._figures.points.labels(self._feed.name).inc(rows)
         self._news.set()
