@@ -4,6 +4,9 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from .described import described
+from .settings import FenceSettings, HullSettings
+
 
 class Name(NamedTuple):
     """The names of a field.
@@ -21,43 +24,25 @@ class Name(NamedTuple):
 
 # Fields below one that is named here belong to it.
 NAMES: Mapping[str, Name] = {
+    **{
+        f"config.{each.path}": Name((each.name,), each.option)
+        for settings in (HullSettings, FenceSettings)
+        for each in described(settings)
+    },
     "config": Name((), ""),
-    "config.identity": Name(("keyed",)),
-    "config.max_points": Name(("point_limit",)),
-    "config.ordering": Name(option="--event-order"),
-    "config.frame": Name(("geographic",)),
-    "config.center": Name(),
-    "config.shards": Name(),
     "config.window": Name((), "--max-age or --max-points"),
-    "config.window.max_age": Name(),
-    "config.window.max_points": Name(),
-    "config.window.clock": Name(),
-    "config.window.max_skew": Name(),
-    "config.window.ahead": Name(option="--clamp"),
     "config.quarantine": Name(option=""),
     "config.quarantine.max_speed": Name(("quarantine", "max_speed")),
     "config.quarantine.max_growth": Name(("quarantine", "max_growth")),
     "config.quarantine.confirmations": Name(("quarantine", "confirmations")),
     "config.hull_area": Name(("area",)),
     "config.hull_area.name": Name(("area", "hull"), "--area"),
-    "config.hull_area.without_self": Name(),
-    "config.hull_area.layer": Name(),
     "config.area": Name(("area",), "the area"),
     "config.polygon_area": Name(("area",), "--polygon"),
     "config.circle_area": Name(("area",), "--circle"),
     "config.subject_hull": Name(("subjects",)),
     "config.subject_prefix": Name(),
     "config.other_hull": Name(),
-    "config.boundary": Name(),
-    "config.initial": Name(),
-    "config.margin": Name(),
-    "config.near_distance": Name(("near",)),
-    "config.report_crosses": Name(("crosses",)),
-    "config.dwell": Name(),
-    "config.min_dwell": Name(),
-    "config.confirmations": Name(),
-    "config.max_events": Name(),
-    "config.max_event_age": Name(),
     "quarantine": Name((), ""),
     "quarantine.max_speed": Name(),
     "quarantine.max_growth": Name(),

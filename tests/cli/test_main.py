@@ -39,7 +39,15 @@ for command in {commands!r}:
     found.append((output.getvalue(), [*{{module.partition(".")[0] for module in sys.modules}}]))
 print(json.dumps(found))
 """
-OURS = {"dynhull_bridges", "dynhull_gateway", "dynhull_cli", "dynhull_cluster", "dynhull_dashboard", "dynhull_server"}
+OURS = {
+    "dynhull_bridges",
+    "dynhull_cli",
+    "dynhull_cluster",
+    "dynhull_dashboard",
+    "dynhull_gateway",
+    "dynhull_server",
+    "dynhull_surface",
+}
 MODELS = {
     "annotated_types",
     "pydantic",

@@ -1,38 +1,26 @@
 """`dynhull list`, `dynhull create` and `dynhull delete`: the hulls of a server."""
 
 import sys
-from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from dynhull_surface.reasons import Exit
+from dynhull_surface.settings import HullSettings
 
 from .connected import AsJson, connected, fail
-from .durations import duration, shown
+from .durations import shown
 from .json_lines import json_line
 from .listing import below, listed
+from .lon_lat import lon_lat
 from .plural import plural
 from .quarantine import Confirmations, MaxGrowth, MaxSpeed, given_rules, rule_members, shown_rules
+from .setting_options import choosing, settings_options
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from dynhull_client import HullClient, HullInfo
-
-
-class KeyKind(StrEnum):
-    """The kinds of keys."""
-
-    STR = "str"
-    INT = "int"
-
-
-class ClockKind(StrEnum):
-    """The clocks of a window."""
-
-    SERVER = "server"
-    DATA = "data"
 
 
 Names = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the hulls.")]
@@ -68,70 +56,15 @@ def list_hulls(
             typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}{frame}{held}")
 
 
-COUNTS = {"min": 1, "max": 2**63 - 1, "metavar": "INTEGER"}
-
-
-def _setting(text: str, *names: str, **more: Any) -> Any:
-    return typer.Option(*names, help=text, rich_help_panel="Settings, fixed from then on", **more)
-
-
 @connected
+@choosing(settings_options(HullSettings, "Settings, fixed from then on"))
 def create(
     client: "HullClient",
     names: Names,
-    keyed: Annotated[
-        KeyKind | None,
-        _setting("Name each point by a key, a string or an integer. Default: points without keys.", "--keyed"),
-    ] = None,
-    max_age: Annotated[
-        str | None,
-        _setting("Age at which points leave: 500ms, 90s, 30m, 2h or 7d; a number alone is seconds. Default: never."),
-    ] = None,
-    max_points: Annotated[
-        int | None, _setting("Number of points beyond which the oldest leave. Default: no such limit.", **COUNTS)
-    ] = None,
-    clock: Annotated[
-        ClockKind, _setting("Clock that decides what is too old: the server's, or data for the latest event time.")
-    ] = ClockKind.SERVER,
-    max_skew: Annotated[
-        str | None,
-        _setting("How far an event time may be ahead of the server's clock, as for --max-age. Default: any distance."),
-    ] = None,
-    clamp: Annotated[
-        bool, _setting("Reduce event times further ahead to the latest allowed, rather than refuse them.", "--clamp")
-    ] = False,
-    event_order: Annotated[
-        bool,
-        _setting(
-            "Of two positions of a key, keep the one with the later event time. Default: that which arrives last."
-        ),
-    ] = False,
-    point_limit: Annotated[
-        int | None,
-        _setting("Number of points beyond which batches are refused. Default: the server's limit.", **COUNTS),
-    ] = None,
-    geographic: Annotated[
-        bool, _setting("Points are longitudes and latitudes on the globe. Default: points of a plane.", "--geographic")
-    ] = False,
-    center: Annotated[
-        str | None,
-        _setting(
-            "Centre of a geographic hull, LON,LAT in degrees; points are within 85 degrees of it. Default: the mean "
-            "direction of the first points.",
-            "--center",
-            "--centre",
-        ),
-    ] = None,
+    chosen: dict[str, Any],
     max_speed: MaxSpeed = None,
     max_growth: MaxGrowth = None,
     confirmations: Confirmations = None,
-    shards: Annotated[
-        int | None,
-        _setting(
-            "Number of shards to divide the points among, each on one of the server's workers. Default: one hull.",
-            **COUNTS,
-        ),
-    ] = None,
     exist_ok: Annotated[
         bool, typer.Option("--exist-ok", help="Accept a hull that exists already with the same settings.")
     ] = False,
@@ -148,49 +81,21 @@ def create(
     """
     from dynhull_client import HullExistsError
 
-    settings: dict[str, Any] = {
-        "keyed": keyed and keyed.value,
-        "max_age": duration(max_age, "--max-age"),
-        "max_points": max_points,
-        "clock": clock.value,
-        "max_skew": duration(max_skew, "--max-skew"),
-        "ahead": "clamp" if clamp else "refuse",
-        "ordering": "event_time" if event_order else "arrival",
-        "point_limit": point_limit,
-        "geographic": geographic,
-        "center": None if center is None else _place(center),
-        "quarantine": given_rules(max_speed, max_growth, confirmations),
-        "shards": shards,
-    }
-    _require("--geographic", geographic, {"--center": center is not None})
-    _require(
-        "--keyed",
-        keyed is not None,
-        {"--max-speed": max_speed is not None, "--max-growth": max_growth is not None, "--event-order": event_order},
-    )
-    _require(
-        "--max-age or --max-points",
-        max_age is not None or max_points is not None,
-        {"--clock": clock is not ClockKind.SERVER, "--max-skew": max_skew is not None, "--clamp": clamp},
-    )
+    chosen["quarantine"] = given_rules(max_speed, max_growth, confirmations)
+    if chosen["quarantine"] is not None and chosen["keyed"] is None:
+        raise ValueError(f"{'--max-speed' if max_speed is not None else '--max-growth'} is given with --keyed")
     for name in names:
         try:
-            client.create_hull(name, **settings)
+            client.create_hull(name, **chosen)
             created = True
         except HullExistsError:
             if not exist_ok:
                 raise
-            client.create_hull(name, **settings, exist_ok=True)  # refuses other settings
+            client.create_hull(name, **chosen, exist_ok=True)  # refuses other settings
             created = False
         typer.echo(
             json_line(name=name, created=created) if as_json else f"{name}: {'created' if created else 'exists'}"
         )
-
-
-def _require(other: str, there: bool, given: dict[str, bool]) -> None:
-    """Raise ValueError for an option that is given without the other one that it needs."""
-    for option in (option for option, is_given in given.items() if is_given and not there):
-        raise ValueError(f"{option} is given with {other}")
 
 
 @connected
@@ -209,7 +114,7 @@ def recenter(
 
     The hull is built anew, as one revision.
     """
-    info = client.recenter(name, None if center is None else _place(center))
+    info = client.recenter(name, None if center is None else lon_lat(center))
     if as_json:
         typer.echo(json_line(name=name, revision=info.revision, center=info.center))
     else:
@@ -236,15 +141,6 @@ def reshard(
         typer.echo(json_line(name=name, revision=info.revision, shards=info.shards))
     else:
         typer.echo(f"{name}: {info.shards} shard{'' if info.shards == 1 else 's'}, revision {info.revision}")
-
-
-def _place(text: str) -> tuple[float, float]:
-    """LON,LAT as numbers; ValueError for another text."""
-    try:
-        lon, lat = (float(each) for each in text.split(","))
-    except ValueError:
-        raise ValueError(f"the centre is {text!r}: give LON,LAT, two numbers of degrees") from None
-    return lon, lat
 
 
 def _shown_place(info: "HullInfo") -> str:

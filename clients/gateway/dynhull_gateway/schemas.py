@@ -20,20 +20,23 @@ from pydantic import (
     StrictStr,
     StringConstraints,
     Tag,
-    ValidationInfo,
-    field_validator,
     model_validator,
 )
 
 from dynhull_client import Quarantine
+from dynhull_surface import settings as surface
 
 from . import examples
+from .numbers import LARGEST as LARGEST
+from .numbers import Number as Number
+from .numbers import Point as Point
+from .numbers import Seconds
+from .setting_fields import with_settings
 
 NO_TIME = np.datetime64(0, "us")  # of a key without event time
 
 NAME = r"^[A-Za-z0-9._/-]{1,200}$"
 NAMES = "1 to 200 letters a to z and A to Z, digits and ._-/; a slash in a path is written %2F"
-LARGEST = 2**64 - 1
 
 
 def unquoted(value: Any) -> Any:
@@ -72,7 +75,6 @@ def _not_a_number(value: Any) -> Any:
     return value
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True, ge=0, le=LARGEST)]
 Name = Annotated[str, Field(strict=True, pattern=NAME, description=NAMES, examples=["fleet"])]
 Key = (
@@ -80,9 +82,6 @@ Key = (
     | Annotated[int, Field(strict=True, ge=0, le=LARGEST)]
 )
 Time = Annotated[AwareDatetime, BeforeValidator(_not_a_number)]
-Seconds = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
-# Pairs are lists of two: their JSON schema, unlike that of tuples, is the same in every draft.
-Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Points = list[Point]
 
 Finite = Annotated[float | None, BeforeValidator(_finite)]
@@ -191,38 +190,13 @@ class QuarantineRules(Request):
     )
 
 
+@with_settings(surface.HullSettings)
 class NewHull(Request):
     """The settings of a hull, fixed from its creation."""
 
     name: Name
-    keyed: Literal["str", "int"] | None = Field(None, description="Kind of the keys; null for a hull without keys.")
-    max_age: Annotated[float, Field(strict=True, gt=0, le=1e9)] | None = Field(
-        None, description="Sliding window: seconds after which points leave."
-    )
-    max_points: Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)] | None = Field(
-        None, description="Sliding window: number of points beyond which the oldest leave."
-    )
-    clock: Literal["server", "data"] = Field("server", description="Clock of the window.")
-    max_skew: Seconds | None = Field(None, description="Seconds that event times may be ahead of the server's clock.")
-    ahead: Literal["refuse", "clamp"] = Field("refuse", description="What happens to times further ahead.")
-    ordering: Literal["arrival", "event_time"] = Field("arrival", description="Which position of a key is the later.")
-    point_limit: Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)] | None = Field(
-        None, description="Points beyond which batches are refused."
-    )
-    geographic: StrictBool = Field(False, description="Whether points are longitudes and latitudes in degrees.")
-    center: Point | None = Field(None, description="Longitude and latitude of the centre of a geographic hull.")
     quarantine: QuarantineRules | None = Field(None, description="Rules that hold bad positions of keys out.")
-    shards: Annotated[int, Field(strict=True, ge=1, le=1024)] | None = Field(
-        None, description="The number of shards to divide the points among; null for a hull that is not divided."
-    )
     exist_ok: StrictBool = Field(False, description="Return an existing hull with these settings.")
-
-    @field_validator("center")
-    @classmethod
-    def _of_the_globe(cls, center: list[float] | None, info: ValidationInfo) -> list[float] | None:
-        if center is not None and not info.data.get("geographic", True):
-            raise ValueError('is a setting of hulls on the globe: give "geographic": true, too')
-        return center
 
     def arguments(self) -> dict[str, Any]:
         """The fields as arguments of the SDK."""
@@ -741,6 +715,7 @@ Area = Annotated[
 ]
 
 
+@with_settings(surface.FenceSettings)
 class FenceSettings(Request):
     """What a fence compares, and when it makes events."""
 
@@ -750,26 +725,13 @@ class FenceSettings(Request):
         None, description="or a prefix of the names of several,"
     )
     other_hull: Name | None = Field(None, description="or a hull that is compared as a whole.")
-    boundary: Literal["closed", "open"] = "closed"
-    margin: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
-    crosses: StrictBool = False
-    dwell: Seconds | None = None
-    confirmations: Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)] = 0
-    min_dwell: Seconds | None = None
-    near: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 0.0
-    without_self: StrictBool = False
-    layer: Annotated[int, Field(strict=True, ge=1, le=1000)] = 1
-    max_events: Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)] = 0
-    max_event_age: Seconds | None = None
 
 
+@with_settings(surface.FenceSettings, at_creation=True)
 class NewFence(FenceSettings):
     """A fence to create."""
 
     name: Name
-    initial: Literal["snapshot", "events", "none"] = Field(
-        "snapshot", description="What it says about subjects that are inside at first."
-    )
     exist_ok: StrictBool = Field(False, description="Return an existing fence with these settings.")
 
 

@@ -80,12 +80,11 @@ def as_area(area: Any) -> Area:
     return area if isinstance(area, str | Circle) else tuple(_polygons(area, "area"))
 
 
-def encode_area(area: Area, without_self: bool, layer: int, config: fence_pb2.FenceConfig) -> None:
-    """Add an area to the settings of a fence; the layer as it is sent, 0 for the hull itself."""
+def encode_area(area: Area, config: fence_pb2.FenceConfig) -> None:
+    """Add an area to the settings of a fence."""
     if isinstance(area, str):
-        config.hull_area.CopyFrom(fence_pb2.HullArea(name=area, without_self=without_self, layer=layer))
-    elif without_self or layer:
-        raise ValueError(f"{'without_self' if without_self else 'layer'} is for an area that is a hull")
+        config.hull_area.name = area
+        config.hull_area.SetInParent()
     elif isinstance(area, Circle):
         config.circle_area.CopyFrom(fence_pb2.CircleArea(center_x=area.x, center_y=area.y, radius=area.r))
     else:

@@ -5,9 +5,7 @@ The methods of `HullClient` and `AsyncHullClient` are made of these functions an
 
 from __future__ import annotations
 
-import operator
 from dataclasses import dataclass
-from numbers import Real
 from typing import TYPE_CHECKING, Any, Generic, Literal, Never, TypeVar
 from uuid import uuid4
 
@@ -18,8 +16,10 @@ from dynhull.arrays import as_points
 from dynhull.globe import as_center
 from dynhull_proto.v1 import hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_surface.settings import HullSettings
 
 from . import _messages as messages
+from ._arguments import choice, positive, whole
 from ._batch import Batch
 from ._errors import DynhullError, HullExistsError, HullNotFoundError
 from ._keys import checked_keys, decode_names, encode_keys
@@ -40,6 +40,7 @@ from ._messages import (
     Verification,
 )
 from ._quarantine_messages import encode_quarantine
+from ._settings import SPAN, documenting
 from ._times import encode_duration
 
 if TYPE_CHECKING:
@@ -50,10 +51,10 @@ if TYPE_CHECKING:
     from google.protobuf.message import Message
 
     from dynhull.keys import KeyType
+    from dynhull_surface.settings import Ahead, Clock, Ordering
 
     from ._batch import Missing, Only
     from ._hull_copy import HullCopy
-    from ._messages import Ahead, Clock, Ordering
     from ._quarantine_messages import Quarantine
 
 Answer = TypeVar("Answer")
@@ -102,14 +103,8 @@ class Call(Generic[Answer]):
     in_parts: bool = False
 
 
-def require_not_negative(**numbers: float | None) -> None:
-    """Raise ValueError if one of the arguments is negative or not a number."""
-    for argument, value in numbers.items():
-        if isinstance(value, Real) and not value >= 0:
-            raise ValueError(f"{argument} must be at least 0, got {value}")
-
-
-def create_hull(
+@documenting(HullSettings, SPAN)
+def create_hull(  # noqa: D417  # the settings have their descriptions
     name: str,
     *,
     keyed: KeyType | None = None,
@@ -137,22 +132,9 @@ def create_hull(
 
     Args:
         name: 1 to 200 letters a to z and A to Z, digits and "._-/".
-        keyed: the kind of the keys, "str" or "int"; None for a hull of points without keys.
-        max_age: the age at which points leave, in seconds or as a timedelta.
-        max_points: the number of points beyond which the oldest leave. For a limit that refuses, see `point_limit`.
-        clock: the clock that decides what is too old: "server", or "data" for the greatest event time so far.
-        max_skew: how far an event time may be ahead of the server's clock; None for any distance.
-        ahead: what happens to event times further ahead: "refuse" the batch, or "clamp" the time to the latest allowed.
-        ordering: which of two positions of a key is the later one: the one that arrives last ("arrival"), or the one
-            with the later event time ("event_time"): an older one then changes nothing.
-        point_limit: the number of points beyond which a batch is refused; None for the server's own limit.
-        geographic: whether points are places on the globe, rather than points of a plane.
-        center: longitude and latitude of the centre of a geographic hull, whose points are all within 85 degrees of it;
-            None for the mean direction of its first points.
         quarantine: the rules that a keyed hull begins with, which hold bad positions out; None for none.
             `set_quarantine` changes them; those of an existing hull are not compared.
-        shards: the number of shards among which the server divides the points, for a hull that is too much for one
-            process; None for one that is not divided. Some settings and questions are refused then.
+        SETTINGS
         exist_ok: whether to return an existing hull of that name and kind, with its points. HullExistsError if it has
             other settings, or without `exist_ok`.
         timeout: seconds, instead of the client's.
@@ -170,7 +152,7 @@ def create_hull(
         raise ValueError("clock, max_skew and ahead are settings of a window: give max_age or max_points, too")
     if quarantine is not None:
         config.quarantine.CopyFrom(encode_quarantine(quarantine))
-    config.shards = _positive("shards", None if shards is None else whole("shards", shards, bits=32))
+    config.shards = positive("shards", None if shards is None else whole("shards", shards, bits=32))
     create: Call[HullInfo] = Call(
         "CreateHull",
         pb.CreateHullRequest(name=name, config=config),
@@ -194,7 +176,7 @@ def _config(keyed: KeyType | None, ordering: Ordering, point_limit: int | None) 
     return hull_pb2.HullConfig(
         identity=choice("keyed", keyed, IDENTITIES),
         ordering=choice("ordering", ordering, ORDERINGS),
-        max_points=_positive("point_limit", point_limit),
+        max_points=positive("point_limit", point_limit),
     )
 
 
@@ -212,44 +194,11 @@ def _window(
 ) -> hull_pb2.Window:
     return hull_pb2.Window(
         max_age=None if max_age is None else encode_duration(max_age, "max_age"),
-        max_points=_positive("max_points", max_points),
+        max_points=positive("max_points", max_points),
         clock=choice("clock", clock, CLOCKS),
         max_skew=None if max_skew is None else encode_duration(max_skew, "max_skew"),
         ahead=choice("ahead", ahead, AHEAD_POLICIES),
     )
-
-
-def choice(argument: str, value: Any, choices: Mapping[Any, Any]) -> Any:
-    """The value that stands for a choice; ValueError names the argument and what it may be."""
-    if value not in choices:
-        raise ValueError(f"{argument} must be one of {', '.join(map(repr, choices))}, got {value!r}")
-    return choices[value]
-
-
-def text(argument: str, value: Any) -> str:
-    """The value; TypeError if it is no str."""
-    if not isinstance(value, str):
-        raise TypeError(f"{argument} is {value!r}: must be a str")
-    return value
-
-
-def whole(argument: str, value: Any, bits: int = 64) -> int:
-    """The value as an integer without sign; TypeError if it is no integer, ValueError if it is out of range."""
-    try:
-        number = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{argument} is {value!r}: must be an integer") from None
-    if number < 0:
-        raise ValueError(f"{argument} must be at least 0, got {number}")
-    if number >= 2**bits:
-        raise ValueError(f"{argument} must be less than 2**{bits}, got {number}")
-    return number
-
-
-def _positive(argument: str, value: int | None) -> int:
-    if value is not None and value < 1:
-        raise ValueError(f"{argument} must be at least 1, got {value}")
-    return value or 0
 
 
 def encode_layer(layer: int) -> int:
@@ -296,7 +245,7 @@ def reshard(name: str, shards: int, *, timeout: float | None = None) -> Call[Hul
         shards: the number of shards, 1 to 1024.
         timeout: seconds, instead of the client's.
     """
-    number = _positive("shards", whole("shards", shards, bits=32))
+    number = positive("shards", whole("shards", shards, bits=32))
     request = pb.ReshardRequest(name=name, shards=number)
     return Call("Reshard", request, lambda response: messages.decode_info(response.hull), timeout, repeatable=False)
 
@@ -951,7 +900,7 @@ def watch(
         include_keys=keys,
         outline_only=outline,
         layer=encode_layer(layer),
-        max_vertices=_positive("max_vertices", max_vertices),
+        max_vertices=positive("max_vertices", max_vertices),
     )
     if copy is not None and resume is not None:
         raise ValueError("give either copy, which the watch updates, or resume, which the caller updates, not both")

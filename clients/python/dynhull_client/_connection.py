@@ -13,7 +13,8 @@ from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 from ._address import is_local, proxy_of, target
-from ._calls import Call, require_not_negative
+from ._arguments import require_not_negative
+from ._calls import Call
 from ._errors import DynhullError, error_of
 from ._home import Home, require_grpc
 from ._retry import Attempts

@@ -1,17 +1,17 @@
 """Fences and their events, as values."""
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Literal
 
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2
+from dynhull_surface.settings import FenceSettings
 
 from ._areas import Area, Prefix, decode_area
 from ._keys import KeyTuple, decode_names
+from ._settings import decode_settings, documenting
 from ._times import decode_time
 
-Boundary = Literal["closed", "open"]
-Initial = Literal["snapshot", "events", "none"]
 EventType = Literal[
     "enter",
     "exit",
@@ -37,15 +37,6 @@ FenceCause = Literal[
     "time_passed",
 ]
 
-BOUNDARIES: dict[Boundary, fence_pb2.FenceBoundary] = {
-    "closed": fence_pb2.FENCE_BOUNDARY_CLOSED,
-    "open": fence_pb2.FENCE_BOUNDARY_OPEN,
-}
-INITIALS: dict[Initial, fence_pb2.FenceInitial] = {
-    "snapshot": fence_pb2.FENCE_INITIAL_SNAPSHOT,
-    "events": fence_pb2.FENCE_INITIAL_EVENTS,
-    "none": fence_pb2.FENCE_INITIAL_NONE,
-}
 TYPES: dict[int, EventType] = {
     fence_pb2.FENCE_EVENT_TYPE_ENTER: "enter",
     fence_pb2.FENCE_EVENT_TYPE_EXIT: "exit",
@@ -88,8 +79,9 @@ class FenceConsumer:
     lost: int
 
 
-@dataclass(frozen=True, slots=True)
-class Fence:
+@documenting(FenceSettings)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fence(FenceSettings):
     """A fence with its settings, as given to `create_fence`, its counts and its consumers.
 
     Attributes:
@@ -97,18 +89,7 @@ class Fence:
         area: the name of a hull, a `Circle`, or a tuple of `Polygon`.
         subjects: the name of a keyed hull, or a `Prefix`; None for a fence around another hull.
         other_hull: the hull that is compared as a whole; None for a fence around keys.
-        boundary: "closed" or "open".
-        margin: how far outside of the area a subject has to be to leave.
-        near: the distance at which hulls are near.
-        initial: what the fence said at first.
-        crosses: whether crossings make events.
-        dwell: the time inside that makes an event; None for no such event.
-        confirmations: the number of reports that must agree; 0 for no such rule.
-        min_dwell: the time on the other side before a subject enters or leaves; None for no such rule.
-        without_self: whether each subject is compared with the hull of the others.
-        layer: the convex layer of the hull that is the area; 1 for the hull itself.
-        max_events: the number of events to keep; 0 for the limit of the server.
-        max_event_age: how long events are kept; None for no limit.
+        SETTINGS
         created: when it was created.
         uid: differs from that of an earlier or later fence of the same name.
         last_sequence: the sequence of the last event; 0 before the first.
@@ -118,21 +99,8 @@ class Fence:
         consumers: its durable consumers, by name.
     """
 
-    name: str
     area: Area
     subjects: str | Prefix | None
-    other_hull: str | None
-    boundary: Boundary
-    margin: float
-    near: float
-    initial: Initial
-    crosses: bool
-    dwell: timedelta | None
-    confirmations: int
-    min_dwell: timedelta | None
-    without_self: bool
-    max_events: int
-    max_event_age: timedelta | None
     created: datetime
     uid: str
     last_sequence: int
@@ -140,7 +108,6 @@ class Fence:
     inside: int
     subject_count: int
     consumers: tuple[FenceConsumer, ...]
-    layer: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,18 +203,7 @@ def decode_fence(message: fence_pb2.Fence) -> Fence:
         area=decode_area(config),
         subjects=_subjects(config),
         other_hull=config.other_hull if config.HasField("other_hull") else None,
-        boundary="open" if config.boundary == fence_pb2.FENCE_BOUNDARY_OPEN else "closed",
-        margin=config.margin,
-        near=config.near_distance,
-        initial=next((name for name, number in INITIALS.items() if number == config.initial), "snapshot"),
-        crosses=config.report_crosses,
-        dwell=config.dwell.ToTimedelta() if config.HasField("dwell") else None,
-        confirmations=config.confirmations,
-        min_dwell=config.min_dwell.ToTimedelta() if config.HasField("min_dwell") else None,
-        without_self=config.hull_area.without_self,
-        layer=config.hull_area.layer or 1,
-        max_events=config.max_events,
-        max_event_age=config.max_event_age.ToTimedelta() if config.HasField("max_event_age") else None,
+        **decode_settings(FenceSettings, config),
         created=decode_time(message.create_time),
         uid=message.uid,
         last_sequence=message.last_sequence,

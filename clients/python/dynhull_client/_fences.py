@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import grpc
-import numpy as np
-from google.protobuf.duration_pb2 import Duration
 
 from dynhull.arrays import as_coordinate
 from dynhull_proto.v1 import fence_pb2
 from dynhull_proto.v1 import fence_service_pb2 as pb
+from dynhull_surface.settings import FenceSettings
 
 from ._areas import Prefix, as_area, encode_area
-from ._calls import Call, choice, encode_layer, text, whole
+from ._arguments import flag, text, whole
+from ._calls import Call
 from ._errors import FenceExistsError, FenceNotFoundError
 from ._fence_messages import (
-    BOUNDARIES,
-    INITIALS,
     Fence,
     FenceConsumer,
     Inside,
@@ -26,32 +24,20 @@ from ._fence_messages import (
     decode_fence,
     decode_inside,
 )
+from ._settings import SPAN, documenting, encode_settings
 from ._times import encode_duration
 
 if TYPE_CHECKING:
     from datetime import timedelta
 
-    from ._fence_messages import Boundary, Initial
+    from dynhull_surface.settings import Boundary, Initial
 
-SETTINGS = (
-    "area",
-    "subjects",
-    "other_hull",
-    "boundary",
-    "margin",
-    "near",
-    "crosses",
-    "dwell",
-    "confirmations",
-    "min_dwell",
-    "without_self",
-    "layer",
-    "max_events",
-    "max_event_age",
-)
+# What an existing fence has in common with the one to create.
+COMPARED = [each.name for each in fields(FenceSettings) if each.name not in ("name", "initial")]
 
 
-def create_fence(
+@documenting(FenceSettings, SPAN)
+def create_fence(  # noqa: D417  # the settings have their descriptions
     name: str,
     area: Any,
     subjects: str | Prefix | None = None,
@@ -84,29 +70,12 @@ def create_fence(
             holes, GeoJSON, a geometry with `__geo_interface__`, or a list of these, joined by "or"; or a `Circle`.
         subjects: the keyed hull whose keys are compared; or a `Prefix` for all keyed hulls with such names,
         other_hull: or a hull that is compared as a whole, with an area that is a hull.
-        boundary: "closed": a subject on the boundary is inside; "open": it is outside.
-        margin: how far outside of the area a subject that is inside has to be to leave.
-        initial: what the fence says about subjects that are inside at first: one "snapshot" with all of them, "events",
-            an enter of each, or "none".
-        crosses: whether a subject that is outside before and after, but whose straight way between meets the area,
-            makes an event.
-        dwell: the time after which a subject that is still inside makes an event, in seconds or as a timedelta.
-        confirmations: the number of consecutive reports that must agree before a subject enters or leaves.
-        min_dwell: how long a subject must be on the other side before it enters or leaves.
-        near: with `other_hull`: the hulls are near while their distance is at most this.
-        without_self: compare each subject that is a point of the area's hull with the hull of the others. The area is
-            then the subjects' own hull, and there is a margin.
-        layer: the convex layer of the area's hull, as in `layers`; 1 is the hull itself. Each batch of that hull then
-            finds the layer anew.
-        max_events: the number of events to keep; 0 for the limit of the server.
-        max_event_age: how long events are kept.
+        SETTINGS
         exist_ok: whether to return an existing fence of that name and with these settings. FenceExistsError if it has
             others, or without `exist_ok`.
         timeout: seconds, instead of the client's.
     """
-    given = locals()
-    config = _config(area, subjects, given)
-    config.initial = choice("initial", initial, INITIALS)
+    config = _config(locals())
     create: Call[Fence] = Call(
         "CreateFence",
         pb.CreateFenceRequest(name=text("name", name), config=config),
@@ -150,8 +119,7 @@ def replace_fence(
     Subjects that are inside of one area and outside of the other make events with the cause "fence_changed". The same
     settings again make none.
     """
-    given = locals()
-    request = pb.ReplaceFenceRequest(name=text("name", name), config=_config(area, subjects, given))
+    request = pb.ReplaceFenceRequest(name=text("name", name), config=_config(locals()))
     return Call("ReplaceFence", request, lambda response: decode_fence(response.fence), timeout)
 
 
@@ -265,7 +233,7 @@ def watch_fence(
     request = pb.WatchFenceRequest(
         name=text("name", name),
         uid=text("uid", uid),
-        conflate=_flag("conflate", conflate),
+        conflate=flag("conflate", conflate),
         max_responses_per_second=as_coordinate(max_rate, "max_rate"),
     )
     if consumer is not None:
@@ -279,51 +247,28 @@ def watch_fence(
     return WatchingFence(request, reconnect, timeout)
 
 
-def _config(area: Any, subjects: str | Prefix | None, given: dict[str, Any]) -> fence_pb2.FenceConfig:
+def _config(given: dict[str, Any]) -> fence_pb2.FenceConfig:
     """The settings of a fence, given the arguments of the call by name: `create_fence` says what each of them is."""
-    other_hull: str | None = given["other_hull"]
+    subjects, other_hull = given["subjects"], given["other_hull"]
     if (subjects is None) == (other_hull is None):
         raise ValueError("give either subjects or other_hull")
-    config = fence_pb2.FenceConfig(
-        boundary=choice("boundary", given["boundary"], BOUNDARIES),
-        margin=as_coordinate(given["margin"], "margin"),
-        near_distance=as_coordinate(given["near"], "near"),
-        report_crosses=_flag("crosses", given["crosses"]),
-        confirmations=0 if given["confirmations"] == 1 else whole("confirmations", given["confirmations"], 32),
-        max_events=whole("max_events", given["max_events"]),
-        dwell=_span(given["dwell"], "dwell"),
-        min_dwell=_span(given["min_dwell"], "min_dwell"),
-        max_event_age=_span(given["max_event_age"], "max_event_age"),
-    )
-    encode_area(as_area(area), _flag("without_self", given["without_self"]), encode_layer(given["layer"]), config)
+    config = fence_pb2.FenceConfig()
+    encode_area(as_area(given["area"]), config)
+    if given["confirmations"] == 1:  # each report agrees with itself
+        given["confirmations"] = 0
+    encode_settings(FenceSettings, given, config)
     if isinstance(subjects, Prefix):
         config.subject_prefix = text("subjects", subjects.text)
     elif subjects is not None:
         config.subject_hull = text("subjects", subjects)
-    elif other_hull is not None:
+    else:
         config.other_hull = text("other_hull", other_hull)
     return config
 
 
-def _span(seconds: float | timedelta | None, name: str) -> Duration | None:
-    """A time span; none for 0, which means the same."""
-    span = None if seconds is None else encode_duration(seconds, name)
-    if span != Duration():
-        return span
-    if seconds:  # rounded to nothing, it would be no rule
-        raise ValueError(f"{name} is {seconds!r}: must be at least a microsecond, or 0")
-    return None
-
-
-def _flag(name: str, value: Any) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise TypeError(f"{name} is {value!r}: must be True or False")
-    return bool(value)
-
-
 def _as_wanted(existing: Fence, wanted: Fence) -> Fence:
     """The existing fence; FenceExistsError if it has other settings than the one to create."""
-    for setting in SETTINGS:
+    for setting in COMPARED:
         has, wants = getattr(existing, setting), getattr(wanted, setting)
         if has != wants:
             message = f"the fence {existing.name!r} exists with other settings: its {setting} is {has!r}, not {wants!r}"

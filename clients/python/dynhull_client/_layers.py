@@ -10,7 +10,8 @@ import numpy as np
 from dynhull._value import Value
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ._calls import Call, whole
+from ._arguments import whole
+from ._calls import Call
 from ._keys import decode_names
 from ._messages import Points, decode_points
 

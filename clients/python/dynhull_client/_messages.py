@@ -17,6 +17,7 @@ from dynhull.arrays import Points as Points
 from dynhull.keys import Keys, KeyType
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 from dynhull_surface.counts import COUNTS
+from dynhull_surface.settings import Ahead, Clock, Ordering
 
 from ._keys import KeyTuple, decode_keys, decode_names, join_keys
 from ._quarantine_messages import Quarantine, decode_quarantine
@@ -25,9 +26,6 @@ from ._times import Times, decode_time, decode_times
 # In the uid of a hull that a backup has brought back, before what is new with each copy.
 INCARNATION = "."
 
-Clock = Literal["server", "data"]
-Ordering = Literal["arrival", "event_time"]
-Ahead = Literal["refuse", "clamp"]
 Cause = Literal["batch", "expiry", "recenter"]
 BATCH: Cause = "batch"
 CAUSES: dict[int, Cause] = {batch_pb2.CAUSE_EXPIRY: "expiry", batch_pb2.CAUSE_RECENTER: "recenter"}

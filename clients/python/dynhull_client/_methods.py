@@ -7,7 +7,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 
 import grpc
 
-from ._calls import require_not_negative
+from ._arguments import require_not_negative
 from ._connection import DEFAULT_ADDRESS, DEFAULT_PING_INTERVAL, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
 
 P = ParamSpec("P")

@@ -1,10 +1,12 @@
 """Fences and their events as JSON and as text."""
 
 from dataclasses import asdict
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
 from dynhull_client import Circle, Fence, FenceEvent, Prefix
+from dynhull_surface.described import Setting, described
+from dynhull_surface.settings import FenceSettings
 
 from ..durations import shown
 from ..plural import plural
@@ -18,8 +20,7 @@ def fence_members(fence: Fence) -> dict[str, Any]:
     members = {name: getattr(fence, name) for name in Fence.__dataclass_fields__}
     members["area"] = _area_json(fence)
     members["subjects"] = {"prefix": fence.subjects.text} if isinstance(fence.subjects, Prefix) else fence.subjects
-    for span in ("dwell", "min_dwell", "max_event_age"):
-        members[span] = None if members[span] is None else members[span].total_seconds()
+    members |= {name: value.total_seconds() for name, value in members.items() if isinstance(value, timedelta)}
     members["created"] = fence.created.isoformat()
     members["consumers"] = [
         asdict(each) | {"oldest": _time(each.oldest)}  # a datetime
@@ -83,16 +84,17 @@ def subjects_text(fence: Fence) -> str:
 
 def settings_text(fence: Fence) -> str:
     """The settings that are not the usual ones."""
-    found: list[str] = [fence.boundary] if fence.boundary != "closed" else []
-    found += [f"margin {fence.margin:g}"] if fence.margin else []
-    found += [f"near {fence.near:g}"] if fence.near else []
-    found += ["without self"] if fence.without_self else []
-    found += [f"layer {fence.layer}"] if fence.layer > 1 else []
-    found += ["crosses"] if fence.crosses else []
-    found += [f"dwell {shown(fence.dwell)}"] if fence.dwell else []
-    found += [f"{fence.confirmations} confirmations"] if fence.confirmations > 1 else []
-    found += [f"min dwell {shown(fence.min_dwell)}"] if fence.min_dwell else []
-    return ", ".join(found)
+    found = ((each, getattr(fence, each.name)) for each in described(FenceSettings) if not each.at_creation)
+    return ", ".join(_setting_text(each, value) for each, value in found if value != each.usual)
+
+
+def _setting_text(setting: Setting, value: Any) -> str:
+    if setting.choices:
+        return str(value)
+    name = setting.name.replace("_", " ")
+    if setting.kind is bool:
+        return name
+    return f"{name} {shown(value) if isinstance(value, timedelta) else format(value, 'g')}"
 
 
 def event_cells(event: FenceEvent) -> tuple[str, ...]:

@@ -1,0 +1,58 @@
+"""Fields of bodies, one for each described setting of hulls and of fences."""
+
+from collections.abc import Callable
+from datetime import timedelta
+from functools import partial
+from typing import Annotated, Any, TypeVar
+
+from pydantic import AfterValidator, BaseModel, Field, StrictBool, ValidationInfo, create_model
+
+from dynhull_surface.described import Setting, described
+
+from .numbers import Number, Point, Seconds
+
+Body = TypeVar("Body", bound=BaseModel)
+IN_SECONDS = "In seconds."
+LARGEST = 2**63 - 1  # that the server stores
+
+
+def with_settings(settings: type, *, at_creation: bool = False) -> Callable[[type[Body]], type[Body]]:
+    """A body that also has a field for each described setting: those of a creation, or the others."""
+    fields: dict[str, Any] = {
+        each.name: _field(each) for each in described(settings) if each.at_creation == at_creation
+    }
+
+    def complete(body: type[Body]) -> type[Body]:
+        return create_model(body.__name__, __base__=body, __doc__=body.__doc__, __module__=body.__module__, **fields)
+
+    return complete
+
+
+def _field(setting: Setting) -> tuple[Any, Any]:
+    kind = _kind(setting) if setting.usual is not None else _kind(setting) | None
+    if setting.needs:
+        kind = Annotated[kind, AfterValidator(partial(_with_others, setting.needs))]
+    meaning = f"{setting.meaning} {IN_SECONDS}" if setting.kind is timedelta else setting.meaning
+    return kind, Field(setting.usual, description=meaning)
+
+
+def _with_others(needs: tuple[str, ...], value: Any, info: ValidationInfo) -> Any:
+    """A setting that is given; ValueError if it means nothing without another one, which comes before it."""
+    if value and not any(info.data.get(name, True) for name in needs):
+        raise ValueError(f"is given with {' or '.join(needs)}")
+    return value
+
+
+def _kind(setting: Setting) -> Any:
+    if setting.choices:
+        return setting.kind
+    if setting.kind is bool:
+        return StrictBool
+    if setting.kind is timedelta:
+        return Seconds
+    if setting.kind is int:
+        greatest = LARGEST if setting.greatest is None else setting.greatest
+        return Annotated[int, Field(strict=True, ge=setting.least, le=greatest)]
+    if setting.kind is float:
+        return Annotated[Number, Field(ge=setting.least)]
+    return Point

@@ -1,0 +1,114 @@
+"""Settings as messages and as documentation, made of their descriptions."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from google.protobuf.duration_pb2 import Duration
+
+from dynhull.arrays import as_coordinate
+from dynhull_surface.described import described
+
+from ._arguments import choice, flag, whole
+from ._times import encode_duration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from google.protobuf.message import Message
+
+    from dynhull_surface.described import Setting
+
+Documented = TypeVar("Documented", bound="Callable[..., Any]")
+INDENT = " " * 8
+SPAN = " Seconds or a timedelta."  # of an argument that is a time span
+
+
+def encode_settings(settings: type, given: Mapping[str, Any], config: Message) -> None:
+    """Add those of the described settings to a message that are given and not as usual."""
+    for each in described(settings):
+        if each.name in given:
+            _encode(each, given[each.name], config)
+
+
+def decode_settings(settings: type, config: Message) -> dict[str, Any]:
+    """The described settings that a message has, by name."""
+    return {each.name: _decode(each, config) for each in described(settings)}
+
+
+def _encode(setting: Setting, value: Any, config: Message) -> None:
+    within, _, name = setting.path.rpartition(".")
+    message = getattr(config, within) if within else config
+    encoded = _encoded(setting, value, message.DESCRIPTOR.fields_by_name[name])
+    if encoded is None:
+        return
+    if within and not config.HasField(within):
+        raise ValueError(f"{setting.name} is for an area that is a hull")
+    if isinstance(encoded, Duration):
+        getattr(message, name).CopyFrom(encoded)
+    else:
+        setattr(message, name, encoded)
+
+
+def _encoded(setting: Setting, value: Any, field: Any) -> Any:
+    """The value in the form of a message; None for the usual one, and for one that means the same."""
+    name, least = setting.name, setting.least
+    if setting.choices:
+        return choice(name, value, _numbers(setting, field))
+    if setting.kind is timedelta:
+        return None if value is None else _span(value, name)
+    if setting.kind is bool:
+        return flag(name, value) or None
+    if setting.kind is float:
+        return as_coordinate(value, name) or None
+    number = whole(name, value, 32 if field.type == field.TYPE_UINT32 else 64)
+    if least is not None and number < least:
+        raise ValueError(f"{name} must be at least {least}, got {number}")
+    return None if number == setting.usual else number
+
+
+def _decode(setting: Setting, config: Message) -> Any:
+    within, _, name = setting.path.rpartition(".")
+    message = getattr(config, within) if within else config
+    if setting.kind is timedelta:
+        return getattr(message, name).ToTimedelta() if message.HasField(name) else None
+    value = getattr(message, name)
+    if setting.choices:
+        numbers = _numbers(setting, message.DESCRIPTOR.fields_by_name[name])
+        return next((each for each, number in numbers.items() if number == value), setting.usual)
+    return value or setting.usual
+
+
+def _numbers(setting: Setting, field: Any) -> dict[str, int]:
+    """The number of each choice on the wire."""
+    numbers = field.enum_type.values_by_name
+    prefix = field.enum_type.values[0].name.removesuffix("UNSPECIFIED")
+    return {each: numbers[f"{prefix}{each.upper()}"].number for each in setting.choices}
+
+
+def _span(seconds: float | timedelta, name: str) -> Duration | None:
+    """A time span; None for 0, which means the same."""
+    span = encode_duration(seconds, name)
+    if span != Duration():
+        return span
+    if seconds:  # rounded to nothing, it would be no rule
+        raise ValueError(f"{name} is {seconds!r}: must be at least a microsecond, or 0")
+    return None
+
+
+def documenting(settings: type, spans: str = "") -> Callable[[Documented], Documented]:
+    """Put the lines about the settings into a docstring ; `spans` says what time spans are."""
+
+    def document(documented: Documented) -> Documented:
+        lines = []
+        for each in described(settings):
+            meaning = each.meaning[0].lower() + each.meaning[1:]
+            said = f"{each.name}: {meaning}{spans if each.kind is timedelta else ''}"
+            lines.append(fill(said, 120, initial_indent=INDENT, subsequent_indent=INDENT + "    "))
+        if documented.__doc__ is not None:  # python -OO leaves them out
+            documented.__doc__ = documented.__doc__.replace(f"{INDENT}SETTINGS", "\n".join(lines))
+        return documented
+
+    return document
