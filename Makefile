@@ -78,6 +78,8 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) $(wildcard tests/kernel/*.cpp tests/kernel/*.hpp)
 	$(BIN)/mypy
+	$(BIN)/mypy tests/surface/typed_program.py
+	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(STUB) dynhull._kernel -o build/_kernel.pyi
 	$(STUB) dynhull_server._native -o build/_native.pyi
 	diff build/_kernel.pyi dynhull/_kernel.pyi && diff build/_native.pyi server/dynhull_server/_native.pyi \
