@@ -3,7 +3,7 @@
 Numbers are read as the nearest double, as in every JSON; there is no number where a double is infinite or not a number.
 """
 
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Annotated, Any, Literal
 from urllib.parse import unquote
 
@@ -23,10 +23,12 @@ from pydantic import (
     model_validator,
 )
 
-from dynhull_client import Quarantine
+import dynhull_client as sdk
 from dynhull_surface import settings as surface
+from dynhull_surface.counts import COUNTS
 
 from . import examples
+from .answers import Finite, Place, Rows, answering, listed, rows
 from .numbers import LARGEST as LARGEST
 from .numbers import Number as Number
 from .numbers import Point as Point
@@ -44,29 +46,10 @@ def unquoted(value: Any) -> Any:
     return unquote(value, errors="replace") if isinstance(value, str) else value
 
 
-def _rows(value: Any) -> Any:
-    """An array as lists; None for what is not finite."""
-    if not isinstance(value, np.ndarray):
-        return value
-    return value.tolist() if np.isfinite(value).all() else np.where(np.isfinite(value), value, np.array(None)).tolist()
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
 def _times(value: Any) -> Any:
     if not isinstance(value, np.ndarray):
         return value
     return [None if np.isnat(each) or each == NO_TIME else f"{each}Z" for each in value]
-
-
-def _seconds(value: Any) -> Any:
-    return value.total_seconds() if isinstance(value, timedelta) else value
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _not_a_number(value: Any) -> Any:
@@ -84,16 +67,12 @@ Key = (
 Time = Annotated[AwareDatetime, BeforeValidator(_not_a_number)]
 Points = list[Point]
 
-Finite = Annotated[float | None, BeforeValidator(_finite)]
-Place = Annotated[list[Finite], Field(min_length=2, max_length=2), BeforeValidator(_listed)]
-Rows = Annotated[list[Place], BeforeValidator(_rows)]
-Pairs = Annotated[list[Annotated[list[Place], Field(min_length=2, max_length=2)]], BeforeValidator(_rows)]
-Numbers = Annotated[list[float | None], BeforeValidator(_rows)]
-Integers = Annotated[list[int], BeforeValidator(_rows)]
-Booleans = Annotated[list[bool], BeforeValidator(_rows)]
+Pairs = Annotated[list[Annotated[list[Place], Field(min_length=2, max_length=2)]], BeforeValidator(rows)]
+Numbers = Annotated[list[float | None], BeforeValidator(rows)]
+Integers = Annotated[list[int], BeforeValidator(rows)]
+Booleans = Annotated[list[bool], BeforeValidator(rows)]
 Keys = Annotated[list[str] | list[int], BeforeValidator(list)]
 Times = Annotated[list[str | None], BeforeValidator(_times)]
-Span = Annotated[float | None, BeforeValidator(_seconds)]
 
 Segment = Annotated[str, StringConstraints(pattern=NAME), BeforeValidator(unquoted)]
 THE_HULL = f"The hull: {NAMES}."
@@ -200,47 +179,26 @@ class NewHull(Request):
 
     def arguments(self) -> dict[str, Any]:
         """The fields as arguments of the SDK."""
-        quarantine = None if self.quarantine is None else Quarantine(**self.quarantine.arguments())
+        quarantine = None if self.quarantine is None else sdk.Quarantine(**self.quarantine.arguments())
         return super().arguments() | {"quarantine": quarantine}
 
 
+@answering(sdk.Quarantine, finite=True)
 class PresentRules(Response):
     """The rules of a quarantine; null for those that are off."""
 
-    max_speed: float | None
-    max_growth: float | None
-    confirmations: int
 
-
+@answering(sdk.Window)
 class Window(Response):
     """A hull's sliding window."""
 
-    max_age: Span
-    max_points: int | None
-    clock: str
-    max_skew: Span
-    ahead: str
 
-
+@answering(sdk.HullInfo)
 class HullInfo(Response):
     """A hull, its size and its settings."""
 
-    name: str
-    revision: int
-    points: int
-    distinct: int
-    created: datetime
-    uid: str
-    keyed: str | None
     window: Window | None
-    ordering: str
-    point_limit: int | None
-    clock: datetime | None
-    geographic: bool
-    center: Place | None
     quarantine: PresentRules | None = Field(description="Null for a hull that has never had any rules.")
-    held: int = Field(description="Keys in quarantine.")
-    shards: int | None = Field(description="The shards that its points are divided among; null for a whole hull.")
     restored: bool = Field(description="Whether a backup has brought the hull back, without the batches after it.")
 
 
@@ -251,13 +209,9 @@ class HullPage(Response):
     next: str | None
 
 
+@answering(sdk.Measures)
 class Measures(Response):
     """Measures of a hull; null where there is no number. Of a geographic hull in metres and square metres."""
-
-    area: Finite
-    perimeter: Finite
-    centroid: Place
-    bounds: Annotated[list[Finite], Field(min_length=4, max_length=4), BeforeValidator(_listed)]
 
 
 class Hull(Response):
@@ -290,14 +244,10 @@ class MinCircle(Response):
         return {"center": value[0], "radius": value[1]} if isinstance(value, tuple) else value
 
 
+@answering(sdk.Measured)
 class AllMeasures(Measures):
     """All measures of a hull."""
 
-    revision: int
-    diameter: Finite
-    width: Finite
-    min_box: Rows
-    min_perimeter_box: Rows
     min_circle: MinCircle
 
 
@@ -319,7 +269,7 @@ class HeldPosition(Response):
     key: str | int
     position: Place
     time: datetime | None
-    breaks: Annotated[list[Literal["max_speed", "max_growth"]], BeforeValidator(_listed)]
+    breaks: Annotated[list[Literal["max_speed", "max_growth"]], BeforeValidator(listed)]
     speed: Finite
     growth: Finite
     revision: int = Field(description="The revision that has held it.")
@@ -369,29 +319,13 @@ class Batch(Request):
     )
 
 
+@answering(sdk.Applied)
 class Applied(Response):
     """The effect of a batch. If `gathered` is more than 1, that of all the requests that were applied together."""
 
-    revision: int
-    inserted: int
-    deleted: int
-    missing: int
-    hull_changed: bool
-    points: int
-    duplicate: bool
-    moved: int
-    stale: int
-    late: int
-    skipped: int
-    clamped: int
-    evicted: int
-    clock: datetime | None
-    held: int = Field(description="Positions put into quarantine.")
-    held_rows: Annotated[list[int], BeforeValidator(_listed)] = Field(
-        description="The rows of this request that these are."
+    held_rows: Annotated[list[int], BeforeValidator(listed)] = Field(
+        description="The rows of this request that were put into quarantine."
     )
-    released: int
-    dropped: int
     gathered: int = Field(1, description="Requests whose changes were applied together, as one revision.")
 
 
@@ -416,6 +350,7 @@ class BadRow(Response):
     value: str | None = Field(None, description="The value at fault.")
 
 
+@answering(sdk.Applied, COUNTS)
 class Uploaded(Response):
     """The effect of a body of rows: the sums over its batches, and the hull after the last one."""
 
@@ -426,18 +361,6 @@ class Uploaded(Response):
     batches: int
     revision: int | None = Field(description="Of the last batch; null if there was nothing to apply.")
     points: int | None
-    inserted: int
-    deleted: int
-    missing: int
-    moved: int
-    stale: int
-    late: int
-    skipped: int
-    clamped: int
-    evicted: int
-    held: int
-    released: int
-    dropped: int
     bad_rows: int = Field(description="Rows left out because they cannot be read, or the server refuses them.")
     bad: list[BadRow] = Field(description="The first ten of these.")
     last_sequence: int | None = Field(description="With an Idempotency-Key, the number of the last row.")
@@ -577,17 +500,9 @@ class Influence(Response):
     keys: list[str] | list[int] | None
 
 
+@answering(sdk.Separation)
 class Separation(Response):
     """The distance or overlap of two hulls, and the line between them."""
-
-    revision: int
-    other_revision: int
-    intersect: bool
-    distance: Finite
-    depth: Finite
-    normal: Place
-    offset: Finite
-    closest: Rows
 
 
 class Entries(Request):
@@ -670,7 +585,7 @@ class Verification(Response):
     difference: Difference | None
     keys_equal: bool = Field(description="Whether the points of a keyed hull are the positions of its keys.")
     fences: int = Field(description="The fences that compare the hull or its keys.")
-    fence_differences: Annotated[list[FenceDifference], BeforeValidator(_listed)] = Field(
+    fence_differences: Annotated[list[FenceDifference], BeforeValidator(listed)] = Field(
         description="What is wrong with who is inside of them and with their events, the first of it."
     )
 
@@ -735,14 +650,9 @@ class NewFence(FenceSettings):
     exist_ok: StrictBool = Field(False, description="Return an existing fence with these settings.")
 
 
+@answering(sdk.FenceConsumer)
 class Consumer(Response):
     """A durable reader of a fence."""
-
-    name: str
-    acknowledged: int
-    backlog: int
-    oldest: datetime | None
-    lost: int
 
 
 class Acknowledgement(Request):
@@ -769,32 +679,14 @@ class Inside(Response):
     subjects: list[SubjectsInside]
 
 
+@answering(sdk.Fence, finite=True)
 class Fence(Response):
     """A fence with its settings, its counts and its consumers."""
 
-    name: str
-    uid: str
     area: Area
-    subjects: str | None
-    subject_prefix: str | None
-    other_hull: str | None
-    boundary: str
-    margin: float
-    near: float
-    initial: str
-    crosses: bool
-    dwell: Span
-    confirmations: int
-    min_dwell: Span
-    without_self: bool
-    layer: int
-    max_events: int
-    max_event_age: Span
-    created: datetime
-    last_sequence: int
-    first_sequence: int
-    inside: int
-    subject_count: int
+    subjects: str | None = Field(description="The keyed hull whose keys are compared,")
+    subject_prefix: str | None = Field(description="or a prefix of the names of several,")
+    other_hull: str | None = Field(description="or a hull that is compared as a whole.")
     consumers: list[Consumer]
 
 

@@ -1,10 +1,14 @@
 """What the data of events looks like, for the description."""
 
-from typing import Literal
-
 from pydantic import BaseModel, Field
 
-from ..schemas import Measures, Place, Rows, SubjectsInside
+import dynhull_client
+
+from ..answers import Place, Rows, answering
+from ..schemas import Measures, SubjectsInside
+
+# The id of an event says after which sequence to go on.
+SENT = [name for name in dynhull_client.FenceEvent.__dataclass_fields__ if name != "after"]
 
 
 class HullEvent(BaseModel):
@@ -60,47 +64,11 @@ class HullProgress(HullEvent):
     center: Place | None = Field(None, description="As in a change.")
 
 
+@answering(dynhull_client.FenceEvent, SENT, partial=True)
 class FenceEvent(BaseModel):
     """The data of an event of a fence; fields that do not apply are left out."""
 
-    type: Literal[
-        "enter",
-        "exit",
-        "cross",
-        "dwell",
-        "transfer",
-        "begin",
-        "cease",
-        "snapshot",
-        "closed",
-        "lost",
-        "progress",
-        "unknown",
-    ] = Field(description="What happened; the name of the event, too.")
-    sequence: int = Field(description="Counted per fence from 1, without gaps.")
-    fence: str = Field("", description="The name of the fence.")
-    uid: str = Field("", description="Which fence of that name it is.")
-    cause: list[str] = Field([], description="Why it happened: subject_appeared, subject_moved, area_moved and others.")
-    hull: str = Field("", description="The hull of the subject.")
-    key: str | int | None = Field(None, description="The key of the subject.")
-    revision: int = Field(0, description="The revision of that hull.")
-    area_revision: int = Field(0, description="The revision of the area's hull.")
-    position: Place | None = Field(None, description="Where the subject is.")
-    previous_position: Place | None = Field(None, description="Where it was.")
-    distance: float | None = Field(
-        None, description="From the position to the area, 0 inside; of begin and cease, between the hulls."
-    )
-    time: str = Field("", description="When the server made the event.")
-    event_time: str | None = Field(None, description="The event time of the position.")
-    first_time: str | None = Field(
-        None, description="When the subject changed its side, if it had to stay; of dwell, since when it is inside."
-    )
     inside: list[SubjectsInside] = Field([], description="Of snapshot and closed, who was inside, by hull.")
-    first: int = Field(0, description="Of lost, the first sequence that was dropped,")
-    last: int = Field(0, description="and the last one.")
-    conflated: int = Field(0, description="Events left out before this one because they cancel each other.")
-    previous_hull: str = Field("", description="The hull that a batch has moved the subject from.")
-    previous_hull_revision: int = Field(0, description="The revision of that hull that has removed the key.")
 
 
 OF_HULL = (
