@@ -19,10 +19,8 @@ def measure(client: "HullClient", name: HullName, as_json: AsJson = False) -> No
 
         dynhull measure fleet/north --json | jq .diameter
 
-    * area, perimeter, centroid, diameter, width
-    * bounds: least x, least y, greatest x, greatest y
-    * min_box, min_perimeter_box: the four corners of the smallest boxes, in any direction
-    * min_circle: centre and radius of the smallest circle around the points
+    The measures are lengths and areas; bounds are least x, least y, greatest x, greatest y; boxes, the smallest ones in
+    any direction, are four corners; circles are a centre and a radius.
     """
     _print(as_json, asdict(client.get_measures(name)))
 

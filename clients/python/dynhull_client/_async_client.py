@@ -14,11 +14,8 @@ from ._async_ingest import AsyncIngest
 from ._async_pipeline import AsyncPipeline
 from ._async_watch import AsyncFenceWatch, AsyncWatch
 from ._async_writer import AsyncWriter
-from ._calls import Call
-from ._fence_messages import Fence
-from ._messages import HullInfo
+from ._calls import Call, Pages
 from ._methods import Client, answer_of, described, documented, opening
-from ._quarantine_messages import HeldPosition
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -41,6 +38,24 @@ def _reading(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["Async
 
     def method(self: "AsyncHullClient", /, *arguments: P.args, **options: P.kwargs) -> AsyncIterator[Result]:
         return self._connection.parts(described(describe, *arguments, **options))
+
+    documented(method, describe, f"AsyncIterator[{answer_of(describe)}]")
+    return method
+
+
+def _listing(
+    describe: Callable[P, Pages[Result]],
+) -> Callable[Concatenate["AsyncHullClient", P], AsyncIterator[Result]]:
+    """The method that returns a list, one after the other."""
+
+    async def method(self: "AsyncHullClient", /, *arguments: P.args, **options: P.kwargs) -> AsyncIterator[Result]:
+        page, token = described(describe, *arguments, **options), ""
+        while True:
+            found, token = await self._connection.answer(page(token))
+            for each in found:
+                yield each
+            if not token:
+                return
 
     documented(method, describe, f"AsyncIterator[{answer_of(describe)}]")
     return method
@@ -92,44 +107,14 @@ class AsyncHullClient(Client[AsyncConnection]):
     fence_inside = _answering(fences.fence_inside)
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
+    list_hulls = _listing(calls.list_hulls)
+    list_held = _listing(quarantine.list_held)
+    list_fences = _listing(fences.list_fences)
     ingest = opening(AsyncIngest, calls.ingest)
     pipeline = opening(AsyncPipeline, calls.pipeline)
     watch = opening(AsyncWatch, calls.watch)
     watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
     writer = opening(AsyncWriter, calls.writer)
-
-    async def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> AsyncIterator[HullInfo]:
-        """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
-        following: str | None = ""
-        while following is not None:
-            hulls, token = await self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
-            for each in hulls:
-                yield each
-            following = token or None
-
-    async def list_held(
-        self, name: str, *, min_revision: int = 0, timeout: float | None = None
-    ) -> AsyncIterator[HeldPosition]:
-        """The positions in quarantine of a keyed hull, in the order of their keys, fetched page by page."""
-        following: str | None = ""
-        while following is not None:
-            found, token = await self._connection.answer(
-                described(quarantine.held_page, name, following, min_revision=min_revision, timeout=timeout)
-            )
-            for each in found:
-                yield each
-            following = token or None
-
-    async def list_fences(self, prefix: str = "", *, timeout: float | None = None) -> AsyncIterator[Fence]:
-        """The fences whose names begin with `prefix`, in the order of their names, fetched page by page."""
-        following: str | None = ""
-        while following is not None:
-            found, token = await self._connection.answer(
-                described(fences.list_page, prefix, following, timeout=timeout)
-            )
-            for each in found:
-                yield each
-            following = token or None
 
     def presence(self) -> AsyncIterator[bool]:
         """Whether the server is connected, now and whenever that changes, until the client is closed.

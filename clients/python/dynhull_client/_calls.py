@@ -5,6 +5,7 @@ The methods of `HullClient` and `AsyncHullClient` are made of these functions an
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Literal, Never, TypeVar
 from uuid import uuid4
@@ -44,7 +45,7 @@ from ._settings import SPAN, documenting
 from ._times import encode_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from datetime import timedelta
 
     import numpy.typing as npt
@@ -101,6 +102,10 @@ class Call(Generic[Answer]):
     instead: Callable[[DynhullError], Call[Answer] | None] = _nothing
     awaits_hull: bool = False
     in_parts: bool = False
+
+
+# A list: the call for a page of it, given the token of the page; the next token is empty after the last one.
+Pages = Callable[[str], Call[tuple[list[Answer], str]]]
 
 
 @documenting(HullSettings, SPAN)
@@ -269,13 +274,13 @@ def delete_hull(name: str, *, timeout: float | None = None) -> Call[None]:
     return Call("DeleteHull", pb.DeleteHullRequest(name=name), lambda _: None, timeout, repeatable=False)
 
 
-def list_page(prefix: str, page_token: str, timeout: float | None) -> Call[tuple[list[HullInfo], str]]:
-    """A page of hulls, and the token of the next page, which is empty after the last."""
+def list_hulls(prefix: str = "", *, timeout: float | None = None) -> Pages[HullInfo]:
+    """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
 
     def decode(response: pb.ListHullsResponse) -> tuple[list[HullInfo], str]:
         return [messages.decode_info(each) for each in response.hulls], response.next_page_token
 
-    return Call("ListHulls", pb.ListHullsRequest(prefix=prefix, page_token=page_token), decode, timeout)
+    return lambda token: Call("ListHulls", pb.ListHullsRequest(prefix=prefix, page_token=token), decode, timeout)
 
 
 def apply(  # noqa: D417  # unnamed takes nothing

@@ -9,14 +9,11 @@ from . import _fences as fences
 from . import _layers as peeling
 from . import _quarantine as quarantine
 from . import _uses as uses
-from ._calls import Call
+from ._calls import Call, Pages
 from ._connection import BlockingConnection
-from ._fence_messages import Fence
 from ._ingest import Ingest
-from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
-from ._quarantine_messages import HeldPosition
 from ._watch import FenceWatch, Watch
 from ._writer import Writer
 
@@ -39,6 +36,21 @@ def _reading(describe: Callable[P, Call[Result]]) -> Callable[Concatenate["HullC
 
     def method(self: "HullClient", /, *arguments: P.args, **options: P.kwargs) -> Iterator[Result]:
         return self._connection.parts(described(describe, *arguments, **options))
+
+    documented(method, describe, f"Iterator[{answer_of(describe)}]")
+    return method
+
+
+def _listing(describe: Callable[P, Pages[Result]]) -> Callable[Concatenate["HullClient", P], Iterator[Result]]:
+    """The method that returns a list, one after the other."""
+
+    def method(self: "HullClient", /, *arguments: P.args, **options: P.kwargs) -> Iterator[Result]:
+        page, token = described(describe, *arguments, **options), ""
+        while True:
+            found, token = self._connection.answer(page(token))
+            yield from found
+            if not token:
+                return
 
     documented(method, describe, f"Iterator[{answer_of(describe)}]")
     return method
@@ -109,37 +121,14 @@ class HullClient(Client[BlockingConnection]):
     fence_inside = _answering(fences.fence_inside)
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
+    list_hulls = _listing(calls.list_hulls)
+    list_held = _listing(quarantine.list_held)
+    list_fences = _listing(fences.list_fences)
     ingest = opening(Ingest, calls.ingest)
     pipeline = opening(Pipeline, calls.pipeline)
     watch = opening(Watch, calls.watch)
     watch_fence = opening(FenceWatch, fences.watch_fence)
     writer = opening(Writer, calls.writer)
-
-    def list_hulls(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[HullInfo]:
-        """The hulls whose names begin with `prefix`, in the order of their names, fetched page by page."""
-        following: str | None = ""
-        while following is not None:
-            hulls, token = self._connection.answer(described(calls.list_page, prefix, following, timeout=timeout))
-            yield from hulls
-            following = token or None
-
-    def list_held(self, name: str, *, min_revision: int = 0, timeout: float | None = None) -> Iterator[HeldPosition]:
-        """The positions in quarantine of a keyed hull, in the order of their keys, fetched page by page."""
-        following: str | None = ""
-        while following is not None:
-            found, token = self._connection.answer(
-                described(quarantine.held_page, name, following, min_revision=min_revision, timeout=timeout)
-            )
-            yield from found
-            following = token or None
-
-    def list_fences(self, prefix: str = "", *, timeout: float | None = None) -> Iterator[Fence]:
-        """The fences whose names begin with `prefix`, in the order of their names, fetched page by page."""
-        following: str | None = ""
-        while following is not None:
-            found, token = self._connection.answer(described(fences.list_page, prefix, following, timeout=timeout))
-            yield from found
-            following = token or None
 
     def close(self) -> None:
         """Close the connection and end the calls on it."""

@@ -14,7 +14,7 @@ from dynhull_surface.settings import FenceSettings
 
 from ._areas import Prefix, as_area, encode_area
 from ._arguments import flag, text, whole
-from ._calls import Call
+from ._calls import Call, Pages
 from ._errors import FenceExistsError, FenceNotFoundError
 from ._fence_messages import (
     Fence,
@@ -137,15 +137,14 @@ def get_fence(name: str, *, timeout: float | None = None) -> Call[Fence]:
     )
 
 
-def list_page(prefix: str, page_token: str, timeout: float | None) -> Call[tuple[list[Fence], str]]:
-    """A page of fences, and the token of the next page, which is empty after the last."""
+def list_fences(prefix: str = "", *, timeout: float | None = None) -> Pages[Fence]:
+    """The fences whose names begin with `prefix`, in the order of their names, fetched page by page."""
+    text("prefix", prefix)
 
     def decode(response: pb.ListFencesResponse) -> tuple[list[Fence], str]:
         return [decode_fence(each) for each in response.fences], response.next_page_token
 
-    return Call(
-        "ListFences", pb.ListFencesRequest(prefix=text("prefix", prefix), page_token=page_token), decode, timeout
-    )
+    return lambda token: Call("ListFences", pb.ListFencesRequest(prefix=prefix, page_token=token), decode, timeout)
 
 
 def fence_inside(name: str, *, timeout: float | None = None) -> Call[Inside]:

@@ -119,9 +119,9 @@ def described(describe: Callable[P, Description], *arguments: P.args, **options:
 
 
 def answer_of(describe: Function) -> str:
-    """The source of the answer's type: that of a description is `Call[answer]`."""
+    """The source of the answer's type: that of a description is `Call[answer]`, or `Pages[answer]`."""
     annotation: str = describe.__annotations__["return"]
-    return annotation.removeprefix("Call[").removesuffix("]")
+    return annotation.partition("[")[2].removesuffix("]")
 
 
 def opening(

@@ -8,7 +8,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from . import _messages as messages
 from ._batch import Batch
-from ._calls import Call, apply_batch
+from ._calls import Call, Pages, apply_batch
 from ._quarantine_messages import HeldPosition, Quarantine, decode_held, encode_quarantine
 
 MOST_A_PAGE = 1000
@@ -79,9 +79,14 @@ def drop(
     return apply_batch(name, Batch(drop=keys), producer, sequence, may_skip, timeout)
 
 
-def held_page(
-    name: str, page_token: str, min_revision: int, timeout: float | None
-) -> Call[tuple[list[HeldPosition], str]]:
-    """A page of the positions in quarantine, and the token of the next page, which is empty after the last."""
-    request = pb.ListHeldRequest(name=name, min_revision=min_revision, page_size=MOST_A_PAGE, page_token=page_token)
-    return Call("ListHeld", request, lambda response: (decode_held(response), response.next_page_token), timeout)
+def list_held(name: str, *, min_revision: int = 0, timeout: float | None = None) -> Pages[HeldPosition]:
+    """The positions in quarantine of a keyed hull, in the order of their keys, fetched page by page."""
+
+    def decode(response: pb.ListHeldResponse) -> tuple[list[HeldPosition], str]:
+        return decode_held(response), response.next_page_token
+
+    def page(token: str) -> Call[tuple[list[HeldPosition], str]]:
+        request = pb.ListHeldRequest(name=name, min_revision=min_revision, page_size=MOST_A_PAGE, page_token=token)
+        return Call("ListHeld", request, decode, timeout)
+
+    return page

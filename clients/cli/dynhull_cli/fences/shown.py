@@ -14,6 +14,9 @@ from ..plural import plural
 if TYPE_CHECKING:
     from dynhull_client import SubjectsInside
 
+LISTS = "snapshot", "closed"  # events that list who is inside
+MAY_BE_EMPTY = "fence", "uid", "sequence", "key", "distance", "inside"  # what zero or nobody is a value of
+
 
 def fence_members(fence: Fence) -> dict[str, Any]:
     """A fence as members of JSON; members without a value are null."""
@@ -31,31 +34,11 @@ def fence_members(fence: Fence) -> dict[str, Any]:
 
 def event_members(event: FenceEvent) -> dict[str, Any]:
     """An event as members of JSON: those that it has."""
-    members: dict[str, Any] = {
-        "type": event.type,
-        "fence": event.fence,
-        "sequence": event.sequence,
-        "uid": event.uid,
-        "hull": event.hull or None,
-        "previous_hull": event.previous_hull or None,
-        "key": event.key,
-        "cause": sorted(event.cause) or None,
-        "position": event.position,
-        "previous_position": event.previous_position,
-        "distance": event.distance,
-        "revision": event.revision or None,
-        "previous_hull_revision": event.previous_hull_revision or None,
-        "area_revision": event.area_revision or None,
-        "time": _time(event.time),
-        "event_time": _time(event.event_time),
-        "first_time": _time(event.first_time),
-        "first": event.first or None,
-        "last": event.last or None,
-        "conflated": event.conflated or None,
-    }
-    if event.type in ("snapshot", "closed"):
-        members["inside"] = [inside_members(each) for each in event.inside]
-    return {name: value for name, value in members.items() if value is not None}
+    members = {name: getattr(event, name) for name in FenceEvent.__dataclass_fields__ if name != "after"}
+    members |= {name: value.isoformat() for name, value in members.items() if isinstance(value, datetime)}
+    members["cause"] = sorted(event.cause)
+    members["inside"] = [inside_members(each) for each in event.inside] if event.type in LISTS else None
+    return {name: value for name, value in members.items() if value or (value is not None and name in MAY_BE_EMPTY)}
 
 
 def inside_members(subjects: "SubjectsInside") -> dict[str, Any]:
@@ -103,7 +86,7 @@ def event_cells(event: FenceEvent) -> tuple[str, ...]:
     what = event.key
     if event.type == "lost":
         what = f"{event.first}-{event.last}"
-    elif event.type in ("snapshot", "closed"):
+    elif event.type in LISTS:
         what = plural(sum(len(each.keys) for each in event.inside), "key")
     time = "" if event.time is None else event.time.isoformat(timespec="milliseconds")
     causes = ",".join(sorted(event.cause))
