@@ -26,8 +26,9 @@ HANDSHAKE_TIMEOUT = 10_000
 # reason; by default already some of a thousand.
 PENDING = 20_000
 
-# Calls that a connection may have at a time beside the streams of a caller; the client holds the others back. With the
-# limit gRPC counts calls that were reset and are not yet forgotten, too, and so bounds what one connection has waiting.
+# Calls that a connection may have at a time beside all streams, which may be those of a gateway; its client holds the
+# others back. With a limit gRPC counts calls that were reset and are not yet forgotten, too, and so bounds what one
+# connection has waiting.
 CALLS_OF_A_CONNECTION = 2_500
 
 # Messages up to this many bytes beyond the limit are read, so that the refusal can have details.
@@ -119,7 +120,7 @@ def grpc_server(settings: Settings, *, shared_port: bool = False) -> grpc.aio.Se
             ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
             ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
             ("grpc.max_allowed_incoming_connections", settings.max_connections),
-            ("grpc.max_concurrent_streams", settings.max_streams_per_caller + CALLS_OF_A_CONNECTION),
+            ("grpc.max_concurrent_streams", settings.max_streams + CALLS_OF_A_CONNECTION),
             ("grpc.server.max_pending_requests", PENDING),
             ("grpc.server.max_pending_requests_hard_limit", 2 * PENDING),
         ]
