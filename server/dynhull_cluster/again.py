@@ -7,10 +7,9 @@ from google.rpc.error_details_pb2 import ErrorInfo
 from google.rpc.status_pb2 import Status
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_server.rpc.methods import DESCRIPTOR, FENCES, FINISHED
+from dynhull_server.rpc.methods import DESCRIPTOR, FENCES, FINISHED, LISTS
 from dynhull_surface.reasons import NOT_BEGUN
 
-LISTS = {"ListHulls", "ListFences"}
 READS = {
     f"/{service.full_name}/{method.name}"
     for service in (DESCRIPTOR, FENCES)

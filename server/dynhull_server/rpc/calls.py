@@ -125,7 +125,7 @@ class Call:
         return self._calls.max_message_bytes
 
     def require_entitled(self) -> None:
-        """Raise StartingError while nothing may be read from memory: before each answer of a call that has several."""
+        """Raise StartingError while nothing may be read from memory: before each answer leaves."""
         self._calls.require_entitled()
 
     def note_refusal(self, method: str, status: Status) -> str:

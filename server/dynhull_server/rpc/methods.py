@@ -24,7 +24,7 @@ from .health import MAX_BYTES, Health
 from .hull_service import HullService
 from .query import METHODS
 from .runs import RUNS, Run
-from .status import MethodUnknownError
+from .status import ANSWERED, MethodUnknownError
 
 DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
 FENCES = fence_service_pb2.DESCRIPTOR.services_by_name["FenceService"]
@@ -48,6 +48,9 @@ FINISHED = {
     "AckFence",
     "DeleteConsumer",
 }
+
+# Those of them that change nothing.
+LISTS = {"ListHulls", "ListFences"}
 
 # The name of all unknown methods in the counts of calls.
 UNKNOWN_METHOD = "unknown"
@@ -81,7 +84,7 @@ def run_handlers(service: HullService, calls: Calls) -> dict[str, RunHandler]:
     found = {}
     for kind in RUNS:
         method = METHODS[kind]
-        handle = calls.handler(method, calls.admit, _run(getattr(service, method)))
+        handle = calls.handler(method, calls.admit, _run(_read(getattr(service, method))))
         found[f"/{DESCRIPTOR.full_name}/{method}"] = RunHandler(kind, handle)
     return found
 
@@ -128,8 +131,11 @@ def _own_handlers(
 ) -> grpc.GenericRpcHandler:
     works = {}
     for method in descriptor.methods:
-        make = _streaming if method.client_streaming or method.server_streaming else _unary
-        works[method.name] = make(method, getattr(service, method.name))
+        behave = getattr(service, method.name)
+        if method.client_streaming or method.server_streaming:
+            works[method.name] = _streaming(method, behave)
+        else:
+            works[method.name] = _unary(method, behave if method.name in FINISHED - LISTS else _read(behave))
     return _handlers(descriptor, works, "", calls, calls.admit, calls.max_message_bytes)
 
 
@@ -153,6 +159,21 @@ def _handlers(
             request_deserializer=_received(GetMessageClass(method.input_type), max_bytes),
         )
     return grpc.method_handlers_generic_handler(service.full_name, handlers)
+
+
+def _read(behave: Behave) -> Behave:
+    """A read, whose answer does not leave if another server may have other hulls meanwhile: this one may have slept."""
+
+    async def answer(request: Any, call: Call) -> Any:
+        try:
+            response = await behave(request, call)
+        except ANSWERED:
+            call.require_entitled()
+            raise
+        call.require_entitled()
+        return response
+
+    return answer
 
 
 def _run(behave: Behave) -> Work:

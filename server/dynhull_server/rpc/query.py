@@ -59,7 +59,6 @@ class Answers:
 
     async def answer(self, reads: Sequence[pb.Read]) -> None:
         """Answer the reads of a message."""
-        self._call.require_entitled()
         index = 0
         while index < len(reads):
             read = reads[index]
@@ -127,6 +126,7 @@ class Answers:
         """Send the answers so far. The permissions that they needed are not needed any more."""
         if not self._parts:
             return
+        self._call.require_entitled()
         self._metrics.queried(self._counts)
         self._counts.clear()
         self._call.access.forget()
