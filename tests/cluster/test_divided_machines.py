@@ -245,8 +245,13 @@ def test_a_dump_beside_writes_is_of_one_revision(fleet: Fleet, postgres: Postgre
     before = len(fleet.writer.revisions)
     copy = postgres.restored_copy(fleet.url, tmp_path)
     fleet.writer.more()
-    with server_process(*machine(copy)) as server, HullClient(server.address, retries=1000) as client:
+    copied = "the database is a copy"
+    with (
+        server_process(*machine(copy), complaints=copied) as server,
+        HullClient(server.address, retries=1000) as client,
+    ):
         info = client.get_hull(fleet.hull).info
+        assert info.restored
         written = info.revision - 1
         assert before <= written <= len(fleet.writer.revisions)
         assert info.points == len(POINTS) + written

@@ -1,6 +1,6 @@
 """A restored backup is another incarnation: nobody takes what is in it for what the server had before.
 
-Nor what is in a folder that was copied while no server used it, and brought back later.
+Nor what is in a folder that was copied while no server used it, or in a database that was dumped, and brought back.
 """
 
 import shutil
@@ -11,11 +11,14 @@ from functools import partial
 from pathlib import Path
 
 import grpc
+import postgresql
 import pytest
 from client_kinds import CLIENTS
 from command_line import dynhull
 from gateway_process import gateway_process
 from mortal_server import MortalServer
+from postgresql import PostgreSQL
+from psycopg.conninfo import conninfo_to_dict
 from refusal import refusal
 from server_process import shape_options
 
@@ -77,9 +80,13 @@ def numbered(name: str, sequence: int, uid: str = "") -> pb.ApplyRequest:
 class Backup:
     """By the commands for it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, request: pytest.FixtureRequest) -> None:
         self.folder = folder
-        self.server = MortalServer(folder, *shape_options())
+        self.server = MortalServer(folder, *self.options(request), *shape_options())
+
+    def options(self, _: pytest.FixtureRequest) -> tuple[str, ...]:
+        """What keeps the hulls."""
+        return ()
 
     def back_up(self) -> None:
         """Keep what the server has."""
@@ -109,10 +116,28 @@ class CopiedFolder(Backup):
         shutil.copytree(self.folder / "backup", self.folder / "data")
 
 
-@pytest.fixture(scope="module", params=[Backup, CopiedFolder], ids=lambda way: way.__name__)
+class DumpedDatabase(Backup):
+    """By the programs of PostgreSQL."""
+
+    def options(self, request: pytest.FixtureRequest) -> tuple[str, ...]:
+        self.postgres: PostgreSQL = request.getfixturevalue("postgres")
+        self.url = self.postgres.new_database()
+        return "--journal", self.url
+
+    def back_up(self) -> None:
+        postgresql.back_up(self.url, self.folder / "dump")
+
+    def restore(self) -> None:
+        name = conninfo_to_dict(self.url)["dbname"]
+        for sql in (f"DROP DATABASE {name} WITH (FORCE)", f"CREATE DATABASE {name}"):
+            self.postgres.query(sql, database="postgres")
+        postgresql.bring_back(self.folder / "dump", self.url)
+
+
+@pytest.fixture(scope="module", params=[Backup, CopiedFolder, DumpedDatabase], ids=lambda way: way.__name__)
 def before(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Before]:
     with ExitStack() as stack:
-        way = request.param(tmp_path_factory.mktemp("restored"))
+        way = request.param(tmp_path_factory.mktemp("restored"), request)
         server = way.server
         stack.callback(server.kill)
         clients = {kind: stack.enter_context(connect(server.address)) for kind, connect in CLIENTS.items()}

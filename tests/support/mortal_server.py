@@ -9,7 +9,7 @@ from forked import COMMAND, Process
 
 
 class MortalServer:
-    """`dynhull serve` with these options on a folder; it keeps its port over its lives.
+    """`dynhull serve` with these options on a folder or the database that they name; it keeps its port over its lives.
 
     Attributes:
         lives: how often it has started.
@@ -27,8 +27,9 @@ class MortalServer:
 
     def start(self, *, stepped_back: bool = False) -> None:
         wrap = wall_clock.at("-1h") if stepped_back else []
-        command = [*wrap, COMMAND, "serve", "--port", str(self._port), "--data", str(self._data)]
-        command += ["--log-level", "warning", *self._options]
+        command = [*wrap, COMMAND, "serve", "--port", str(self._port), "--log-level", "warning", *self._options]
+        if "--journal" not in self._options:
+            command += ["--data", str(self._data)]
         with self._log.open("ab") as log:
             self._process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
         assert self._process.stdout is not None

@@ -135,15 +135,15 @@ class PostgreSQL:
         name = f"test{next(self._databases)}"
         # As copies of files: that takes a quarter of the processor time of copying through the log.
         self.query(f"CREATE DATABASE {name} TEMPLATE {template} STRATEGY file_copy", database="postgres")
+        if template != "template1":  # it stands for a database that was filled where it is
+            self.query("DROP TABLE IF EXISTS dynhull.places", database=name)
         return self.url(name)
 
     def restored_copy(self, url: str, folder: Path) -> str:
         """A backup as the page makes it, in a database of its own."""
-        file = folder / "hulls.dump"
-        dump = ["--format", "custom", "--schema", "dynhull", "--file", file, url]
-        subprocess.run([postgres_program("pg_dump"), *dump], check=True)
-        copy = self.new_database()
-        subprocess.run([postgres_program("pg_restore"), "--dbname", copy, file], check=True)
+        file, copy = folder / "hulls.dump", self.new_database()
+        back_up(url, file)
+        bring_back(file, copy)
         return copy
 
     def query(self, sql: str, *values: object, database: str) -> list[Any]:
@@ -156,6 +156,17 @@ def query(url: str, sql: str, *values: object) -> list[Any]:
     with psycopg.connect(url, autocommit=True, options="-c search_path=dynhull") as connection:
         cursor = connection.execute(sql, values)
         return cursor.fetchall() if cursor.description else []
+
+
+def back_up(url: str, file: Path) -> None:
+    """Write a database to a file, as the page does."""
+    dump = ["--format", "custom", "--schema", "dynhull", "--file", file, url]
+    subprocess.run([postgres_program("pg_dump"), *dump], check=True)
+
+
+def bring_back(file: Path, url: str) -> None:
+    """Fill an empty database from that file."""
+    subprocess.run([postgres_program("pg_restore"), "--dbname", url, file], check=True)
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from dynhull_server.state.errors import words
 from dynhull_server.storage.port import StorageError
 
 from ..postgres.database import Connection, Database, as_storage_errors, storage_error
+from ..postgres.origin import begin_anew_if_copied
 from ..postgres.ownership import CHANNEL, IS_CONNECTED, LEASE, Leases
 from ..postgres.processes import is_known_dead, this_process
 from ..postgres.schema import hold, partitions_of, prepare
@@ -172,6 +173,7 @@ def join(database: Database, partitions: int) -> Cluster:
         hold(connection, database)
         there = partitions_of(connection, database) or partitions
         prepare(connection, database, there)
+        begin_anew_if_copied(connection, database, there)
         with connection.pipeline():
             for each in TABLES:
                 connection.execute(each.encode())

@@ -22,9 +22,9 @@ from dynhull_server.storage.rows.totals import Totals
 from ..divisions.divisions import hull_of_shard
 from ..placement import worker_of, worker_of_shard
 from .database import Connection
+from .examination import examined
 from .ownership import follow_owner
 from .schema import put_totals
-from .storage import examined
 
 # The tables whose rows go where their hull or their fence goes, each with the column of its number.
 OF_HULLS = {"batches": "hull", "snapshots": "hull", "hulls": "id"}

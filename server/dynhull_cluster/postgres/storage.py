@@ -30,14 +30,15 @@ from dynhull_server.storage.port import (
     TakenOverError,
 )
 from dynhull_server.storage.refusals import Meaning
-from dynhull_server.storage.rows.examine import Findings, examine
+from dynhull_server.storage.rows.examine import Findings
 from dynhull_server.storage.rows.ledger import Group
 from dynhull_server.storage.rows.storage import RowStorage
-from dynhull_server.storage.rows.tables import FORMAT, UnreadableError
 from dynhull_server.storage.rows.totals import COPIES
 
 from .database import Connection, Database, as_storage_errors, storage_error
+from .examination import examined
 from .follower import Follower
+from .origin import NOTE, begin_anew_if_copied, place_of
 from .ownership import REQUIRE, Leases, Ownership, taken_over, writer_name
 from .reader import BegunReader, PostgresReader, Readers
 from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of, require_partitions
@@ -182,6 +183,7 @@ class PostgresStorage(RowStorage):
             with as_storage_errors(), connection.transaction():
                 hold(connection, self._database)
                 prepare(connection, self._database, self._partitions)
+                begin_anew_if_copied(connection, self._database, self._partitions)
         except BaseException:
             connection.close()
             raise
@@ -249,11 +251,11 @@ class PostgresStorage(RowStorage):
                     raise
                 self._disconnect()
         connection = self._writer = self._connect_writer(writer_name(self._partition, self._owner.epoch))
-        self._send(connection, group)
+        self._send(connection, group, place_of(connection))
         return connection
 
-    def _send(self, connection: Connection, group: Group) -> None:
-        """Send all of a transaction but its COMMIT."""
+    def _send(self, connection: Connection, group: Group, place: str | None = None) -> None:
+        """Send all of a transaction but its COMMIT; on a new connection it notes the place that this leads to."""
         with connection.pipeline():
             connection.execute("BEGIN")
             owned = connection.execute(REQUIRE, self._owner.own)
@@ -262,6 +264,8 @@ class PostgresStorage(RowStorage):
             *_, last = group.before.row
             keys = self._partition, group.before.commits, last
             renewed = connection.execute(UPDATE_TOTALS, [*group.totals.row, *keys])
+            if place is not None:
+                connection.execute(NOTE, [[self._partition], place])
         self._require_ownership(owned.rowcount)
         if renewed.rowcount != COPIES:
             raise TakenOverError(
@@ -334,16 +338,6 @@ class PostgresStorage(RowStorage):
     def bytes_used(self) -> int:
         """The size of the tables of all partitions in bytes, as of the last look."""
         return self._size
-
-
-def examined(connection: Connection, partition: int, progress: Progress, *, contents: bool = True) -> Findings:
-    """Compare the rows of a partition with their checksums and the totals, inside of a transaction."""
-    findings = Findings()
-    try:
-        examine(PostgresReader(connection, partition), FORMAT, findings, progress, contents=contents)
-    except UnreadableError as error:
-        findings.fatal.append(f"a part of the database cannot be read ({error})")
-    return findings
 
 
 def _not_committed(error: BaseException) -> NotCommittedError:

@@ -21,10 +21,10 @@ from dynhull_server.storage.worker_folders import parts_of, worker_folder, write
 
 from ..shards.epochs import owner_of
 from .database import Connection, Database, as_storage_errors
+from .examination import examined
 from .ownership import LOOK, Leases, Ownership, follow_owner
 from .reader import PostgresReader
 from .schema import INSERTED_BYTES, hold, partitions_of, prepare, put_totals, queries_of
-from .storage import examined
 
 log = logging.getLogger(__name__)
 
