@@ -12,6 +12,37 @@ import dynhull
 from dynhull_proto.v1.hull_service_pb2 import ReadError
 from dynhull_surface.reasons import REASONS, Code
 
+__all__ = [
+    "ConsumerNotFoundError",
+    "DeadlineError",
+    "DuplicateKeyError",
+    "DynhullError",
+    "FenceExistsError",
+    "FenceNotFoundError",
+    "FenceReplacedError",
+    "HullEmptyError",
+    "HullExistsError",
+    "HullFencedError",
+    "HullNotFoundError",
+    "HullReplacedError",
+    "HullUnsuitableError",
+    "InvalidRequestError",
+    "KeyMissingError",
+    "LimitExceededError",
+    "MethodUnknownError",
+    "OutcomeUnknownError",
+    "PermissionDeniedError",
+    "PointMissingError",
+    "ProducerInUseError",
+    "RestoredError",
+    "RevisionForgottenError",
+    "SequenceAheadError",
+    "SequenceGapError",
+    "StaleCopyError",
+    "UnauthenticatedError",
+    "UnavailableError",
+]
+
 DOMAIN = "dynhull.v1"
 
 
