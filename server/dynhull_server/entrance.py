@@ -22,8 +22,8 @@ LOOKAHEAD = 2**20
 # Milliseconds that a new connection has for the HTTP/2 handshake.
 HANDSHAKE_TIMEOUT = 10_000
 
-# Calls that may wait to be taken up. gRPC refuses some of more than that, and all of more than twice as many, without a
-# reason; by default already some of a thousand.
+# Calls that may wait to be taken up, or twice those of a connection if that is more. gRPC refuses some of more than
+# that, and all of more than twice as many, without a reason; by default already some of a thousand.
 PENDING = 20_000
 
 # Calls that a connection may have at a time beside all streams, which may be those of a gateway; its client holds the
@@ -104,6 +104,8 @@ class PublicEntrance:
 
 def grpc_server(settings: Settings, *, shared_port: bool = False) -> grpc.aio.Server:
     """A server with the limits of the settings, which does not listen yet."""
+    calls = settings.max_streams + CALLS_OF_A_CONNECTION
+    pending = max(PENDING, 2 * calls)
     return grpc.aio.server(
         options=[
             # gRPC's own refusal of a large message has no details, so its limit is higher than ours.
@@ -120,9 +122,9 @@ def grpc_server(settings: Settings, *, shared_port: bool = False) -> grpc.aio.Se
             ("grpc.server_handshake_timeout_ms", HANDSHAKE_TIMEOUT),
             ("grpc.max_connection_idle_ms", math.ceil(settings.max_connection_idle * 1000)),
             ("grpc.max_allowed_incoming_connections", settings.max_connections),
-            ("grpc.max_concurrent_streams", settings.max_streams + CALLS_OF_A_CONNECTION),
-            ("grpc.server.max_pending_requests", PENDING),
-            ("grpc.server.max_pending_requests_hard_limit", 2 * PENDING),
+            ("grpc.max_concurrent_streams", calls),
+            ("grpc.server.max_pending_requests", pending),
+            ("grpc.server.max_pending_requests_hard_limit", 2 * pending),
         ]
     )
 
