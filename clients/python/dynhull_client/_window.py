@@ -240,6 +240,7 @@ class Window(Generic[Future]):
         self._waiting_bytes += sum(batch.size for batch in self._sent)
         self._sent.clear()
         self._most_batches = 0  # the next server may be an older one
+        error = self._explained(error)
         if isinstance(error, FATAL) or error.code == grpc.StatusCode.CANCELLED:
             return self._end(error), None
         if error.reason and not passes(error):
@@ -253,6 +254,20 @@ class Window(Generic[Future]):
         if now - self._lost_since > self._writing.patience:
             return self._end(error), None
         return [], next(self._pauses)
+
+    def _explained(self, error: DynhullError) -> DynhullError:
+        """RestoredError for a gap before batches that were acknowledged: the hull was led back without a notice."""
+        if type(error) is not SequenceGapError or error.expected is None or error.metadata.get("uid") != self.uid:
+            return error
+        if not self.uid or error.expected > self.sequence:
+            return error
+        last = error.expected - 1
+        message = (
+            f"the hull {self._writing.name!r} was led back to an earlier state, and the last batch of producer "
+            f"{self._writing.producer!r} that it has is number {last}: those after it are gone, so go on from there, "
+            "with a new writer"
+        )
+        return RestoredError(message, error.code, "RESTORED", error.metadata | {"last": str(last)})
 
     def abandon(self) -> list[Future]:
         """Drop all batches; returns their outcomes, which stay unknown."""

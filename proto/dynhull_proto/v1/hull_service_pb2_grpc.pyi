@@ -48,7 +48,9 @@ class HullServiceStub:
 
     A backup lacks the batches after it, so numbers from before it was restored are refused with FAILED_PRECONDITION, reason
     RESTORED, and the number of the producer's last batch that the hull has ("last"): where a request says of which hull its
-    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored.
+    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored. A server
+    cannot notice that its whole disk was led back. A SEQUENCE_GAP that expects a number which was acknowledged to the
+    caller, in the hull whose numbers they are (its present uid is in the error, "uid"), says that.
 
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
@@ -213,7 +215,9 @@ class HullServiceAsyncStub(HullServiceStub):
 
     A backup lacks the batches after it, so numbers from before it was restored are refused with FAILED_PRECONDITION, reason
     RESTORED, and the number of the producer's last batch that the hull has ("last"): where a request says of which hull its
-    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored.
+    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored. A server
+    cannot notice that its whole disk was led back. A SEQUENCE_GAP that expects a number which was acknowledged to the
+    caller, in the hull whose numbers they are (its present uid is in the error, "uid"), says that.
 
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and
@@ -374,7 +378,9 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
 
     A backup lacks the batches after it, so numbers from before it was restored are refused with FAILED_PRECONDITION, reason
     RESTORED, and the number of the producer's last batch that the hull has ("last"): where a request says of which hull its
-    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored.
+    numbers are ("uid"), whatever its number; otherwise in place of SEQUENCE_GAP in any hull that was ever restored. A server
+    cannot notice that its whole disk was led back. A SEQUENCE_GAP that expects a number which was acknowledged to the
+    caller, in the hull whose numbers they are (its present uid is in the error, "uid"), says that.
 
     Numbers may rise and skip where a request says so ("may_skip"): any number greater than the producer's last one is
     applied, any other one is a duplicate. So a producer "topic/0" can number its batches with the offsets of a log, and

@@ -202,7 +202,7 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     SequenceAheadError: Refusal("SEQUENCE_AHEAD", lambda e: {"field": e.field, "value": e.sequence, "last": e.last}),
     SequenceGapError: Refusal(
         "SEQUENCE_GAP",
-        lambda e: {"field": "sequence", "value": e.sequence, "expected": e.expected},
+        lambda e: {"field": "sequence", "value": e.sequence, "expected": e.expected, "uid": e.uid or None},
         subject="sequence",
     ),
     ServiceUnknownError: Refusal("SERVICE_UNKNOWN", lambda e: {"value": _short(e.name)}),

@@ -65,11 +65,16 @@ async def require_present(hull: LiveHull, producer: str, uid: str) -> None:
 def gap_explained(error: Exception, engine: Engine, name: str, uid: str) -> Exception:
     """The error that refuses a batch; RestoredError for a gap where batches may be missing because of a backup.
 
-    Who says of which hull the numbers are, has skipped some: `require_present` has compared the uid.
+    Who says of which hull the numbers are, has skipped some, as `require_present` has compared the uid; or the hull was
+    led back, and nobody has noticed: the present uid lets a caller with acknowledged numbers decide.
     """
-    if type(error) is not SequenceGapError or uid or not engine.has(name) or not engine.get(name).restored:
+    if type(error) is not SequenceGapError or not engine.has(name):
         return error
     hull = engine.get(name)
+    if uid:
+        error.uid = hull.uid
+    if uid or not hull.restored:
+        return error
     return RestoredError(name, hull.uid, error.producer, error.expected - 1)
 
 

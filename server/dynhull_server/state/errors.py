@@ -132,10 +132,12 @@ class SequenceGapError(RefusedError):
         producer: the name of the producer.
         sequence: the number sent.
         expected: the next number.
+        uid: the uid of the hull, for who has said of which hull the numbers are; empty for others.
     """
 
     def __init__(self, producer: str, sequence: int, expected: int, words: str = "") -> None:
         super().__init__(words or f"batch {sequence} of producer {producer!r} arrived, expected {expected}")
+        self.uid = ""
         self.producer = producer
         self.sequence = sequence
         self.expected = expected
