@@ -25,11 +25,12 @@ def test_writers_have_numbers_that_a_hull_has_lost(tmp_path: Path) -> None:
     server, folder, earlier = MortalServer(tmp_path), tmp_path / "data", tmp_path / "earlier"
     with ExitStack() as stack:
         stack.callback(lambda: server.kill())
-        writers = {}
+        writers, clients = {}, {}
         for kind, connect in CLIENTS.items():
             client = stack.enter_context(connect(server.address))
             for name in ("counts", "skips"):
                 hull = f"{name}/{kind}"
+                clients[hull] = client
                 client.create_hull(hull)
                 writers[hull] = client.writer(hull, producer=name, may_skip=name == "skips")
                 for number in range(1, KEPT + 1):
@@ -48,3 +49,6 @@ def test_writers_have_numbers_that_a_hull_has_lost(tmp_path: Path) -> None:
                 put(hull, writer, KEPT + 2)
             assert caught.value.last == (10 * KEPT if hull.startswith("skips") else KEPT)
             assert caught.value.uid == writer.uid
+            known = {"uid": writer.uid, "acknowledged": writer.sequence}
+            with pytest.raises(RestoredError), clients[hull].writer(hull, producer=hull.partition("/")[0], **known):
+                pass

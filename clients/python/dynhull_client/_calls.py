@@ -22,7 +22,7 @@ from dynhull_surface.settings import HullSettings
 from . import _messages as messages
 from ._arguments import choice, positive, whole
 from ._batch import Batch
-from ._errors import DynhullError, HullExistsError, HullNotFoundError
+from ._errors import DynhullError, HullExistsError, HullNotFoundError, RestoredError
 from ._keys import checked_keys, decode_names, encode_keys
 from ._messages import (
     Applied,
@@ -453,9 +453,27 @@ class Known:
 
 
 def known(writing: Writing) -> Call[Known]:
-    """What the hull knows of the producer of a writer."""
+    """What the hull knows of the producer of a writer; RestoredError if it lacks what an earlier writer had."""
+
+    def decode(response: pb.GetProducerResponse) -> Known:
+        last = int(response.last_sequence)
+        if writing.uid and response.uid == writing.uid and last < writing.acknowledged:
+            raise led_back(writing, last)
+        return Known(last, response.uid)
+
     request = pb.GetProducerRequest(name=writing.name, producer=writing.producer, uid=writing.uid)
-    return Call("GetProducer", request, lambda response: Known(int(response.last_sequence), response.uid), None)
+    return Call("GetProducer", request, decode, None)
+
+
+def led_back(writing: Writing, last: int) -> RestoredError:
+    """The error of a writer whose hull lacks acknowledged batches, though it has the same uid."""
+    message = (
+        f"the hull {writing.name!r} was led back to an earlier state, and the last batch of producer "
+        f"{writing.producer!r} that it has is number {last}: those after it are gone, so go on from there, with a new "
+        "writer"
+    )
+    metadata = {"value": writing.name, "uid": writing.uid, "last": str(last), "expected": str(last + 1)}
+    return RestoredError(message, grpc.StatusCode.FAILED_PRECONDITION, "RESTORED", metadata)
 
 
 def locate(
@@ -743,6 +761,7 @@ class Writing:
     patience: float
     may_skip: bool
     uid: str
+    acknowledged: int
 
 
 def writer(
@@ -758,6 +777,7 @@ def writer(
     patience: float = 60.0,
     may_skip: bool = False,
     uid: str = "",
+    acknowledged: int = 0,
 ) -> Writing:
     """A writer that gathers points into batches, each applied exactly once.
 
@@ -789,6 +809,8 @@ def writer(
             SequenceGapError. Needs a `producer`.
         uid: the uid of the hull that an earlier writer with this name wrote to: RestoredError if a backup of the hull
             was restored since then. A writer also ends with that error if that happens while it writes.
+        acknowledged: the number of the last batch that was acknowledged to that writer: the same error if the hull of
+            this `uid` lacks it, as where nobody has noticed that the disk of the server was led back.
     """
     if may_skip and producer is None:
         raise ValueError("may_skip needs a producer, whose numbers go on after a restart")
@@ -799,7 +821,18 @@ def writer(
     if coalesce not in (None, "last"):
         raise ValueError(f'coalesce must be None or "last", got {coalesce!r}')
     return Writing(
-        name, producer, batch_points, linger, in_flight, missing, coalesce, stop_on_error, patience, may_skip, uid
+        name,
+        producer,
+        batch_points,
+        linger,
+        in_flight,
+        missing,
+        coalesce,
+        stop_on_error,
+        patience,
+        may_skip,
+        uid,
+        acknowledged,
     )
 
 

@@ -5,14 +5,14 @@ No I/O and no clock: `Writer` and `AsyncWriter` add them.
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import grpc
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ._calls import Known, Writing
+from ._calls import Known, Writing, led_back
 from ._errors import (
     DynhullError,
     HullNotFoundError,
@@ -261,13 +261,7 @@ class Window(Generic[Future]):
             return error
         if not self.uid or error.expected > self.sequence:
             return error
-        last = error.expected - 1
-        message = (
-            f"the hull {self._writing.name!r} was led back to an earlier state, and the last batch of producer "
-            f"{self._writing.producer!r} that it has is number {last}: those after it are gone, so go on from there, "
-            "with a new writer"
-        )
-        return RestoredError(message, error.code, "RESTORED", error.metadata | {"last": str(last)})
+        return led_back(replace(self._writing, uid=self.uid), error.expected - 1)
 
     def abandon(self) -> list[Future]:
         """Drop all batches; returns their outcomes, which stay unknown."""

@@ -99,6 +99,7 @@ class Lane:
         self._named_by_messages = named_by_messages
         self._kind: str | None = None
         self._uid = ""  # of the hull, once it is known
+        self._acknowledged = 0  # the last number that this hull has acknowledged
         self._waiting: deque[Chunk] = deque()  # not given to the writer
         self._flying: deque[Chunk] = deque()  # given to it, and not settled
         self._failure: Exception | None = None
@@ -168,9 +169,10 @@ class Lane:
             stop_on_error=True,
             patience=self._away.pause(PATIENCE),
             uid=self._uid,
+            acknowledged=self._acknowledged,
         )
         async with writer:
-            self._uid = writer.uid
+            self._uid, self._acknowledged = writer.uid, writer.sequence
             known = writer.sequence if self._producer is not None else -1
             while True:
                 while self._waiting and self._failure is None:
@@ -220,6 +222,8 @@ class Lane:
         if error is None and self._flying[0] is chunk:
             self._away.ends()
             self._flying.popleft()
+            if self._producer is not None:
+                self._acknowledged = chunk.number
             chunk.settle()
             self._settled(len(chunk.points), outcome.result())
         elif self._failure is None and isinstance(error, Exception):

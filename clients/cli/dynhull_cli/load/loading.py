@@ -11,7 +11,15 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from dynhull_client import DeadlineError, DynhullError, HullClient, HullExistsError, HullNotFoundError, UnavailableError
+from dynhull_client import (
+    DeadlineError,
+    DynhullError,
+    HullClient,
+    HullExistsError,
+    HullNotFoundError,
+    RestoredError,
+    UnavailableError,
+)
 
 from ..json_lines import json_line
 from ..keyed_rows import known_hull
@@ -205,10 +213,13 @@ def _resumable(option: str, producer: str | None) -> Iterator[None]:
         yield
     except LoadedBeforeError:
         raise
-    except (KeyboardInterrupt, DynhullError, ValueError):
+    except (KeyboardInterrupt, DynhullError, ValueError) as error:
         if producer is not None:
+            there = "The points acknowledged so far are in the hull"
+            if isinstance(error, RestoredError):
+                there = "Of the points acknowledged so far, the hull lacks some"
             typer.echo(
-                f"The points acknowledged so far are in the hull. The same command with {option} loads the rest; "
+                f"{there}. The same command with {option} loads the rest; "
                 f"if you correct the file first, add --producer {producer}.",
                 err=True,
             )
