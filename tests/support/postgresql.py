@@ -121,7 +121,13 @@ class PostgreSQL:
         return [self.process.pid, *descendants(self.process.pid)]
 
     def kill(self) -> None:
-        """SIGKILL its first process, and wait until the others have ended: before that, it cannot start again."""
+        """SIGKILL its first process, and wait until the others have ended: before that, it cannot start again.
+
+        It is stopped first, so that it begins no others when these have been counted.
+        """
+        first = self.process.pid
+        os.kill(first, signal.SIGSTOP)
+        os.waitid(os.P_PID, first, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
         _, *others = self.processes
         self.stop(signal.SIGKILL)
         wait_until(lambda: not any(map(runs, others)))
