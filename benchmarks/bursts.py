@@ -1,8 +1,9 @@
 """What a burst of one caller costs others: `python benchmarks/bursts.py [--calls 5000]`.
 
 One caller begins many reads at once, in a process of its own, while another reads one at a time; one without a token
-begins 100,000 calls and resets each; and a gateway gets 2,500 GETs at once. Whatever is not answered is counted by
-its error. The server and the callers share this machine, and have the default settings.
+begins 100,000 calls and resets each; and a gateway gets 2,500 GETs at once. Two processes that only count, as many as
+a burst keeps busy, show what the machine alone makes of the other caller's delays. Whatever is not answered is counted
+by its error. The server and the callers share this machine, and have the default settings.
 """
 
 import argparse
@@ -65,6 +66,15 @@ def resets(address, _token, calls):
     return time.perf_counter() - begun, {"reset": calls}
 
 
+def counting(_address, _token, rounds):
+    """The seconds that two processes take to count, which ask nobody anything."""
+    program = f"for _ in range({rounds}): pass"
+    begun = time.perf_counter()
+    with subprocess.Popen([sys.executable, "-c", program]):
+        exec(program)
+    return time.perf_counter() - begun, {"counted": 2 * rounds}
+
+
 def reads(client, enough):
     """The milliseconds of each of at least a hundred reads, one after the other, and how many failed."""
     times, failed = [], Counter()
@@ -120,6 +130,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--calls", type=int, default=5000)
     parser.add_argument("--resets", type=int, default=100_000)
+    parser.add_argument("--counts", type=int, default=60_000_000)
     parser.add_argument("--gets", type=int, default=2500)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(1, get_context("spawn")) as pool:
@@ -132,6 +143,7 @@ def main():
         ):
             client.create_hull(NAME)
             client.apply(NAME, insert=[[0, 0], [1, 0], [0, 1]])
+            beside(pool, counting, client, address, None, options.counts)
             beside(pool, burst, client, address, one, options.calls)
             beside(pool, resets, client, address, None, options.resets)
             with running("gateway", "--address", address, "--token", other) as place:
