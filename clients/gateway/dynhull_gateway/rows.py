@@ -115,10 +115,12 @@ class Ndjson:
                 else:
                     given = LON_LAT(line)
                     point = given["lon"], given["lat"]
-                if "time" not in given and "expires" not in given:
-                    found.rows.append(Row(given.get("key"), point))
-                    continue
-            except ValidationError:
+                times: tuple[int | None, ...] = ()
+                if "time" in given or "expires" in given:
+                    times = self._labels.times(given.get("time"), given.get("expires"))
+                found.rows.append(Row(given.get("key"), point, *times))
+                continue
+            except (ValidationError, BadValueError):
                 pass
             self._read(line, found)
         return found

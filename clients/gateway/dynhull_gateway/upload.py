@@ -195,13 +195,15 @@ class Upload:
         """
         begin = self.settled
         while True:
-            there = {place: row for place, row in enumerate(rows) if row is not None}
+            places, there = _good(rows)
             if self._keep_last:
-                last = {place if row.key is None else row.key: place for place, row in there.items()}
-                there = {place: there[place] for place in last.values()}
-            places = list(there)
+                last = {
+                    place if row.key is None else row.key: at
+                    for at, (place, row) in enumerate(zip(places, there, strict=True))
+                }
+                places, there = [places[at] for at in last.values()], [there[at] for at in last.values()]
             try:
-                return await self._send_rows(list(there.values()), numbered)
+                return await self._send_rows(there, numbered)
             except DynhullError as error:
                 if error.row is None:
                     raise
@@ -253,6 +255,14 @@ def _first_repetition(rows: Sequence[Row | None]) -> int:
             return number
         seen.add(row.key)
     return len(rows)
+
+
+def _good(rows: Sequence[Row | None]) -> tuple[list[int], list[Row]]:
+    """The places of the rows that are not bad, and these rows."""
+    good = [row for row in rows if row is not None]
+    if len(good) == len(rows):
+        return list(range(len(rows))), good
+    return [place for place, row in enumerate(rows) if row is not None], good
 
 
 def _times(times: list[int | None]) -> npt.NDArray[np.int64] | None:

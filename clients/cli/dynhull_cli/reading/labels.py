@@ -10,6 +10,7 @@ from .times import TimeReader, TimeUnit
 from .values import BadValueError
 
 Key = str | int
+LONGEST_KEY = 255  # bytes
 Labels = tuple[Key | None, int | None, int | None]
 """The key of a row, its time and the time at which it leaves, in microseconds since 1970; None for what it has not."""
 
@@ -43,8 +44,12 @@ class LabelReader:
 
     def __call__(self, key: Any, time: Any, expires: Any = None) -> Labels:
         """The labels of a row; BadValueError says what is wrong with them."""
+        without = self._key is None or (self._optional and key is None)
+        return (None if without else key_of(key, self._key or "", self._kind), *self.times(time, expires))
+
+    def times(self, time: Any, expires: Any = None) -> tuple[int | None, int | None]:
+        """The time of a row and the one at which it leaves; BadValueError says what is wrong with them."""
         return (
-            None if self._key is None or (self._optional and key is None) else key_of(key, self._key, self._kind),
             None if self._time is None or (self._optional and _absent(time)) else self._read(self._time, time),
             None if self._expires is None or _absent(expires) else self._read(self._expires, expires),
         )
@@ -59,6 +64,8 @@ class LabelReader:
 
 def key_of(value: Any, name: str, kind: KeyType | None = None) -> Key:
     """A key; BadValueError if it is missing, or cannot be one of this kind."""
+    if isinstance(value, str) and 0 < len(value) <= LONGEST_KEY and value.isascii() and kind != "int":
+        return value  # most are
     if _absent(value):
         raise BadValueError(name, "is missing")
     value = float(value) if isinstance(value, Decimal) else value

@@ -57,13 +57,13 @@ class TimeReader:
 
     def read(self, value: Any) -> int:
         """The time in microseconds since 1970; ValueError says what is wrong with the value."""
+        if isinstance(value, str) and value[4:5] == "-" and value[:4].isdecimal():  # a date, as most times are
+            return self._of_text(value.strip())
         if isinstance(value, datetime):
             return self._of_datetime(value, value.isoformat())
         text = "" if value is None else str(value).strip()
         if not text:
             raise BadValueError(self._name, "is missing")
-        if text[4:5] == "-" and text[:4].isdecimal():  # a date, which Decimal takes long to refuse
-            return self._of_text(text)
         try:
             number = Decimal(text)
         except InvalidOperation:
