@@ -6,9 +6,7 @@ number of threads that one call of the kernel may use, by default one for each p
 
 import os
 from operator import index
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
-from warnings import warn
 
 if TYPE_CHECKING:
     import numpy as np
@@ -61,6 +59,9 @@ def _load() -> _Kernel | None:
 
 def _warn_of_the_reference() -> None:
     """Nobody shall find out by waiting that the reference in Python answers."""
+    from pathlib import Path  # most programs have the kernel, and need neither
+    from warnings import warn
+
     folder = Path(__file__).parents[1]
     if (folder / "pyproject.toml").is_file():
         why = f"it was imported from its source folder, {folder}: begin Python in another folder"

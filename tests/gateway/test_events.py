@@ -276,12 +276,11 @@ def test_a_reader_that_does_not_read_gets_a_snapshot_later(address: str, name: s
     """While it does not read, what waits for it stays small; then it gets the whole hull, and what follows."""
     with HullClient(address) as client, gateway_process(address, "--metrics-port", "0") as gateway:
         client.create_hull(name)
-        xy = [[i, i * i] for i in range(4000)]
-        client.apply(name, insert=xy)
+        client.apply(name, insert=[[i, i * i] for i in range(8000)])  # 26 such events fill the most that Linux buffers
         slow = Events(gateway, f"/hulls/{name}/events?rate=100&f=vertices")
         other = Events(gateway, f"/hulls/{name}/events?rate=100&f=vertices")
         revision = 1
-        for i in range(4000, 4120):
+        for i in range(8000, 8120):
             revision = client.apply(name, insert=[[i, i * i]]).revision
             while other.next()[1]["revision"] < revision:
                 pass

@@ -28,6 +28,7 @@ from dynhull_server.state.fences.faults import FenceFault
 from dynhull_server.state.fences.recent import RecentEvents
 from dynhull_server.state.fences.records import AppendEvents, Cause, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME, HullSettings
+from dynhull_server.storage.sqlite.origin import NOTE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 SQUARE = [[0, 0], [6, 0], [6, 6], [0, 6]]
@@ -264,7 +265,7 @@ def depot(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_check_compares_stored_fences(
     depot: Path, tmp_path: Path, made: tuple[EventType, str, str], complaint: str
 ) -> None:
-    data = shutil.copytree(depot, tmp_path / "data")
+    data = shutil.copytree(depot, tmp_path / "data", ignore=shutil.ignore_patterns(NOTE))  # not known for a copy
     storage = SQLiteStorage(data)
     (fence,) = storage.open(lambda *_: None).fences
     storage.commit([AppendEvents(block_of({fence.number: [event(*made, 3)]}))])
