@@ -16,6 +16,8 @@ from ports import free_port
 
 RAY = str(Path(sys.executable).with_name("ray"))
 MEMORY = "100000000"
+# Any ports: those of a range are refused if the port of the GCS is among them.
+WORKERS = "--min-worker-port=0", "--max-worker-port=0"
 # Ray counts its users unless asked not to, and without a token puts one into the home folder. Nodes that have lost
 # their GCS end after so many seconds, a minute otherwise.
 ENVIRONMENT = {
@@ -44,7 +46,15 @@ class Node:
         where = ["--num-cpus=1", f"--address={address}"] if address else [*first, f"--port={port}"]
         self._log = (folder / f"node-{free_port()}.log").open("w+")
         self._process = subprocess.Popen(
-            [RAY, "start", "--block", "--node-ip-address=127.0.0.1", f"--object-store-memory={MEMORY}", *where],
+            [
+                RAY,
+                "start",
+                "--block",
+                "--node-ip-address=127.0.0.1",
+                f"--object-store-memory={MEMORY}",
+                *WORKERS,
+                *where,
+            ],
             stdout=self._log,
             stderr=self._log,
             env={**os.environ, **ENVIRONMENT},
