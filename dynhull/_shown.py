@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,6 +72,8 @@ def _nested(coordinates: Sequence[Any]) -> str:
 
 def svg(vertices: Points, title: str, points: Points | None = None) -> str:
     """A drawing of (h, 2) vertices and, if given, the (n, 2) points inside, with the same unit on both axes."""
+    from html import escape  # only notebooks need it
+
     place, height = _fitted(vertices)
     corners = " ".join(f"{x:.2f},{y:.2f}" for x, y in place(vertices))
     dots = "".join(

@@ -1,13 +1,12 @@
 """How a setting is described."""
 
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import Field, field, fields
 from functools import lru_cache
 from types import NoneType
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 
-@dataclass(frozen=True, slots=True)
-class Flag:
+class Flag(NamedTuple):
     """An option of the command line that stands for one value of a choice.
 
     Attributes:
@@ -21,8 +20,7 @@ class Flag:
     meaning: str
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
+class Setting(NamedTuple):
     """A setting.
 
     Attributes:

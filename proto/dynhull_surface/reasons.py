@@ -1,8 +1,8 @@
 """Why a request is refused, and what follows from it: status codes, exit codes, classes of errors, repetitions."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum, IntEnum
+from typing import NamedTuple
 
 
 class Repeat(Enum):
@@ -68,8 +68,7 @@ class Code(Enum):
     UNAUTHENTICATED = 16, 401, "UnauthenticatedError"
 
 
-@dataclass(frozen=True, slots=True)
-class Reason:
+class Reason(NamedTuple):
     """What follows from a reason.
 
     Attributes:

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from datetime import datetime, timedelta
-from html import escape
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -148,6 +147,8 @@ class Hull(Value, Shown):
         }
 
     def _repr_html_(self) -> str:
+        from html import escape  # only notebooks need it
+
         info, measures = self.info, self.measures
         picture = shown_svg(self.vertices, info.center, info.name)
         caption = f"{info.points} points, {len(self.vertices)} vertices, area {measures.area:.6g}"
