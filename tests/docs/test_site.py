@@ -11,7 +11,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 ROOT = Path(__file__).parents[2]
-GENERATED = {ROOT / "docs/reference/commands.md", ROOT / "docs/reference/protocol.md"}
+GENERATED = {ROOT / f"docs/reference/{page}.md" for page in ("commands", "errors", "protocol")}
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "deploy").rglob("*.md"), *(ROOT / "docs").rglob("*.md")])
 CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
 TARGET = re.compile(r"\]\(([^)\s]+)[^)]*\)")

@@ -59,9 +59,12 @@ from dynhull_server.state.records import (
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.sqlite.folder import DATABASE
+from dynhull_server.storage.sqlite.origin import NOTE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 LOG = f"{DATABASE}-wal"
+# Without the note a copy is not known for one, whose identities would be others.
+UNNOTED = shutil.ignore_patterns(NOTE)
 NOTHING = np.empty((0, 2))
 
 HARMLESS, REPAIRED, REFUSED, SILENT, TRACEBACK = "harmless", "repaired", "refused", "silent losses", "tracebacks"
@@ -238,7 +241,7 @@ def build(root: Path) -> dict[str, Acknowledged]:
         built[name] = copied(builder, root / name)
         builder.storage.close()
         if name == "killed":
-            shutil.copytree(root / "work", root / "stopped")
+            shutil.copytree(root / "work", root / "stopped", ignore=UNNOTED)
             built["stopped"] = builder.acknowledged
         shutil.rmtree(root / "work")
     # Most of it in the database, some of it in a log with frames of an earlier use behind it.
@@ -257,7 +260,7 @@ def build(root: Path) -> dict[str, Acknowledged]:
 
 def copied(builder: Builder, target: Path) -> Acknowledged:
     """The folder as a killed process leaves it."""
-    shutil.copytree(builder.storage._folder.path, target)
+    shutil.copytree(builder.storage._folder.path, target, ignore=UNNOTED)
     return {number: list(records) for number, records in builder.acknowledged.items()}
 
 
