@@ -5,6 +5,8 @@ from functools import lru_cache
 from types import NoneType
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
+LARGEST = 2**63 - 1  # integer that the server stores
+
 
 class Flag(NamedTuple):
     """An option of the command line that stands for one value of a choice.
@@ -30,7 +32,7 @@ class Setting(NamedTuple):
         path: its place on the wire, in the message of the settings.
         meaning: sentences; other settings stand in them as `names`.
         least: the least value; None for any.
-        greatest: the greatest value that the contract and the server know; None for any.
+        greatest: the greatest value that the contract and the server know.
         needs: settings without one of which it means nothing.
         flag: the option of the command line if it is not named after the setting.
         also: another spelling of the option.
@@ -43,7 +45,7 @@ class Setting(NamedTuple):
     path: str
     meaning: str
     least: int | None = None
-    greatest: int | None = None
+    greatest: int = LARGEST
     needs: tuple[str, ...] = ()
     flag: Flag | None = None
     also: str | None = None

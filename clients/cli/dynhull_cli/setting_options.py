@@ -78,7 +78,7 @@ def _parameter(setting: Setting, panel: str | None) -> inspect.Parameter:
     elif setting.kind in READ:
         kind = str
     elif setting.kind is int:
-        limits = {"min": setting.least, "max": setting.greatest}
+        limits = {"min": setting.least, "max": setting.greatest, "metavar": "INTEGER"}
     spellings = [each for each in (setting.option, setting.also) if each]
     option = typer.Option(*spellings, help=meaning, rich_help_panel=panel, **limits)
     return inspect.Parameter(

@@ -13,7 +13,6 @@ from .numbers import Number, Point, Seconds
 
 Body = TypeVar("Body", bound=BaseModel)
 IN_SECONDS = "In seconds."
-LARGEST = 2**63 - 1  # that the server stores
 
 
 def with_settings(settings: type, *, at_creation: bool = False) -> Callable[[type[Body]], type[Body]]:
@@ -51,8 +50,7 @@ def _kind(setting: Setting) -> Any:
     if setting.kind is timedelta:
         return Seconds
     if setting.kind is int:
-        greatest = LARGEST if setting.greatest is None else setting.greatest
-        return Annotated[int, Field(strict=True, ge=setting.least, le=greatest)]
+        return Annotated[int, Field(strict=True, ge=setting.least, le=setting.greatest)]
     if setting.kind is float:
         return Annotated[Number, Field(ge=setting.least)]
     return Point
