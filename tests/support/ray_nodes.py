@@ -37,6 +37,7 @@ class Node:
 
     Attributes:
         address: that of the first node.
+        folder: the folder.
     """
 
     def __init__(self, folder: Path, address: str = "") -> None:
@@ -44,6 +45,7 @@ class Node:
         self.address = address or f"127.0.0.1:{free_port()}"
         port = self.address.rpartition(":")[2]
         where = ["--num-cpus=1", f"--address={address}"] if address else [*first, f"--port={port}"]
+        self.folder = folder
         self._log = (folder / f"node-{free_port()}.log").open("w+")
         self._process = subprocess.Popen(
             [

@@ -246,10 +246,10 @@ KINDS = [
 ]
 
 
-def certified(folder: Path) -> tuple[str, ...]:
-    """The options of servers with a certificate."""
+def certified(folder: Path, *hosts: str) -> tuple[str, ...]:
+    """The options of servers with a certificate, for this machine and other hosts."""
     authority = trustme.CA()
-    authority.issue_cert("127.0.0.1").private_key_and_cert_chain_pem.write_to_path(folder / "cert.pem")
+    authority.issue_cert("127.0.0.1", *hosts).private_key_and_cert_chain_pem.write_to_path(folder / "cert.pem")
     authority.cert_pem.write_to_path(folder / "ca.pem")
     cert = str(folder / "cert.pem")
     return ("--tls-cert", cert, "--tls-key", cert, "--cluster-ca", str(folder / "ca.pem"))

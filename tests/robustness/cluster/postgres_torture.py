@@ -82,8 +82,7 @@ class Torture(torture.Torture):
         self._database.start()
         self._url = self._database.new_database()
         self._wires = [Proxy(self._socket())]
-        self._journal = self._journal_through(self._wires[0])
-        super().__init__(folder, seed, breath, options, self._journal, tls)
+        super().__init__(folder, seed, breath, options, self._journal_through(self._wires[0]), tls)
 
     def _journal_through(self, wire: Proxy) -> str:
         host, _, port = wire.address.partition(":")

@@ -104,10 +104,9 @@ class Torture:
         journal: str = "",
         tls: grpc.ChannelCredentials | None = None,
     ) -> None:
-        self._folder = folder
-        self._options = options
+        self._folder, self._options, self._journal = folder, options, journal
         self._seed, self._random = seed, random.Random(seed)
-        self.server = Server(folder, options, journal)
+        self.server = self._first_server()
         self.server.start()
         self._started = wall(), time.monotonic()
         self._proxy = Proxy(self.server.address)
@@ -137,6 +136,9 @@ class Torture:
         for actor in (*self.writers, *self.readers, *self.watchers, *self.leavers):
             actor.start()
         self.shared.gate.set()
+
+    def _first_server(self) -> Server:
+        return Server(self._folder, self._options, self._journal)
 
     def _new_reader(self, target: str = "") -> Reader:
         return Reader(self.shared, HULL, self.acknowledged, target)
