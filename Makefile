@@ -179,8 +179,9 @@ CONTRACT = tests/client
 upgrade: .venv/.test  ## from BASE, an earlier commit: a cluster is upgraded beside callers, and the tests of the client run across the two versions
 	$(BIN)/python tests/robustness/cluster/earlier.py $(BASE) -- $(CONTRACT)
 
-ray: .venv/.test  ## all tests of Ray: Datasets, and as a launcher of servers; `make test` runs the cheap ones
+ray: .venv/.test .venv/.peers  ## all tests of Ray: Datasets, and as a launcher of servers, with a torture; `make test` runs the cheap ones
 	RAY_CASES=all $(BIN)/pytest tests/ray
+	$(BIN)/python tests/robustness/cluster/ray_torture.py --faults 11
 
 ends: .venv/.test  ## whatever waits in the SDK is cancelled and closed after each of 41 steps beside servers that have failed: how long it takes
 	CLIENT_CASES=all $(BIN)/pytest tests/client/test_ends.py -s
