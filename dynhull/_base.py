@@ -109,7 +109,7 @@ class Live(Shown):
         return self._tree.locate(xy)
 
     def vertex_rows(self, xy: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """(h,) rows of (k, 2) points: for each of `vertices` the first row that is that point. O(k + h log n).
+        """(h,) rows of (k, 2) points: for each of `vertices` the first row that is that point. O(k log n).
 
         With the points that a hull was made of, these are the rows of a table that are its corners, as
         `scipy.spatial.ConvexHull.vertices`.
@@ -123,8 +123,9 @@ class Live(Shown):
         [0, 1, 3]
         """
         vertices, points = self.vertices(), self._as_points(xy)
+        on_boundary = np.flatnonzero(self.locate(points) == 0)
         first: dict[tuple[float, float], int] = {}
-        for row, point in enumerate(as_tuples(points)):
+        for row, point in zip(on_boundary.tolist(), as_tuples(points[on_boundary]), strict=True):
             first.setdefault(point, row)
         missing = [vertex for vertex in as_tuples(vertices) if vertex not in first]
         if missing:

@@ -342,13 +342,13 @@ def as_convex(shape: Set, name: str = "shape") -> Convex:
         raise ValueError(f"{name} has no points: an empty set has no support function")
     if points.shape[1] != 2:
         return Cloud(points)
-    hull = polygon(points)
-    if is_geometry(shape) and not _is_convex(geojson_of(shape), points, convex_hull(points)):
+    hull = convex_hull(points)
+    if is_geometry(shape) and not _is_convex(geojson := geojson_of(shape), points, hull):
         raise ValueError(
-            f"{name} is a {geojson_of(shape)['type']} that is not convex: give its convex hull, or a list of convex "
-            "parts, as dynhull.decompose.convex_pieces makes of a polygon"
+            f"{name} is a {geojson['type']} that is not convex: give its convex hull, or a list of convex parts, as "
+            "dynhull.decompose.convex_pieces makes of a polygon"
         )
-    return hull
+    return Cloud(hull)
 
 
 def _is_convex(geojson: Mapping[str, Any], points: Points, hull: Points) -> bool:

@@ -99,7 +99,7 @@ def _span(seconds: float | timedelta, name: str) -> Duration | None:
 
 
 def documenting(settings: type, spans: str = "") -> Callable[[Documented], Documented]:
-    """Put the lines about the settings into a docstring ; `spans` says what time spans are."""
+    """Put the lines about the settings into a docstring; `spans` says what time spans are."""
 
     def document(documented: Documented) -> Documented:
         lines = []

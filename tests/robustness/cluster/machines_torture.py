@@ -209,16 +209,9 @@ class Torture(postgres_torture.Torture):
         self._begins()
         self._order("anywhere")
 
-    def finish(self) -> None:
-        self.shared.over.set()
-        self.shared.gate.set()
-        self._channel.close()
-        self._proxy.close()
+    def _end_servers(self) -> None:
         for machine in self._machines():
             machine.kill()
-        for wire in self._wires:
-            wire.close()
-        self._database.stop()
 
 
 KINDS = [

@@ -149,15 +149,8 @@ class Torture(postgres_torture.Torture):
         self._proxy.cut()
         self._balanced()
 
-    def finish(self) -> None:
-        self.shared.over.set()
-        self.shared.gate.set()
-        self._channel.close()
-        self._proxy.close()
+    def _end_servers(self) -> None:
         self.server.kill()
-        for wire in self._wires:
-            wire.close()
-        self._database.stop()
 
 
 def run(folder: Path, options: argparse.Namespace) -> str:

@@ -465,6 +465,9 @@ class Torture:
         self.shared.gate.set()
         self._channel.close()
         self._proxy.close()
+        self._end_servers()
+
+    def _end_servers(self) -> None:
         self.server.process.terminate()
         self.server.process.wait()
 

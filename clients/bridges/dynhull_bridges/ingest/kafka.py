@@ -42,7 +42,7 @@ class Kafka:
         group: str,
         ping_interval: float = PING_INTERVAL,
     ) -> None:
-        self._timeout = round(3000 * ping_interval)  # milliseconds
+        self._timeout = _request_timeout(ping_interval)
         self._silence = 1.5 * ping_interval
         self._wait = min(WAIT, round(250 * ping_interval))
         self._heard = 0.0  # when the broker was heard last
@@ -188,7 +188,7 @@ class Topic:
             ValueError: the topic has no such partition, or the broker refuses for good.
             FeedError: no broker answers, or it refuses for now.
         """
-        timeout = round(3000 * self._ping_interval)
+        timeout = _request_timeout(self._ping_interval)
         admin = AIOKafkaAdminClient(bootstrap_servers=self._servers, request_timeout_ms=timeout)
         try:
             await admin.start()
@@ -212,6 +212,11 @@ class Topic:
     def _partition(self, number: int) -> Kafka:
         producer = f"{self._producer}/{number}" if self._producer else None
         return Kafka(self._servers, self._name, number, producer, self._group, self._ping_interval)
+
+
+def _request_timeout(ping_interval: float) -> int:
+    """Milliseconds that a request may take."""
+    return round(3000 * ping_interval)
 
 
 def _failure(error: KafkaError | OSError) -> Exception:

@@ -101,6 +101,6 @@ def feature(key: Key, lonlat: list[float], time: np.datetime64 | None) -> dict[s
     return {
         "type": "Feature",
         "id": key,
-        "geometry": {"type": "Point", "coordinates": [in_range(lonlat[0]), lonlat[1]]},
+        "geometry": {"type": "Point", "coordinates": [in_range(np.array(lonlat[0])).item(), lonlat[1]]},
         "properties": {"key": key, **when},
     }

@@ -37,15 +37,9 @@ class Found:
     matched: int | None
 
 
-def in_range(lon: float) -> float:
-    """A longitude of -360 to 360 degrees as one of -180 to 180, as CRS84 has them."""
-    return lon if abs(lon) <= 180 else lon - 360 if lon > 0 else lon + 360
-
-
-def turned(lonlat: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """(n, 2) places with longitudes from -180 to 180."""
-    lon = lonlat[:, 0]
-    return np.column_stack([np.where(np.abs(lon) <= 180, lon, lon - np.copysign(360, lon)), lonlat[:, 1]])
+def in_range(lon: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Longitudes of -360 to 360 degrees as ones of -180 to 180, as CRS84 has them."""
+    return np.where(np.abs(lon) <= 180, lon, lon - np.copysign(360, lon))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +67,13 @@ class Box:
             )
         if east - west >= 360:
             west, east = -180.0, 180.0
-        elif west < -180 or east > 180 or west > 180 or east < -180:
-            west, east = in_range(west), in_range(east)
+        else:
+            west, east = in_range(np.array([west, east])).tolist()
         return cls(west, south, east, north)
 
     def holds(self, lonlat: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
         """Which of (n, 2) places are in the box; 180 and -180 degrees are one meridian."""
-        lon, lat = turned(lonlat)[:, 0], lonlat[:, 1]
+        lon, lat = in_range(lonlat[:, 0]), lonlat[:, 1]
         in_lon = (
             (self.west <= lon) & (lon <= self.east)
             if self.west <= self.east
