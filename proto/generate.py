@@ -1,6 +1,10 @@
-"""Generate the Python package dynhull_proto from the .proto files: `generate.py`, or `generate.py --check`."""
+"""Generate the Python package dynhull_proto from the .proto files: `generate.py`, or `generate.py --check`.
+
+The counts of batches are described in dynhull_surface, and come from there into the .proto files first.
+"""
 
 import argparse
+import re
 import sys
 import tempfile
 from importlib import resources
@@ -8,9 +12,22 @@ from pathlib import Path
 
 from grpc_tools import protoc
 
+from dynhull_surface.counts import COUNTS
+
 PROTO = Path(__file__).parent
 CONTRACT = PROTO / "dynhull"
 PACKAGE = PROTO / "dynhull_proto"
+# Of a message, between a line that ends so and the other.
+FIELDS = re.compile(r"(`make proto`.*\n\n)(?:.*\n)*?(  // End of counts)")
+COUNT_FIELDS = {
+    CONTRACT / "v1" / "batch.proto": "\n".join(
+        f"  // {each.meaning[0].upper()}{each.meaning[1:]}.\n  uint64 {name} = {each.number};\n"
+        for name, each in COUNTS.items()
+    ),
+    CONTRACT / "v1" / "hull_service.proto": "".join(
+        f"  uint64 {name} = {each.sum_number};\n" for name, each in COUNTS.items()
+    ),
+}
 
 
 def generate(out: Path) -> None:
@@ -50,7 +67,14 @@ def main() -> None:
     """Generate, or with --check fail where the committed package is not what would be generated."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="fail where dynhull_proto is stale, change nothing")
-    if not parser.parse_args().check:
+    check = parser.parse_args().check
+    for proto, fields in COUNT_FIELDS.items():
+        text = proto.read_text()
+        filled = FIELDS.sub(rf"\g<1>{fields}\n\g<2>", text)
+        if check and filled != text:
+            sys.exit(f"stale, run `make proto`: {proto}")
+        proto.write_text(filled)
+    if not check:
         generate(PROTO)
         return
     with tempfile.TemporaryDirectory() as folder:

@@ -1,9 +1,14 @@
-"""How a setting is described."""
+"""How what is described once is said: settings, and lists in docstrings."""
 
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import Field, field, fields
 from functools import lru_cache
+from textwrap import fill
 from types import NoneType
-from typing import Any, Literal, NamedTuple, get_args, get_origin
+from typing import Any, Literal, NamedTuple, TypeVar, get_args, get_origin
+
+Documented = TypeVar("Documented", bound=Callable[..., Any])
 
 LARGEST = 2**63 - 1  # integer that the server stores
 
@@ -82,3 +87,21 @@ def _setting(described: Field[Any]) -> Setting:
     kinds = get_args(described.type)
     kind = next(each for each in kinds if each is not NoneType) if NoneType in kinds else described.type
     return Setting(described.name, kind, described.default, **described.metadata)
+
+
+def documenting(word: str, meanings: Mapping[str, str]) -> Callable[[Documented], Documented]:
+    """Put names and their meanings into a docstring, in place of a line with a word."""
+
+    def document(documented: Documented) -> Documented:
+        if documented.__doc__ is not None:  # python -OO leaves them out
+            line = re.compile(f"^( *){word}$", re.MULTILINE)
+            documented.__doc__ = line.sub(lambda found: _said(meanings, found[1]), documented.__doc__)
+        return documented
+
+    return document
+
+
+def _said(meanings: Mapping[str, str], indent: str) -> str:
+    """Names and meanings as lines of a docstring."""
+    lines = (f"{name}: {meaning[0].lower()}{meaning[1:].rstrip('.')}." for name, meaning in meanings.items())
+    return "\n".join(fill(line, 120, initial_indent=indent, subsequent_indent=f"{indent}    ") for line in lines)

@@ -41,7 +41,7 @@ from ._messages import (
     Verification,
 )
 from ._quarantine_messages import encode_quarantine
-from ._settings import SPAN, documenting
+from ._settings import SPAN, documenting_settings
 from ._times import encode_duration
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class Call(Generic[Answer]):
 Pages = Callable[[str], Call[tuple[list[Answer], str]]]
 
 
-@documenting(HullSettings, SPAN)
+@documenting_settings(HullSettings, SPAN)
 def create_hull(  # noqa: D417  # the settings have their descriptions
     name: str,
     *,

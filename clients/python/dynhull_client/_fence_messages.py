@@ -9,7 +9,7 @@ from dynhull_surface.settings import FenceSettings
 
 from ._areas import Area, Prefix, decode_area
 from ._keys import KeyTuple, decode_names
-from ._settings import decode_settings, documenting
+from ._settings import decode_settings, documenting_settings
 from ._times import decode_time
 
 EventType = Literal[
@@ -79,7 +79,7 @@ class FenceConsumer:
     lost: int
 
 
-@documenting(FenceSettings)
+@documenting_settings(FenceSettings)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fence(FenceSettings):
     """A fence with its settings, as given to `create_fence`, its counts and its consumers.

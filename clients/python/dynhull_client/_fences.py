@@ -24,7 +24,7 @@ from ._fence_messages import (
     decode_fence,
     decode_inside,
 )
-from ._settings import SPAN, documenting, encode_settings
+from ._settings import SPAN, documenting_settings, encode_settings
 from ._times import encode_duration
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 COMPARED = [each.name for each in fields(FenceSettings) if each.name not in ("name", "initial")]
 
 
-@documenting(FenceSettings, SPAN)
+@documenting_settings(FenceSettings, SPAN)
 def create_fence(  # noqa: D417  # the settings have their descriptions
     name: str,
     area: Any,

@@ -16,6 +16,8 @@ from dynhull.arrays import Points as Points
 from dynhull.keys import Keys, KeyType
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
 from dynhull_surface.counts import COUNTS
+from dynhull_surface.counts import Applied as Applied
+from dynhull_surface.counts import Ingested as Ingested
 from dynhull_surface.settings import Ahead, Clock, Ordering
 
 from ._keys import KeyTuple, decode_keys, decode_names, join_keys
@@ -156,77 +158,6 @@ class Hull(Value, Shown):
             f"<figure>{picture}<figcaption><b>{escape(info.name)}</b> at revision "
             f"{info.revision}: {caption}</figcaption></figure>"
         )
-
-
-@dataclass(frozen=True, slots=True)
-class Applied:
-    """The effect of a batch.
-
-    Attributes:
-        revision: the hull's revision after it.
-        inserted: points inserted, with the destinations of moves; in a keyed hull, new keys.
-        deleted: points deleted, with the origins of moves; in a keyed hull, keys removed.
-        missing: points to delete or keys to remove that were skipped because the hull did not hold them.
-        hull_changed: whether the vertices changed.
-        points: the number of points after it.
-        duplicate: whether it had been applied before: its counts are 0, and the revision is one that includes it.
-        moved: known keys whose position was written.
-        stale: positions left out because the stored one has a later event time.
-        late: rows left out because they are too old for the window.
-        skipped: positions left out because of `only`.
-        clamped: rows whose event time was too far ahead and was reduced.
-        evicted: the oldest points, removed because the window has room for no more.
-        clock: the hull's clock after it; None for a hull without one.
-        held: positions put into quarantine, because they break a rule of the hull.
-        held_rows: the rows of the batch that these are, ascending.
-        released: keys that left the quarantine and were let in: by request, or because their position was confirmed.
-        dropped: keys whose held position was dropped: by request, contradicted by one that was let in, or removed.
-    """
-
-    revision: int
-    inserted: int
-    deleted: int
-    missing: int
-    hull_changed: bool
-    points: int
-    duplicate: bool = False
-    moved: int = 0
-    stale: int = 0
-    late: int = 0
-    skipped: int = 0
-    clamped: int = 0
-    evicted: int = 0
-    clock: datetime | None = None
-    held: int = 0
-    held_rows: tuple[int, ...] = ()
-    released: int = 0
-    dropped: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Ingested:
-    """The effect of all `batches` of an ingest, and the hull's revision and number of points after the last one.
-
-    `duplicates` counts the batches that an earlier call of the same producer had applied before. The other counts are
-    sums of those in `Applied`.
-    """
-
-    batches: int
-    revision: int
-    inserted: int
-    deleted: int
-    missing: int
-    points: int
-    duplicates: int = 0
-    moved: int = 0
-    stale: int = 0
-    late: int = 0
-    skipped: int = 0
-    clamped: int = 0
-    evicted: int = 0
-    held: int = 0
-    released: int = 0
-    dropped: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from datetime import timedelta
-from textwrap import fill
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from google.protobuf.duration_pb2 import Duration
 
 from dynhull.arrays import as_coordinate
-from dynhull_surface.described import described
+from dynhull_surface.described import described, documenting
 
 from ._arguments import choice, flag, whole
 from ._times import encode_duration
@@ -19,10 +18,8 @@ if TYPE_CHECKING:
 
     from google.protobuf.message import Message
 
-    from dynhull_surface.described import Setting
+    from dynhull_surface.described import Documented, Setting
 
-Documented = TypeVar("Documented", bound="Callable[..., Any]")
-INDENT = " " * 8
 SPAN = " Seconds or a timedelta."  # of an argument that is a time span
 
 
@@ -98,17 +95,7 @@ def _span(seconds: float | timedelta, name: str) -> Duration | None:
     return None
 
 
-def documenting(settings: type, spans: str = "") -> Callable[[Documented], Documented]:
+def documenting_settings(settings: type, spans: str = "") -> Callable[[Documented], Documented]:
     """Put the lines about the settings into a docstring; `spans` says what time spans are."""
-
-    def document(documented: Documented) -> Documented:
-        lines = []
-        for each in described(settings):
-            meaning = each.meaning[0].lower() + each.meaning[1:]
-            said = f"{each.name}: {meaning}{spans if each.kind is timedelta else ''}"
-            lines.append(fill(said, 120, initial_indent=INDENT, subsequent_indent=INDENT + "    "))
-        if documented.__doc__ is not None:  # python -OO leaves them out
-            documented.__doc__ = documented.__doc__.replace(f"{INDENT}SETTINGS", "\n".join(lines))
-        return documented
-
-    return document
+    said = {each.name: f"{each.meaning}{spans if each.kind is timedelta else ''}" for each in described(settings)}
+    return documenting("SETTINGS", said)

@@ -101,41 +101,41 @@ class Moves(_message.Message):
     def __init__(self, origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., destinations: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class BatchResult(_message.Message):
-    __slots__ = ("revision", "inserted", "deleted", "missing", "hull_changed", "point_count", "duplicate", "moved", "stale", "late", "skipped", "clamped", "evicted", "clock_time", "held", "held_rows", "released", "dropped")
+    __slots__ = ("revision", "hull_changed", "point_count", "duplicate", "clock_time", "held_rows", "inserted", "deleted", "missing", "moved", "stale", "late", "skipped", "clamped", "evicted", "held", "released", "dropped")
     REVISION_FIELD_NUMBER: _ClassVar[int]
-    INSERTED_FIELD_NUMBER: _ClassVar[int]
-    DELETED_FIELD_NUMBER: _ClassVar[int]
-    MISSING_FIELD_NUMBER: _ClassVar[int]
     HULL_CHANGED_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     DUPLICATE_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
+    HELD_ROWS_FIELD_NUMBER: _ClassVar[int]
+    INSERTED_FIELD_NUMBER: _ClassVar[int]
+    DELETED_FIELD_NUMBER: _ClassVar[int]
+    MISSING_FIELD_NUMBER: _ClassVar[int]
     MOVED_FIELD_NUMBER: _ClassVar[int]
     STALE_FIELD_NUMBER: _ClassVar[int]
     LATE_FIELD_NUMBER: _ClassVar[int]
     SKIPPED_FIELD_NUMBER: _ClassVar[int]
     CLAMPED_FIELD_NUMBER: _ClassVar[int]
     EVICTED_FIELD_NUMBER: _ClassVar[int]
-    CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
     HELD_FIELD_NUMBER: _ClassVar[int]
-    HELD_ROWS_FIELD_NUMBER: _ClassVar[int]
     RELEASED_FIELD_NUMBER: _ClassVar[int]
     DROPPED_FIELD_NUMBER: _ClassVar[int]
     revision: int
-    inserted: int
-    deleted: int
-    missing: int
     hull_changed: bool
     point_count: int
     duplicate: bool
+    clock_time: _timestamp_pb2.Timestamp
+    held_rows: _containers.RepeatedScalarFieldContainer[int]
+    inserted: int
+    deleted: int
+    missing: int
     moved: int
     stale: int
     late: int
     skipped: int
     clamped: int
     evicted: int
-    clock_time: _timestamp_pb2.Timestamp
     held: int
-    held_rows: _containers.RepeatedScalarFieldContainer[int]
     released: int
     dropped: int
-    def __init__(self, revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., hull_changed: bool = ..., point_count: _Optional[int] = ..., duplicate: bool = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., held: _Optional[int] = ..., held_rows: _Optional[_Iterable[int]] = ..., released: _Optional[int] = ..., dropped: _Optional[int] = ...) -> None: ...
+    def __init__(self, revision: _Optional[int] = ..., hull_changed: bool = ..., point_count: _Optional[int] = ..., duplicate: bool = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., held_rows: _Optional[_Iterable[int]] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., held: _Optional[int] = ..., released: _Optional[int] = ..., dropped: _Optional[int] = ...) -> None: ...

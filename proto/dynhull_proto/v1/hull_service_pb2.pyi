@@ -219,14 +219,14 @@ class IngestRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., batch: _Optional[_Union[_batch_pb2.Batch, _Mapping]] = ..., producer: _Optional[str] = ..., sequence: _Optional[int] = ..., may_skip: bool = ..., after_sequence: _Optional[int] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class IngestResponse(_message.Message):
-    __slots__ = ("batches", "revision", "inserted", "deleted", "missing", "point_count", "duplicates", "moved", "stale", "late", "skipped", "clamped", "evicted", "held", "released", "dropped")
+    __slots__ = ("batches", "revision", "point_count", "duplicates", "inserted", "deleted", "missing", "moved", "stale", "late", "skipped", "clamped", "evicted", "held", "released", "dropped")
     BATCHES_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    DUPLICATES_FIELD_NUMBER: _ClassVar[int]
     INSERTED_FIELD_NUMBER: _ClassVar[int]
     DELETED_FIELD_NUMBER: _ClassVar[int]
     MISSING_FIELD_NUMBER: _ClassVar[int]
-    POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
-    DUPLICATES_FIELD_NUMBER: _ClassVar[int]
     MOVED_FIELD_NUMBER: _ClassVar[int]
     STALE_FIELD_NUMBER: _ClassVar[int]
     LATE_FIELD_NUMBER: _ClassVar[int]
@@ -238,11 +238,11 @@ class IngestResponse(_message.Message):
     DROPPED_FIELD_NUMBER: _ClassVar[int]
     batches: int
     revision: int
+    point_count: int
+    duplicates: int
     inserted: int
     deleted: int
     missing: int
-    point_count: int
-    duplicates: int
     moved: int
     stale: int
     late: int
@@ -252,7 +252,7 @@ class IngestResponse(_message.Message):
     held: int
     released: int
     dropped: int
-    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., held: _Optional[int] = ..., released: _Optional[int] = ..., dropped: _Optional[int] = ...) -> None: ...
+    def __init__(self, batches: _Optional[int] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., duplicates: _Optional[int] = ..., inserted: _Optional[int] = ..., deleted: _Optional[int] = ..., missing: _Optional[int] = ..., moved: _Optional[int] = ..., stale: _Optional[int] = ..., late: _Optional[int] = ..., skipped: _Optional[int] = ..., clamped: _Optional[int] = ..., evicted: _Optional[int] = ..., held: _Optional[int] = ..., released: _Optional[int] = ..., dropped: _Optional[int] = ...) -> None: ...
 
 class StreamRequest(_message.Message):
     __slots__ = ("name", "batch", "producer", "sequence", "batches", "accept_results", "may_skip", "after_sequence", "uid")

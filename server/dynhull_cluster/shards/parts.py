@@ -13,6 +13,7 @@ from dynhull_server.state.contents import keyed, windowed
 from dynhull_server.state.contents.multiset import missing_point
 from dynhull_server.state.errors import KeyMissingError, PointMissingError, RefusedError
 from dynhull_server.state.records import KeyRows, Keys
+from dynhull_surface.counts import COUNTS
 
 from .placement import Hashes, key_hashes, point_hashes, shards_of
 
@@ -70,17 +71,9 @@ def merged(
     admitted: Admitted, effects: Sequence[Applied], revision: int, *, hull_changed: bool, points: int
 ) -> Applied:
     """The effect of a batch whose parts had these effects."""
-    applied = Applied(
-        revision,
-        sum(each.inserted for each in effects),
-        sum(each.deleted for each in effects),
-        sum(each.missing for each in effects),
-        hull_changed,
-        points,
-        moved=sum(each.moved for each in effects),
-        stale=sum(each.stale for each in effects),
-        skipped=sum(each.skipped for each in effects),
-    )
+    applied = Applied(revision, 0, 0, 0, hull_changed, points)
+    for name in COUNTS.keys() - {"held"}:  # a hull over shards has no quarantine
+        setattr(applied, name, sum(getattr(each, name) for each in effects))
     if not isinstance(admitted, Batch):
         applied.late, applied.clamped, applied.clock = admitted.late, admitted.clamped, admitted.clock
     return applied

@@ -19,7 +19,7 @@ class Figures:
 
         self.messages = counter("messages", "Messages read.")
         self.points = counter("points", "Points acknowledged by the server.")
-        self.counts = {name: counter(name, f"Of the points, {text}.") for name, text in COUNTS.items()}
+        self.counts = {name: counter(name, f"Of the points, {each.meaning}.") for name, each in COUNTS.items()}
         self.bad = counter("bad", "Messages that could not be taken.")
         self.lost = counter("lost", "Messages, at most, that the broker removed before they were read.")
         self.restarts = counter("restarts", "Times that the feed began again after an error of the broker.")
