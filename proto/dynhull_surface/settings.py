@@ -22,7 +22,7 @@ DEEPEST_LAYER = 1000
 WINDOW = "max_age", "max_points"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)  # nobody makes one
 class HullSettings:
     """The settings of a hull, fixed from its creation."""
 
@@ -91,7 +91,7 @@ class HullSettings:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)  # nobody makes one
 class FenceSettings:
     """What a fence compares, and when it makes events."""
 

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable
 from copy import copy
+from functools import cache
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 
 import grpc
@@ -87,19 +88,24 @@ def documented(method: Function, describe: Function, returns: str, without: str 
 
     Annotations are shown as the source has them: numpy's ArrayLike alone fills five lines otherwise.
     """
-    described = inspect.signature(describe)
-    this = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
-    parameters = [
-        parameter.replace(annotation=Annotation(parameter.annotation.replace("npt.", "")))
-        for parameter in described.parameters.values()
-        if parameter.kind != inspect.Parameter.VAR_POSITIONAL  # takes nothing: see `calls.apply`
-        and parameter.name != without
-    ]
+    parameters = [each for each in _parameters(describe) if each.name != without]
     method.__name__ = method.__qualname__ = describe.__name__
     method.__doc__ = _undocumented(describe.__doc__, without)
-    method.__signature__ = described.replace(  # type: ignore[attr-defined]
-        parameters=[this, *parameters], return_annotation=Annotation(returns)
+    method.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        parameters, return_annotation=Annotation(returns)
     )
+
+
+@cache  # both clients have a method of most
+def _parameters(describe: Function) -> list[inspect.Parameter]:
+    return [
+        inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY),
+        *(
+            parameter.replace(annotation=Annotation(parameter.annotation.replace("npt.", "")))
+            for parameter in inspect.signature(describe).parameters.values()
+            if parameter.kind != inspect.Parameter.VAR_POSITIONAL  # takes nothing: see `calls.apply`
+        ),
+    ]
 
 
 def _undocumented(documentation: str | None, argument: str) -> str | None:
