@@ -28,6 +28,14 @@ class HullSettings:
 
     name: str
     keyed: Keyed | None = setting(None, "identity", "Kind of the keys. Default: the points of the hull have none.")
+    ordering: Ordering = setting(
+        "arrival",
+        "ordering",
+        "Which of two positions of a key is the later one: the one that arrives last (arrival), or the one with the "
+        "later event time (event_time): an older one then changes nothing.",
+        needs=("keyed",),
+        flag=Flag("--event-order", "event_time", "Of two positions of a key, keep the one with the later event time."),
+    )
     max_age: timedelta | None = setting(None, "window.max_age", "Age at which points leave. Default: never.")
     max_points: int | None = setting(
         None,
@@ -46,22 +54,14 @@ class HullSettings:
         None,
         "window.max_skew",
         "How far an event time may be ahead of the server's clock. Default: any distance.",
-        needs=WINDOW,
+        needs=(*WINDOW, "ordering"),
     )
     ahead: Ahead = setting(
         "refuse",
         "window.ahead",
         "What happens to event times further ahead: refuse the batch, or clamp the time to the latest allowed.",
-        needs=WINDOW,
+        needs=(*WINDOW, "max_skew"),
         flag=Flag("--clamp", "clamp", "Reduce event times further ahead to the latest allowed."),
-    )
-    ordering: Ordering = setting(
-        "arrival",
-        "ordering",
-        "Which of two positions of a key is the later one: the one that arrives last (arrival), or the one with the "
-        "later event time (event_time): an older one then changes nothing.",
-        needs=("keyed",),
-        flag=Flag("--event-order", "event_time", "Of two positions of a key, keep the one with the later event time."),
     )
     point_limit: int | None = setting(
         None,

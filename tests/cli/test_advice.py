@@ -78,8 +78,13 @@ LOADS = [
     ("create {name} --max-speed 5", "--max-speed is given with --keyed", "create {name} --max-speed 5 --keyed str"),
     (
         "create {name} --clamp",
-        "--clamp is given with --max-age or --max-points",
+        "--clamp is given with --max-age or --max-points or --max-skew",
         "create {name} --clamp --max-skew 1m --max-age 5m",
+    ),
+    (
+        "create {name} --max-skew 1m",
+        "--max-skew is given with --event-order or --max-age or --max-points",
+        "create {name} --keyed str --event-order --max-skew 1m",
     ),
     ("insert {name} 1,2", "`dynhull list`", "list"),
     ("insert {name} 1,2", "`dynhull create`", "create {name}; insert {name} 1,2"),

@@ -23,6 +23,7 @@ from dynhull_client import (
     HullUnsuitableError,
     InvalidRequestError,
     KeyMissingError,
+    Window,
 )
 
 FLEET = ["LH400", "UA17", "AF84", "BA2"]
@@ -126,12 +127,29 @@ def test_settings_are_kept_and_compared(client: HullClient, name: str) -> None:
         ({"keyed": "float"}, "keyed must be one of None, 'str', 'int', got 'float'"),
         ({"max_points": 0}, "max_points must be at least 1, got 0"),
         ({"clock": "data"}, "give max_age or max_points, too"),
+        ({"ahead": "clamp"}, "give max_skew, max_age or max_points, too"),
+        ({"max_skew": 1}, 'max_age, max_points or ordering="event_time"'),
+        (
+            {"max_skew": 1, "keyed": "str", "ordering": "event_time", "clock": "data"},
+            "clock is a setting of a window: give max_age or max_points, too",
+        ),
         ({"max_age": "30m"}, "max_age is '30m': must be a finite number of seconds or a timedelta"),
     ):
         with pytest.raises(ValueError, match=words):
             client.create_hull(f"{name}/bad", **bad)
     with pytest.raises(InvalidRequestError, match="max_age"):
         client.create_hull(f"{name}/bad", max_age=-1)
+
+
+def test_a_time_of_the_distant_future_is_refused_without_a_window(client: HullClient, name: str) -> None:
+    info = client.create_hull(name, keyed="str", ordering="event_time", max_skew=60)
+    assert info.window == Window(max_skew=timedelta(minutes=1))
+    client.create_hull(name, keyed="str", ordering="event_time", max_skew=60, exist_ok=True)
+    client.put(name, ["a", "b"], [[0, 0], [1, 1]], [NOON, NOON])
+    with pytest.raises(InvalidRequestError, match="further ahead of the server's clock") as refused:
+        client.put(name, ["b", "a"], [[3, 3], [2, 2]], [NOON, datetime(2099, 1, 1, tzinfo=UTC)])
+    assert refused.value.row == 1
+    assert client.put(name, ["a"], [[2, 2]], [NOON + timedelta(hours=1)]).moved == 1
 
 
 def test_a_window_by_event_time(client: HullClient, name: str) -> None:

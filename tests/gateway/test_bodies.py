@@ -286,6 +286,18 @@ def test_rows_say_when_keys_leave_and_which_keys_are_put(gateway: Gateway, name:
     assert (wrong.status, "ttl" in wrong.json["detail"]) == (400, True)
 
 
+def test_a_row_of_the_distant_future_is_a_bad_row_without_a_window_too(gateway: Gateway, name: str) -> None:
+    made = gateway.post("/hulls", {"name": name, "keyed": "str", "max_skew": 60, "ordering": "event_time"})
+    assert (made.json["window"]["max_age"], made.json["window"]["max_skew"]) == (None, 60)
+    rows = b"key,x,y,time\na,1,2,2099-01-01T00:00Z\na,3,4,2026-01-01T00:00Z\n"
+    done = gateway.post(f"/hulls/{name}/rows?max_bad=1", rows, CSV).json
+    (bad,) = done["bad"]
+    assert (done["inserted"], bad["row"], "further ahead of the server's clock" in bad["detail"]) == (1, 0, True)
+    refused = gateway.post("/hulls", {"name": f"{name}/b", "keyed": "str", "max_skew": 60})
+    assert (refused.status, refused.json["field"]) == (400, "max_skew"), refused.json
+    assert "ordering event_time or max_age or max_points" in refused.json["detail"]
+
+
 @pytest.mark.parametrize("numbered", [False, True])
 def test_bad_rows_are_left_out_as_far_as_they_may_be(gateway: Gateway, name: str, numbered: bool) -> None:
     """Rows that cannot be read, that are not like the others, and that the server refuses: in each of three batches."""

@@ -298,6 +298,7 @@ BAD_WINDOWS = {
     "a clock of the future": (window(1, clock=9), "config.window.clock", "9"),
     "a negative skew": (window(1, max_skew=Duration(seconds=-1)), "config.window.max_skew", "-1 s and 0 ns"),
     "a policy of the future": (window(1, ahead=9), "config.window.ahead", "9"),
+    "a skew without an order": (window(max_skew=Duration(seconds=1)), "config.window", "empty"),
     "too many points": (window(max_points=2**63), "config.window.max_points", str(2**63)),
 }
 BAD_CONFIGS = {case: (hull_pb2.HullConfig(window=each), *rest) for case, (each, *rest) in BAD_WINDOWS.items()} | {
@@ -306,6 +307,15 @@ BAD_CONFIGS = {case: (hull_pb2.HullConfig(window=each), *rest) for case, (each, 
         hull_pb2.HullConfig(ordering=hull_pb2.ORDERING_EVENT_TIME),
         "config.ordering",
         "ORDERING_EVENT_TIME",
+    ),
+    "a clock of event times without a window": (
+        hull_pb2.HullConfig(
+            identity=STRINGS,
+            ordering=hull_pb2.ORDERING_EVENT_TIME,
+            window=window(max_skew=Duration(seconds=1), clock=hull_pb2.CLOCK_DATA),
+        ),
+        "config.window.clock",
+        "CLOCK_DATA",
     ),
 }
 

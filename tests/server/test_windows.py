@@ -40,8 +40,11 @@ def stub(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
         yield HullServiceStub(channel)
 
 
-def create(stub: HullServiceStub, name: str, window: hull_pb2.Window | None = None, identity: int = STRINGS) -> None:
-    stub.CreateHull(pb.CreateHullRequest(name=name, config=hull_pb2.HullConfig(identity=identity, window=window)))
+def create(
+    stub: HullServiceStub, name: str, window: hull_pb2.Window | None = None, identity: int = STRINGS, ordering: int = 0
+) -> None:
+    config = hull_pb2.HullConfig(identity=identity, window=window, ordering=ordering)
+    stub.CreateHull(pb.CreateHullRequest(name=name, config=config))
 
 
 def apply(stub: HullServiceStub, name: str, batch: batch_pb2.Batch) -> batch_pb2.BatchResult:
@@ -98,6 +101,26 @@ def test_late_points_are_not_inserted_and_early_ones_are_refused_or_clamped(stub
     batch = insert(0, 0, 1, 0, 2, 0, at=(now - 3600 * SECOND, now - SECOND, now + 3600 * SECOND))
     assert counts(apply(stub, lenient, batch)) == {"inserted": 2, "late": 1, "clamped": 1}
     assert everything(stub, lenient) == [1, 0, 2, 0]
+
+
+def test_a_time_ahead_does_not_keep_a_key_without_a_window(stub: HullServiceStub, name: str) -> None:
+    """Nobody leaves a hull that has only a limit on times, however old."""
+    now, order = int(time.time() * SECOND), hull_pb2.ORDERING_EVENT_TIME
+    strict, lenient, limit = f"{name}-strict", f"{name}-lenient", Duration(seconds=30)
+    create(stub, strict, window(max_skew=limit), ordering=order)
+    create(stub, lenient, window(max_skew=limit, ahead=hull_pb2.AHEAD_POLICY_CLAMP), ordering=order)
+    for each in (strict, lenient):
+        assert counts(apply(stub, each, puts({"a": (0, 0), "b": (9, 0)}, at=[T, T]))) == {"inserted": 2}
+    far = puts({"b": (1, 0), "a": (5, 5)}, at=[now, now + 3600 * SECOND])
+    code, info, _ = refusal(lambda: apply(stub, strict, far))
+    assert (code, info.metadata["field"], info.metadata["row"]) == (INVALID, "batch.puts.times", "1")
+    assert everyone(stub, strict) == {"a": (0, 0), "b": (9, 0)}
+    assert counts(apply(stub, lenient, far)) == {"moved": 2, "clamped": 1}
+    for each in (strict, lenient):
+        assert counts(apply(stub, each, puts({"a": (2, 0)}, at=[now + 3600 * SECOND] if each == lenient else [now])))
+        assert everyone(stub, each)["a"] == (2, 0)
+        assert stub.Verify(pb.VerifyRequest(name=each)).keys_equal
+    assert counts(apply(stub, strict, puts({"a": (3, 0)}, at=[now - SECOND]))) == {"stale": 1}
 
 
 def test_a_clock_of_event_times(stub: HullServiceStub, name: str) -> None:

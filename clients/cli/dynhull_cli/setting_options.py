@@ -57,7 +57,8 @@ def settings_options(settings: type, panel: str | None = None, *, creating: bool
         unusual = {each.name for each in offered if chosen[each.name] != each.usual}
         for each in offered:
             if each.needs and each.name in unusual and unusual.isdisjoint(each.needs):
-                raise ValueError(f"{each.option} is given with {' or '.join(map(option_of, each.needs))}")
+                needed = (other.option for other in offered if other.name in each.needs)
+                raise ValueError(f"{each.option} is given with {' or '.join(needed)}")
         return chosen
 
     make.__signature__ = inspect.Signature([_parameter(each, panel) for each in offered])  # type: ignore[attr-defined]

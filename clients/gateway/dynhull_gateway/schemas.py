@@ -190,7 +190,7 @@ class PresentRules(Response):
 
 @answering(sdk.Window)
 class Window(Response):
-    """A hull's sliding window."""
+    """A hull's sliding window; without `max_age` and `max_points`, only what event times may be."""
 
 
 @answering(sdk.HullInfo)

@@ -1,6 +1,6 @@
 """Fields of bodies, one for each described setting of hulls and of fences."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import timedelta
 from functools import partial
 from typing import Annotated, Any, TypeVar
@@ -17,9 +17,8 @@ IN_SECONDS = "In seconds."
 
 def with_settings(settings: type, *, at_creation: bool = False) -> Callable[[type[Body]], type[Body]]:
     """A body that also has a field for each described setting: those of a creation, or the others."""
-    fields: dict[str, Any] = {
-        each.name: _field(each) for each in described(settings) if each.at_creation == at_creation
-    }
+    every = described(settings)
+    fields: dict[str, Any] = {each.name: _field(each, every) for each in every if each.at_creation == at_creation}
 
     def complete(body: type[Body]) -> type[Body]:
         return create_model(body.__name__, __base__=body, __doc__=body.__doc__, __module__=body.__module__, **fields)
@@ -27,18 +26,20 @@ def with_settings(settings: type, *, at_creation: bool = False) -> Callable[[typ
     return complete
 
 
-def _field(setting: Setting) -> tuple[Any, Any]:
+def _field(setting: Setting, every: Sequence[Setting]) -> tuple[Any, Any]:
     kind = _kind(setting) if setting.usual is not None else _kind(setting) | None
     if setting.needs:
-        kind = Annotated[kind, AfterValidator(partial(_with_others, setting.needs))]
+        needed = [each for each in every if each.name in setting.needs]
+        kind = Annotated[kind, AfterValidator(partial(_with_others, needed))]
     meaning = f"{setting.meaning} {IN_SECONDS}" if setting.kind is timedelta else setting.meaning
     return kind, Field(setting.usual, description=meaning)
 
 
-def _with_others(needs: tuple[str, ...], value: Any, info: ValidationInfo) -> Any:
+def _with_others(needed: Sequence[Setting], value: Any, info: ValidationInfo) -> Any:
     """A setting that is given; ValueError if it means nothing without another one, which comes before it."""
-    if value and not any(info.data.get(name, True) for name in needs):
-        raise ValueError(f"is given with {' or '.join(needs)}")
+    if value and all(info.data.get(each.name, True) == each.usual for each in needed):
+        named = (f"{each.name} {each.flag.value}" if each.flag else each.name for each in needed)
+        raise ValueError(f"is given with {' or '.join(named)}")
     return value
 
 

@@ -151,10 +151,15 @@ def create_hull(  # noqa: D417  # the settings have their descriptions
         if not geographic:
             raise ValueError("center is a setting of a geographic hull: give geographic=True, too")
         config.center.CopyFrom(_encode_center(center))
-    if max_age is not None or max_points is not None:
+    limited = max_age is not None or max_points is not None
+    if limited or (max_skew is not None and ordering == "event_time"):
         config.window.CopyFrom(_window(max_age, max_points, clock, max_skew, ahead))
-    elif clock != "server" or max_skew is not None or ahead != "refuse":
-        raise ValueError("clock, max_skew and ahead are settings of a window: give max_age or max_points, too")
+    elif max_skew is not None:
+        raise ValueError('max_skew is given with a window or an order: max_age, max_points or ordering="event_time"')
+    if not limited and clock != "server":
+        raise ValueError("clock is a setting of a window: give max_age or max_points, too")
+    if not limited and max_skew is None and ahead != "refuse":
+        raise ValueError("ahead is a setting of max_skew or of a window: give max_skew, max_age or max_points, too")
     if quarantine is not None:
         config.quarantine.CopyFrom(encode_quarantine(quarantine))
     config.shards = positive("shards", None if shards is None else whole("shards", shards, bits=32))

@@ -38,6 +38,8 @@ KEY_TYPES: dict[int, KeyType] = {hull_pb2.IDENTITY_STRING_KEYS: "str", hull_pb2.
 class Window:
     """A hull's sliding window: points leave when they are too old or too many.
 
+    A hull that is ordered by event time may have `max_skew` alone: no points leave then.
+
     Attributes:
         max_age: the age at which points leave; None for no such limit.
         max_points: the number of points beyond which the oldest leave; None for no such limit.

@@ -47,7 +47,7 @@ def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
     by_event_time = config.ordering == hull_pb2.ORDERING_EVENT_TIME
     if by_event_time and identity == "multiset":
         raise InvalidFieldError("config.ordering", "ORDERING_EVENT_TIME", "points without keys have no order")
-    window = _decode_window(config.window) if config.HasField("window") else None
+    window = _decode_window(config.window, by_event_time=by_event_time) if config.HasField("window") else None
     frame = FRAMES.get(config.frame)
     if frame is None:
         raise InvalidFieldError("config.frame", config.frame, "not a frame that this server supports")
@@ -100,7 +100,7 @@ def decode_center(place: hull_pb2.LonLat, field: str) -> Center:
     return as_center(center)
 
 
-def _decode_window(window: hull_pb2.Window) -> Window:
+def _decode_window(window: hull_pb2.Window, *, by_event_time: bool) -> Window:
     clock = CLOCKS.get(window.clock)
     if clock is None:
         raise InvalidFieldError("config.window.clock", window.clock, "not a clock that this server supports")
@@ -112,7 +112,11 @@ def _decode_window(window: hull_pb2.Window) -> Window:
     if window.HasField("max_age"):
         max_age = decode_duration(window.max_age, "config.window.max_age", least=1)
     elif not window.max_points:
-        raise InvalidFieldError("config.window", "empty", "a window needs max_age or max_points")
+        if not (by_event_time and window.HasField("max_skew")):
+            problem = "needs max_age or max_points or, in a hull by event time, max_skew"
+            raise InvalidFieldError("config.window", "empty", problem)
+        if clock != "server":
+            raise InvalidFieldError("config.window.clock", "CLOCK_DATA", "needs max_age or max_points")
     if window.HasField("max_skew"):
         max_skew = decode_duration(window.max_skew, "config.window.max_skew", least=0)
     clamps = window.ahead == hull_pb2.AHEAD_POLICY_CLAMP

@@ -61,7 +61,7 @@ def admit(
         clock: the clock of the hull.
 
     Raises:
-        InvalidBatchError: times are required, or a time is further ahead than the window allows.
+        InvalidBatchError: times are required, or a time is further ahead than the hull allows.
     """
     window = settings.window
     if times is None and rows:

@@ -29,7 +29,7 @@ INCARNATION = "."
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A sliding window over the points of a hull.
+    """A sliding window over the points of a hull; or, without `max_age` and `max_points`, only what times may be.
 
     Attributes:
         max_age: the age in microseconds at which points leave, 0 for none.
@@ -44,6 +44,11 @@ class Window:
     clock: Clock = "server"
     max_skew: int | None = None
     clamps: bool = False
+
+    @property
+    def limited(self) -> bool:
+        """Whether points leave because they are too old or too many."""
+        return self.max_age > 0 or self.max_points > 0
 
 
 @dataclass(frozen=True, slots=True)

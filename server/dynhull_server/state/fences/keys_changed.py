@@ -65,7 +65,7 @@ def of_batch(
 ) -> KeysChanged:
     """What an applied batch, the last one of the journal, has done to keys."""
     rows = journal[-1].rows
-    fewer = hull.row.settings.window is not None and (applied.evicted or applied.expired)
+    fewer = _limited(hull) and (applied.evicted or applied.expired)
     return KeysChanged(rows if isinstance(rows, KeyRows) else None, expired, bool(fewer))
 
 
@@ -73,7 +73,12 @@ def of_expiry(hull: Hull) -> KeysChanged:
     """What an expiry has done to keys."""
     contents = hull.state.contents
     ended = contents.ended if isinstance(contents, Keyed) else ()
-    return KeysChanged(None, frozenset(ended), hull.row.settings.window is not None)
+    return KeysChanged(None, frozenset(ended), _limited(hull))
+
+
+def _limited(hull: Hull) -> bool:
+    window = hull.row.settings.window
+    return window is not None and window.limited
 
 
 def with_expiries(crossings: Crossings, expired: AbstractSet[Key]) -> Crossings:
