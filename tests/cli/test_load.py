@@ -166,7 +166,7 @@ def test_bad_rows_of_parquet(tmp_path, name):
         ("a.json", f"[[1e400, 1], [{'9' * 5000}, 1]]", [], "  item 1: x is 1E+400, not finite\n  item 2: x is 999"),
         ("a.ndjson", '{"x": 1, "y": }\n\n', [], "  line 1: not valid JSON at column 15: Expecting value\n"),
         ("a.parquet", "x,y\n1,2\n", [], "a.parquet is not a Parquet file"),
-        ("a.xls", "", [], "the name must end in .csv, .tsv, .parquet, .json, .geojson, .ndjson, .txt, .jsonl"),
+        ("a.xls", "", [], "the name must end in .csv, .tsv, .parquet, .json, .geojson, .ndjson, .gpkg, .shp,"),
         ("a.csv", "x,y\n1,2\n", ["--resume", "--again"], "give one"),
     ],
 )

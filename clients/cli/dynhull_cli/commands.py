@@ -45,6 +45,7 @@ PANELS = {
 }
 OTHERS = "More"
 PACKAGES: dict[str | None, str | None] = {"google": "protobuf", "grpc": "grpcio"}  # of modules with other names
+EXTRAS = {"pyogrio": "gis"}  # of modules that a command needs for a part of what it does
 
 
 class Flags:
@@ -206,7 +207,7 @@ def _explaining(entry: EntryPoint, function: Callable[..., None]) -> Callable[..
 
 def _not_installed(entry: EntryPoint, error: ModuleNotFoundError) -> Callable[[], None]:
     """A command that only prints what to install."""
-    extras = ",".join(entry.extras)
+    extras = ",".join([*entry.extras, *filter(None, [EXTRAS.get(error.name or "")])])
 
     def explain() -> None:
         typer.echo(

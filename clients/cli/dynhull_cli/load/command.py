@@ -30,7 +30,8 @@ def load(
         str | None,
         typer.Argument(
             metavar="FILE",
-            help="A .csv, .tsv, .txt, .parquet, .json, .geojson or .ndjson file. Default, or -: standard input.",
+            help="A .csv, .tsv, .txt, .parquet, .json, .geojson, .ndjson, .gpkg, .shp, .zip, .fgb, .gpx, .kml or .xlsx "
+            "file. Default, or -: standard input.",
         ),
     ] = None,
     format: Annotated[  # noqa: A002
@@ -76,6 +77,9 @@ def load(
     expires: Annotated[
         str | None,
         _input("Column of the times at which keys leave the hull, written like --time; empty for never. With --key."),
+    ] = None,
+    layer: Annotated[
+        str | None, _input("Layer or sheet of a file of a GIS or Excel. Default: the only one that has features.")
     ] = None,
     geographic: Annotated[
         bool | None,
@@ -136,7 +140,7 @@ def load(
         raise ValueError("--time-unit is given with --time or --expires")
     if expires is not None and key is None:
         raise ValueError("--expires is given with --key: only keys leave at times of their own")
-    options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires)
+    options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires, layer)
     if file is None and sys.stdin.isatty():
         raise ValueError("no file: give its name, or - to type the points in")
     there = cache(partial(hull_if_served if dry_run else known_hull, client, name))

@@ -17,6 +17,12 @@ class Format(StrEnum):
     JSON = "json"
     GEOJSON = "geojson"
     NDJSON = "ndjson"
+    GPKG = "gpkg"
+    SHP = "shp"
+    FGB = "fgb"
+    GPX = "gpx"
+    KML = "kml"
+    XLSX = "xlsx"
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +41,7 @@ class Options:
         time: the column or member of the times; None for points without times.
         time_unit: the unit of times that are numbers.
         expires: the column or member of the times at which keys leave; None for points that stay.
+        layer: the layer, of files that have several.
     """
 
     x: str | None = None
@@ -48,6 +55,7 @@ class Options:
     time: str | None = None
     time_unit: TimeUnit | None = None
     expires: str | None = None
+    layer: str | None = None
 
     @property
     def labels(self) -> tuple[tuple[str, str | None], ...]:

@@ -26,8 +26,16 @@ if TYPE_CHECKING:
 
 DIGESTED_BYTES = 2**20
 GZIP_MARK = b"\x1f\x8b"
-SUFFIXES = {f".{each}": each for each in Format} | {".txt": Format.CSV, ".jsonl": Format.NDJSON}
+SUFFIXES = {f".{each}": each for each in Format} | {
+    ".txt": Format.CSV,
+    ".jsonl": Format.NDJSON,
+    ".kmz": Format.KML,
+    ".zip": Format.SHP,
+}
 TABLES = {Format.CSV, Format.TSV}
+JSON = {Format.JSON, Format.GEOJSON, Format.NDJSON}
+LAYERS = {Format.GPKG, Format.SHP, Format.FGB, Format.GPX, Format.KML, Format.XLSX}
+BESIDE = {Format.SHP: (".dbf", ".DBF")}  # the files with the fields of a Shapefile
 APPLIES_TO = {
     "x": set(Format) - {Format.GEOJSON},
     "y": set(Format) - {Format.GEOJSON},
@@ -40,6 +48,7 @@ APPLIES_TO = {
     "time": set(Format),
     "time_unit": set(Format),
     "expires": set(Format),
+    "layer": LAYERS,
 }
 
 
@@ -125,9 +134,13 @@ class Source:
         while part := self.file.read(DIGESTED_BYTES):
             digest.update(part)
         self.file.seek(0)
+        for beside in (Path(self.name).with_suffix(each) for each in BESIDE.get(self.format, ())):
+            if beside.exists():
+                with beside.open("rb") as more:
+                    digest.update(hashlib.file_digest(more, "sha256").digest())
         # Only what differs from the default, so that a file has the name that earlier versions gave it.
-        more = [f" {name}={value}" for name, value in _given(self.options).items() if name not in ("x", "y")]
-        digest.update(f"{self.format} {self.options.x} {self.options.y}{''.join(more)}".encode())
+        given = [f" {name}={value}" for name, value in _given(self.options).items() if name not in ("x", "y")]
+        digest.update(f"{self.format} {self.options.x} {self.options.y}{''.join(given)}".encode())
         return digest.hexdigest()
 
 
@@ -189,12 +202,12 @@ def _source(
 ) -> Source:
     file = stored
     if peek(stored, len(GZIP_MARK)) == GZIP_MARK:
-        if kind is Format.PARQUET:
-            raise ValueError(f"{name} is compressed, and Parquet is read from its end: decompress it with gunzip")
+        if kind is Format.PARQUET or kind in LAYERS:
+            raise ValueError(f"{name} is compressed, and {kind} is not read in order: decompress it with gunzip")
         file = cast("IO[bytes]", gzip.GzipFile(fileobj=stored))
     if not peek(file, 1):
         raise ValueError(f"{name} is empty")
-    if kind not in TABLES and peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
+    if kind in JSON and peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
         raise ValueError(f"{name} is UTF-16, and JSON is UTF-8: convert it with iconv -f UTF-16 -t UTF-8")
     return Source(name, file, stored, size, kind, options, integer_keys)
 
@@ -224,3 +237,7 @@ def _reader(kind: Format) -> Reader:
             from .read_json import read_ndjson
 
             return read_ndjson
+        case _:
+            from .read_layer import read_layer
+
+            return read_layer
