@@ -12,12 +12,10 @@ from ..reading.columns import column_index
 from ..reading.labels import Labels
 from ..reading.values import coordinate
 from .chunks import Chunk, Chunks, Numbers, Position, Rows, picked
-from .geometry import positions
+from .geometry_column import GeometryColumn, Value
 from .source import Source
-from .wkb import decode
 
-WKB_POINTS = np.dtype([("order", "u1"), ("type", "<u4"), ("xy", "<f8", (2,))])
-LITTLE_ENDIAN, POINT = 1, 1
+AXES = ["x", "y"]
 
 OfRow = Callable[[int], Labels]
 """Reads the labels of a row of a batch, given by its number."""
@@ -47,15 +45,22 @@ class ArrowTable:
         for batch, labels, numbers in self._read([x, y]):
             yield self._of_numbers([batch[x], batch[y]], [x, y], labels, numbers)
 
-    def of_geometries(self, column: str) -> Chunks:
-        """Chunks of points from a column of geometries: well-known binary, or structs of x and y."""
+    def of_geometries(self, column: str, *, system_known: bool) -> Chunks:
+        """Chunks of points from a column of geometries: well-known binary or text, or the points of GeoArrow.
+
+        `system_known` says whether the input has said in which coordinate reference system they are.
+        """
+        geometries = GeometryColumn(self.source, column, system_known=system_known)
         for batch, labels, numbers in self._read([column]):
-            array = batch[column]
+            array = _plain(batch[column])
             if pa.types.is_struct(array.type):
-                axes = ["x", "y"]
-                yield self._of_numbers([pc.struct_field(array, axis) for axis in axes], axes, labels, numbers)
+                axes = [pc.struct_field(array, axis) for axis in AXES]
+                yield self._of_numbers(axes, AXES, labels, numbers)
+            elif pa.types.is_fixed_size_list(array.type):
+                axes = [pc.list_element(array, axis) for axis in range(len(AXES))]
+                yield self._of_numbers(axes, AXES, labels, numbers)
             else:
-                yield self._of_binaries(array.to_pylist(), labels, numbers)
+                yield self._of_values(array.to_pylist(), geometries, labels, numbers)
 
     def _read(self, columns: list[str]) -> Iterator[tuple[Any, OfRow | None, Numbers]]:
         """Each batch, what reads the labels of its rows, and their numbers."""
@@ -90,16 +95,13 @@ class ArrowTable:
 
         return self._picked(numbers, position, lambda row: str(rows[row]), labels)
 
-    def _of_binaries(self, rows: list[bytes | None], labels: OfRow | None, numbers: Numbers) -> Chunk:
-        points = None if labels is not None else _wkb_points(rows)
+    def _of_values(
+        self, rows: list[Value], geometries: GeometryColumn, labels: OfRow | None, numbers: Numbers
+    ) -> Chunk:
+        points = None if labels is not None else geometries.points(rows)
         if points is not None:
             return Chunk(Rows(points, numbers, self.unit))
-
-        def of_row(row: int) -> list[Position]:
-            data = rows[row]
-            return positions(None if data is None else decode(data), self.source.options.vertices)
-
-        return self._picked(numbers, of_row, lambda row: _hex(rows[row]), labels)
+        return self._picked(numbers, lambda row: geometries.positions(rows[row]), lambda row: _text(rows[row]), labels)
 
     def _picked(
         self,
@@ -112,14 +114,11 @@ class ArrowTable:
         return picked(self.unit, rows, of_row, text, labels)
 
 
-def _wkb_points(rows: list[bytes | None]) -> Any:
-    """The points where all rows are plain little-endian ones, which is the usual case; otherwise None."""
-    if any(row is None or len(row) != WKB_POINTS.itemsize for row in rows):
-        return None
-    found = np.frombuffer(b"".join(filter(None, rows)), WKB_POINTS)
-    usual = (found["order"] == LITTLE_ENDIAN).all() and (found["type"] == POINT).all()
-    return found["xy"] + 0.0 if usual and np.isfinite(found["xy"]).all() else None
+def _plain(array: Any) -> Any:
+    """The array without what an extension type or a dictionary puts around it."""
+    array = array.storage if isinstance(array, pa.ExtensionArray) else array
+    return array.dictionary_decode() if pa.types.is_dictionary(array.type) else array
 
 
-def _hex(data: bytes | None) -> str:
-    return "" if data is None else data.hex()
+def _text(value: Value) -> str:
+    return value.hex() if isinstance(value, bytes) else value or ""

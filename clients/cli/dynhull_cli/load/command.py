@@ -78,6 +78,10 @@ def load(
         str | None,
         _input("Column of the times at which keys leave the hull, written like --time; empty for never. With --key."),
     ] = None,
+    geometry: Annotated[
+        str | None,
+        _input("Column of geometries, WKT or WKB. Default: geometry, geom, wkt or the like, where no x and y are."),
+    ] = None,
     layer: Annotated[
         str | None, _input("Layer or sheet of a file of a GIS or Excel. Default: the only one that has features.")
     ] = None,
@@ -140,7 +144,9 @@ def load(
         raise ValueError("--time-unit is given with --time or --expires")
     if expires is not None and key is None:
         raise ValueError("--expires is given with --key: only keys leave at times of their own")
-    options = Options(x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires, layer)
+    options = Options(
+        x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires, layer, geometry
+    )
     if file is None and sys.stdin.isatty():
         raise ValueError("no file: give its name, or - to type the points in")
     there = cache(partial(hull_if_served if dry_run else known_hull, client, name))

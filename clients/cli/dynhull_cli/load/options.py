@@ -42,6 +42,7 @@ class Options:
         time_unit: the unit of times that are numbers.
         expires: the column or member of the times at which keys leave; None for points that stay.
         layer: the layer, of files that have several.
+        geometry: the column of geometries.
     """
 
     x: str | None = None
@@ -56,6 +57,7 @@ class Options:
     time_unit: TimeUnit | None = None
     expires: str | None = None
     layer: str | None = None
+    geometry: str | None = None
 
     @property
     def labels(self) -> tuple[tuple[str, str | None], ...]:

@@ -9,14 +9,14 @@ from typing import Any
 from xml.parsers import expat
 
 import pyogrio
-import pyproj
 from pyogrio.errors import DataLayerError, DataSourceError
 
 from ..plural import plural
-from ..reading.columns import coordinate_columns
+from ..reading.columns import coordinate_columns, geometry_column
 from .arrow_rows import ArrowTable
 from .chunks import CHUNK_ROWS, Chunks
 from .options import Format
+from .reference_system import note_reference_system
 from .source import Source
 
 # GDAL chooses a driver by what is in a file, and some drivers read what the file names, of this machine or the network.
@@ -46,7 +46,8 @@ def read_layer(source: Source) -> Chunks:
         raise ValueError(f"{source.name} is {info['driver']}, not {source.format}")
     fields = info["fields"].tolist()
     number, geometry = info["fid_column"] or "OGC_FID", info["geometry_name"] or WKB_COLUMN
-    of_columns = info["geometry_type"] is None or source.options.x is not None or source.options.y is not None
+    options = source.options
+    of_columns = info["geometry_type"] is None or any((options.x, options.y, options.geometry))
 
     def batches(columns: list[str]) -> Iterator[Any]:
         wanted = [each for each in columns if each in fields]
@@ -72,23 +73,14 @@ def read_layer(source: Source) -> Chunks:
 
     unit = "row" if source.format is Format.XLSX else "feature"
     table = ArrowTable(source, [*fields, number], batches, unit, number)
-    if of_columns:
-        x, y = coordinate_columns(source.name, fields, source.options.x, source.options.y)
-        yield from table.of_columns(fields[x], fields[y])
-        return
-    _note_reference_system(source, info["crs"])
-    yield from table.of_geometries(geometry)
-
-
-def _note_reference_system(source: Source, crs: str | None) -> None:
-    if crs is None:
-        source.notes.append(f"{source.name} names no coordinate reference system: --geographic reads degrees")
-        return
-    system = pyproj.CRS.from_user_input(crs)
-    if system.is_geographic:
-        source.in_degrees()
+    if not of_columns:
+        note_reference_system(source, info["crs"], f"the layer {layer}")
+        yield from table.of_geometries(geometry, system_known=True)
+    elif (column := geometry_column(source.name, fields, options.x, options.y, options.geometry)) is not None:
+        yield from table.of_geometries(column, system_known=False)
     else:
-        source.notes.append(f"{source.name}: its coordinates are not degrees: its crs is {system.name}")
+        x, y = coordinate_columns(source.name, fields, options.x, options.y)
+        yield from table.of_columns(fields[x], fields[y])
 
 
 def _layer(source: Source, path: str) -> str:

@@ -6,34 +6,42 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..reading.columns import coordinate_columns
+from ..reading.columns import coordinate_columns, geometry_column
 from .arrow_rows import ArrowTable
 from .chunks import CHUNK_ROWS, Chunks
+from .reference_system import note_reference_system
 from .source import Source
 
 BUFFER_BYTES = 2**20  # without one, and with pre_buffer, whole row groups are in memory
 GEO_KEY = b"geo"  # of the schema's metadata, by the GeoParquet specification
+LOGICAL_TYPES = "Geometry", "Geography"  # of Parquet, since 2025
+EXTENSION, EXTENSION_METADATA = b"ARROW:extension:name", b"ARROW:extension:metadata"
+GEOARROW = "geoarrow."
+DEGREES = "OGC:CRS84"  # the default of GeoParquet and of Parquet's own types
 
 
 def read_parquet(source: Source) -> Chunks:
-    """Chunks of points, a few rows at a time, from the columns of x and y or from GeoParquet's geometry column."""
+    """Chunks of points, a few rows at a time, from the columns of x and y or from a column of geometries."""
     if not source.file.seekable():
         raise ValueError(f"{source.name} is a pipe, and Parquet is read from its end: write it to a file first")
     try:
         parquet = pq.ParquetFile(source.file, pre_buffer=False, buffer_size=BUFFER_BYTES)
     except pa.ArrowInvalid as error:
         raise ValueError(f"{source.name} is not a Parquet file: {error}") from None
-    geometry = None if source.options.x or source.options.y else _geometry_column(source.name, parquet.schema_arrow)
-    table = ArrowTable(
-        source, parquet.schema_arrow.names, lambda columns: parquet.iter_batches(CHUNK_ROWS, columns=columns)
-    )
-    if geometry is None:
+    names = parquet.schema_arrow.names
+    table = ArrowTable(source, names, lambda columns: parquet.iter_batches(CHUNK_ROWS, columns=columns))
+    options = source.options
+    systems = {} if options.x or options.y else _of_geoparquet(source.name, parquet) or _of_types(parquet)
+    column = options.geometry or next(iter(systems), None)
+    column = geometry_column(source.name, names, options.x, options.y, column)
+    if column is None:
         yield from table.of_columns(*_coordinates(source, parquet.schema_arrow))
-    else:
-        source.notes.append(f"{source.name}: points from the geometry column {geometry}")
-        if _in_degrees(parquet.schema_arrow, geometry):
-            source.in_degrees()
-        yield from table.of_geometries(geometry)
+        return
+    source.notes.append(f"{source.name}: points from the geometry column {column}")
+    system = systems.get(column)
+    if system is not None:
+        note_reference_system(source, system, f"the column {column}")
+    yield from table.of_geometries(column, system_known=system is not None)
 
 
 def _coordinates(source: Source, schema: Any) -> list[str]:
@@ -46,19 +54,52 @@ def _coordinates(source: Source, schema: Any) -> list[str]:
     return names
 
 
-def _geometry_column(name: str, schema: Any) -> str | None:
-    """The primary geometry column of GeoParquet, None for other files; ValueError for an unsupported encoding."""
-    if GEO_KEY not in (schema.metadata or {}):
-        return None
-    geo = json.loads(schema.metadata[GEO_KEY])
+def _of_geoparquet(name: str, parquet: Any) -> dict[str, Any]:
+    """The primary geometry column of GeoParquet with its coordinate reference system; empty for other files.
+
+    ValueError for an unsupported encoding.
+    """
+    metadata = parquet.schema_arrow.metadata or {}
+    if GEO_KEY not in metadata:
+        return {}
+    geo = json.loads(metadata[GEO_KEY])
     column = str(geo["primary_column"])
-    encoding = geo["columns"][column]["encoding"]
+    described = geo["columns"][column]
+    encoding = described["encoding"]
     if encoding not in ("WKB", "point"):
         raise ValueError(f"{name}: the geometry column {column} is encoded as {encoding}; WKB and point can be read")
-    return column
+    return {column: described.get("crs", DEGREES)}
 
 
-def _in_degrees(schema: Any, column: str) -> bool:
-    """Whether the geometries are longitudes and latitudes: the default of GeoParquet, or by PROJJSON."""
-    crs = json.loads(schema.metadata[GEO_KEY])["columns"][column].get("crs", {"type": "GeographicCRS"})
-    return isinstance(crs, dict) and crs.get("type") == "GeographicCRS"
+def _of_types(parquet: Any) -> dict[str, Any]:
+    """The columns that are geometries by their types, each with its coordinate reference system, None without one."""
+    found = {}
+    for field in parquet.schema_arrow:
+        extension, described = _extension(field)
+        if extension.startswith(GEOARROW):
+            found[field.name] = json.loads(described or b"{}").get("crs")
+    for index in range(len(parquet.schema)):
+        column = parquet.schema.column(index)
+        kind = json.loads(column.logical_type.to_json())
+        if kind["Type"] in LOGICAL_TYPES:
+            found[column.path] = _system(kind.get("crs", DEGREES), parquet.metadata.metadata or {})
+    return found
+
+
+def _extension(field: Any) -> tuple[str, bytes]:
+    """The name and the description of an extension type, whether or not this process has a class of it."""
+    if isinstance(field.type, pa.ExtensionType):
+        return field.type.extension_name, field.type.__arrow_ext_serialize__()
+    metadata = field.metadata or {}
+    return metadata.get(EXTENSION, b"").decode(), metadata.get(EXTENSION_METADATA, b"")
+
+
+def _system(name: str, metadata: dict[bytes, bytes]) -> Any:
+    """The coordinate reference system of a type of Parquet: PROJJSON beside it, an SRID, or a name."""
+    kind, _, value = name.partition(":")
+    match kind:
+        case "projjson":
+            return json.loads(metadata.get(value.encode(), b"null"))
+        case "srid":
+            return f"EPSG:{value}"
+    return name

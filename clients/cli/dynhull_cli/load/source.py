@@ -49,6 +49,7 @@ APPLIES_TO = {
     "time_unit": set(Format),
     "expires": set(Format),
     "layer": LAYERS,
+    "geometry": {Format.PARQUET} | LAYERS,
 }
 
 

@@ -17,6 +17,16 @@ def decode(data: bytes) -> dict[str, Any]:
         raise ValueError("its geometry is not well-known binary") from None
 
 
+def srid_of(data: bytes) -> int | None:
+    """The SRID of EWKB; None without one."""
+    order = "<" if data[:1] != b"\0" else ">"
+    try:
+        code, srid = struct.unpack_from(f"{order}II", data, 1)
+    except struct.error:
+        return None
+    return srid if code & HAS_SRID else None
+
+
 class _Reader:
     def __init__(self, data: bytes) -> None:
         self._data = data

@@ -8,6 +8,19 @@ from dynhull.arrays import COLUMN_NAMES
 from .values import is_number
 
 LONGITUDE_LATITUDE = "longitude", "latitude"
+GEOMETRY_NAMES = (
+    "geometry",
+    "geom",
+    "the_geom",
+    "wkt",
+    "ewkt",
+    "wkt_geom",
+    "wkb",
+    "ewkb",
+    "wkb_geometry",
+    "geography",
+    "geog",
+)
 DEGREES = [pair for pair in COLUMN_NAMES if pair[1] in ("lat", "latitude")]
 GREATEST_LONGITUDE, GREATEST_LATITUDE = 360.0, 90.0
 
@@ -46,6 +59,20 @@ def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, 
             raise ValueError(f"{path}: name its {option[2:]} column with {option}; it has {', '.join(columns)}")
         found.append(column_index(path, columns, option, column))
     return found[0], found[1]
+
+
+def geometry_column(
+    path: Path | str, columns: Sequence[str], x: str | None, y: str | None, geometry: str | None
+) -> str | None:
+    """The column of geometries: the given one, or that of a known name where no columns of x and y are given or known.
+
+    None without one. ValueError where the given one is not there.
+    """
+    if geometry is not None:
+        return columns[column_index(path, columns, "--geometry", geometry)]
+    if x is not None or y is not None or has_pair(columns):
+        return None
+    return next((column for column in columns if column.strip().lower() in GEOMETRY_NAMES), None)
 
 
 def column_index(path: Path | str, columns: Sequence[str], option: str, column: str) -> int:
