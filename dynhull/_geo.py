@@ -257,6 +257,7 @@ class GeoHull(Multiset, Globe):
 
     Measures are those of WGS84, in metres, and need pyproj: `pip install 'dynhull[geo]'`.
 
+    >>> from dynhull import GeoHull
     >>> fiji = GeoHull([(177.4, -17.8), (178.4, -18.1), (-179.9, -16.8), (179.4, -16.4)])
     >>> fiji.vertices().tolist()
     [[-179.9, -16.8], [179.4, -16.4], [177.4, -17.8], [178.4, -18.1]]
@@ -314,6 +315,7 @@ class GeoKeyedHull(Keyed, Globe):
     Keys, times and batches are those of `KeyedHull`, places, vertices and measures those of `GeoHull`. An entity has
     the pair of numbers that was given last. `vertex_keys` names, for each vertex, the least key with this pair.
 
+    >>> from dynhull import GeoKeyedHull
     >>> fleet = GeoKeyedHull()
     >>> fleet.put_many(["Suva", "Taveuni", "Nadi"], [(178.6, -18), (-179.9, -16.7), (177.4, -17.8)])
     3
@@ -393,6 +395,7 @@ class GeoWindowHull(Windowed, Globe):
 
     Times and limits are those of `WindowHull`, places, vertices and measures those of `GeoHull`.
 
+    >>> from dynhull import GeoWindowHull
     >>> window = GeoWindowHull(max_age=60.0)
     >>> window.add([(179, 0), (-179, 0), (180, 2)], times=[0.0, 10.0, 20.0])
     3

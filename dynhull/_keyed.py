@@ -224,6 +224,7 @@ class KeyedHull(Keyed, Hull):
     `points`, `locate`, `distance`, `area` and all other reading methods are those of `DynamicHull`, with entities at
     the same place as copies of one point; only `in` asks for a key.
 
+    >>> from dynhull import KeyedHull
     >>> fleet = KeyedHull()
     >>> fleet.put_many(["LH400", "UA17", "AF84"], [[0, 0], [4, 0], [0, 4]])
     3

@@ -176,6 +176,7 @@ class WindowHull(Windowed, Hull):
     Every method raises ValueError or TypeError for bad input, which names the first bad row, and nothing changes. The
     queries and measures are those of DynamicHull.
 
+    >>> from dynhull import WindowHull
     >>> window = WindowHull(max_age=60.0)
     >>> window.add([[0, 0], [4, 0], [0, 3]], times=[0.0, 10.0, 20.0])
     3

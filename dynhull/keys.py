@@ -39,6 +39,7 @@ class PackedKeys(Sequence[str]):
         ValueError: the lengths do not add up to the data, or a string is empty or not UTF-8. The message names its row.
         TypeError: an argument is neither bytes nor an array of uint8.
 
+    >>> from dynhull.keys import PackedKeys
     >>> keys = PackedKeys.pack(["LH400", "UA17"])
     >>> list(keys.lengths), keys.data
     ([5, 4], b'LH400UA17')
@@ -174,6 +175,7 @@ def as_keys(keys: Any, key_type: KeyType, name: str = "keys") -> Keys:
             or the shape is not (k,). The message names the first bad row.
         TypeError: a value is missing or of another kind: a bool or a float is not an integer.
 
+    >>> from dynhull.keys import as_keys
     >>> as_keys(["b", "a"], "str")
     <PackedKeys of 2 strings, 2 bytes>
     >>> as_keys([7, 2**64 - 1], "int")

@@ -111,6 +111,7 @@ class PhaseDiagram:
     def decompose(self, compositions: npt.ArrayLike) -> Decomposition:
         """The decomposition of each of (k,) compositions. Shares are exact values rounded once. O(log h) each.
 
+        >>> from dynhull.envelope import PhaseDiagram
         >>> found = PhaseDiagram([[0, 0], [0.5, -1], [1, 0]]).decompose([0.125])
         >>> found.phases.tolist(), found.shares.tolist()
         ([[[0.0, 0.0], [0.5, -1.0]]], [[0.75, 0.25]])

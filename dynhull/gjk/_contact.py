@@ -70,6 +70,7 @@ def intersect(a: Shape, b: Shape) -> bool:
         ValueError: the dimensions differ, are not 2 or 3, a union or a hull is empty, or a geometry is not convex.
 
     >>> from dynhull.convex import ball, box
+    >>> from dynhull.gjk import intersect
     >>> intersect(box([0, 0], [1, 1]), box([1, 1], [2, 2])), intersect(box([0, 0], [1, 1]), ball([3, 0.5], 1))
     (True, False)
     """
@@ -100,6 +101,7 @@ def contact(a: Shape, b: Shape) -> Contact:
         ValueError: the dimensions differ, are not 2 or 3, a union or a hull is empty, or a geometry is not convex.
 
     >>> from dynhull.convex import box
+    >>> from dynhull.gjk import contact
     >>> found = contact(box([0, 0, 0], [1, 1, 1]), box([4, 5, 0], [5, 6, 1]))
     >>> found.distance, found.points[:, :2].tolist()
     (5.0, [[1.0, 1.0], [4.0, 5.0]])

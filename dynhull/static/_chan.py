@@ -49,6 +49,7 @@ def chan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace | None =
     >>> trace = []
     >>> chan([[0, 0], [4, 0], [5, 2], [4, 4], [2, 3], [0, 4], [1, 2], [2, 1]], trace=trace).tolist()
     [[0.0, 0.0], [4.0, 0.0], [5.0, 2.0], [4.0, 4.0], [0.0, 4.0]]
+    >>> from dynhull.static.trace import Round
     >>> [(event.guess, event.steps, event.closed) for event in trace if isinstance(event, Round)]
     [(2, 2, False), (4, 4, False), (16, 5, True)]
     """

@@ -40,6 +40,7 @@ def graham_scan(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trace |
     >>> trace = []
     >>> graham_scan([[0, 0], [4, 0], [1, 1], [0, 4]], trace=trace).tolist()
     [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]
+    >>> from dynhull.static.trace import Turn
     >>> [(event.c, int(event.cross)) for event in trace if isinstance(event, Turn)]
     [((1.0, 1.0), 4), ((0.0, 4.0), -8), ((0.0, 4.0), 16)]
     """

@@ -5,41 +5,12 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from blocks import blocks
 
 ROOT = Path(__file__).parents[2]
-
-
-class TitledCode(HTMLParser):
-    """The code blocks of a page that have a title, by their titles."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.blocks: dict[str, str] = {}
-        self._title = ""
-        self._reads_title = self._reads_code = False
-
-    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        if tag == "span" and ("class", "filename") in attributes:
-            self._title, self._reads_title = "", True
-        elif tag == "code" and self._title:
-            self._reads_code = True
-            self.blocks[self._title] = ""
-
-    def handle_data(self, data: str) -> None:
-        if self._reads_title:
-            self._title += data
-        elif self._reads_code:
-            self.blocks[self._title] += data
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag == "span":
-            self._reads_title = False
-        elif tag == "code" and self._reads_code:
-            self._title, self._reads_code = "", False
 
 
 @pytest.fixture(scope="session")
@@ -67,10 +38,9 @@ def take_program(site: Path, tmp_path: Path) -> Callable[[str, str], Path]:
     """Saves the code block of that title, from the page of that name, as a reader would."""
 
     def take(page: str, title: str) -> Path:
-        reader = TitledCode()
-        reader.feed((site / page / "index.html").read_text())
+        (block,) = [each for each in blocks((site / page / "index.html").read_text()) if each.title == title]
         program = tmp_path / title
-        program.write_text(reader.blocks[title])
+        program.write_text(block.text)
         return program
 
     return take

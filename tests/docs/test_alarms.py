@@ -16,13 +16,13 @@ from ports import free_port
 from server_process import server_process
 
 BEFORE = """\
-dynhull create vehicles --keyed str --geographic
-dynhull put vehicles truck-7 13.4 52.5
-dynhull fences create depot --polygon 'POLYGON ((13 52, 14 52, 14 53, 13 53, 13 52))' --subjects vehicles
-dynhull put vehicles truck-7 11.6 48.1
-dynhull fences watch depot --after 0 --events 2"""
-RELAY = "dynhull relay depot --consumer alarm --to http://127.0.0.1:8000/ --allow-private"
-AFTER = "dynhull put vehicles truck-7 13.4 52.5"
+dynhull create alarms/vehicles --keyed str --geographic
+dynhull put alarms/vehicles truck-7 13.4 52.5
+dynhull fences create alarms/depot --polygon 'POLYGON ((13 52, 14 52, 14 53, 13 53, 13 52))' --subjects alarms/vehicles
+dynhull put alarms/vehicles truck-7 11.6 48.1
+dynhull fences watch alarms/depot --after 0 --events 2"""
+RELAY = "dynhull relay alarms/depot --consumer alarm --to http://127.0.0.1:8000/ --allow-private"
+AFTER = "dynhull put alarms/vehicles truck-7 13.4 52.5"
 LIST = "dynhull relay dead-letters list"
 
 
@@ -59,7 +59,9 @@ def test_an_alarm_from_an_empty_folder(
                 run(AFTER)
                 assert alarm.stdout.readline().split()[1:] == ["dynhull.fence.enter", "truck-7"]
                 wait_until(
-                    lambda: "consumer\talarm: acknowledged 3, 0 events to come" in run("dynhull fences show depot")
+                    lambda: (
+                        "consumer\talarm: acknowledged 3, 0 events to come" in run("dynhull fences show alarms/depot")
+                    )
                 )
             finally:
                 running.terminate()

@@ -13,9 +13,10 @@ from ports import free_port
 from server_process import server_process
 
 INGEST = (
-    "dynhull ingest 'nats://127.0.0.1:4222/POSITIONS/fleet.*.position' --hull fleet --key '{1}' --time '$.ts' --to-end"
+    "dynhull ingest 'nats://127.0.0.1:4222/POSITIONS/fleet.*.position' --hull brokers/fleet --key '{1}' "
+    "--time '$.ts' --to-end"
 )
-QUERY = "dynhull query fleet vertices --keys"
+QUERY = "dynhull query brokers/fleet vertices --keys"
 
 
 def test_positions_from_an_empty_folder(

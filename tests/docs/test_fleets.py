@@ -36,8 +36,8 @@ def test_a_fleet_has_named_corners(
 
 
 COMMANDS = """\
-dynhull create vehicles --keyed str --geographic --max-age 30m
-dynhull put vehicles truck-7 13.4 52.5
-dynhull put vehicles van-3 11.6 48.1
-dynhull put vehicles truck-9 9.9 53.6
-dynhull query vehicles vertices --keys"""
+dynhull create fleets/vehicles --keyed str --geographic --max-age 30m
+dynhull put fleets/vehicles truck-7 13.4 52.5
+dynhull put fleets/vehicles van-3 11.6 48.1
+dynhull put fleets/vehicles truck-9 9.9 53.6
+dynhull query fleets/vehicles vertices --keys"""

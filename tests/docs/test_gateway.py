@@ -103,7 +103,7 @@ def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], si
         events = Events(gateway, follow_fence.removeprefix(ADDRESS))
         assert events.next()[1] is None  # an id alone
         inside = events.next()[1]["inside"]
-        assert inside == [{"hull": "fleet", "keys": ["a", "d"], "revision": 3}]
+        assert inside == [{"hull": "browser", "keys": ["a", "d"], "revision": 3}]
         assert str(inside).replace("'", '"').replace(" ", "") in text_of(site, "browser")
         events.close()
         assert shown.locator("polygon").get_attribute("points") == "0,0 4,0 4,3 2,4"
