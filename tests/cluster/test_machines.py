@@ -234,8 +234,9 @@ def test_a_cluster_beside_a_server_of_one_process_says_that_it_waits_for_its_end
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_worker_for_which_no_partition_is_left_says_so(url: str) -> None:
     options = ("--cluster", "--partitions", "1", "--workers", "2", "--journal", url, "--scrub-cpu", "0")
-    with server_process(*options, complaints="nothing to serve: each partition has another worker"):
+    with server_process(*options, complaints="to divide it among several, run `dynhull cluster split N`"):
         assert sorted(served(url).values()) == [1]
+        assert "run `dynhull cluster split N`" in dynhull("cluster", "status", "--journal", url).stdout
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Programs and commands of the pages, pasted as the copy button of the built page gives them, on one server.
 
-Programs with a title are saved in files, and have tests of their own, as have the pages whose hulls they fill.
+Programs with a title are saved in files, and have tests of their own, as have the pages that need more.
 """
 
 import re
@@ -17,7 +17,7 @@ from command_line import dynhull
 from server_process import server_process
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
-OF_TITLED_PROGRAMS = {"tutorial", "how-to/brokers"}
+ELSEWHERE = {"tutorial", "how-to/brokers", "how-to/serve"}  # their commands have tests of their own
 PIECES = {"reference/sdk"}  # of programs: they begin with a client that is there
 
 ENDING = (
@@ -70,7 +70,7 @@ def failures(name: str, pasted: list[Block], address: str) -> list[str]:
                 prompt = Prompt()
             program = block.text.replace(DEFAULT_ADDRESS, address)
             errors += [each for each in prompt.paste(program) if each not in block.shown]
-        elif name not in OF_TITLED_PROGRAMS:
+        elif name not in ELSEWHERE:
             errors += map(run, block.text.splitlines())
     return [each for each in errors if each]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from html import unescape
 
 BLOCK = re.compile(
-    r'<div class="(?:doc-md )?(?:language-(?P<language>\w+) )?highlight"(?: data-copy="(?P<copy>[^"]*)")?>'
+    r'<div class="(?:language-(?P<language>\w+) )?highlight"(?: data-copy="(?P<copy>[^"]*)")?>'
     r'(?:<span class="filename">(?P<title>.*?)</span>)?<pre>(?P<code>.*?)</pre>',
     re.DOTALL,
 )

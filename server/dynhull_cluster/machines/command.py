@@ -43,6 +43,8 @@ def status(journal: JOURNAL) -> None:
     said = {str(each.versions) for each in tables.workers.values()}
     if len(said) > 1:
         typer.echo(f"the workers are of {' and '.join(sorted(said))}")
+    if count == 1 and len(tables.workers) > 1:
+        typer.echo("one worker can have a single partition: to divide it among several, run `dynhull cluster split N`")
     if tables.workers and all(present.draining for present in tables.workers.values()):
         typer.echo("no worker takes partitions, because all of them were drained: start the process of one again")
     for partition, worker in sorted(tables.wishes.items()):

@@ -54,6 +54,10 @@ APART = (
 )
 # What a worker says that has nothing to do.
 ALONE = "nothing to serve: a server without --cluster has it, until that is stopped"
+UNDIVIDED = (
+    "nothing to serve: the database has a single partition, which another worker has, until that is stopped; to divide "
+    "it among several, run `dynhull cluster split N`"
+)
 LEFT_OUT = (
     "nothing to serve: each partition has another worker, and this one takes over what becomes free; a new database "
     "gets more of them with --partitions"
@@ -197,7 +201,8 @@ class Member:
                 left = [each for each in workers if each != wanted[number]]
                 wanted[number] = shares(expected, left, tables.wishes)[number]
         if not leaving and not any(each.startswith(SPLITS) for each in wanted):
-            self._notice_idle("" if self._worker in wanted else LEFT_OUT, wanted)
+            left_out = UNDIVIDED if self._cluster.partitions == 1 else LEFT_OUT
+            self._notice_idle("" if self._worker in wanted else left_out, wanted)
         for number, ahead in self._ahead.items():
             if wanted[number] != self._worker:
                 ahead.give_up()
