@@ -48,31 +48,17 @@ from .events import (
     Request,
     Retried,
     Retry,
-    Stir,
     Stopping,
     Tick,
     Together,
     WriteBatch,
     WriteTogether,
 )
-from .fences import recovery
 from .fences.components import SPANNING
+from .fences.core import FenceCore
 from .fences.fence import Fence
-from .fences.fence_work import MOST_DUE
-from .fences.fenced_trip import Ground
 from .fences.line import Line
-from .fences.line_trip import LineTrip
-from .fences.requests import (
-    CreateFence,
-    DeleteFence,
-    DropConsumer,
-    DropEvents,
-    FenceRequest,
-    PassTime,
-    PutConsumer,
-    ReadFence,
-    ReplaceFence,
-)
+from .fences.requests import FENCE_REQUESTS, CreateFence, FenceRequest, PassTime, ReadFence
 from .fences.tallies import Tallies
 from .hull import Hull
 from .hull_state import HullState
@@ -129,6 +115,7 @@ class Core:
         self._registry = Registry(limits, next_number)
         self._queues = Queues(self._registry)
         self._schedule = Schedule(self._registry)
+        self._fences = FenceCore(self._registry, self._queues, self._schedule, keeps=keeps)
         self._trips = 0
         self._stopping = False
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
@@ -141,14 +128,7 @@ class Core:
             DeleteHull: self._asked,
             Recenter: self._asked,
             Follow: self._asked,
-            CreateFence: self._asked_of_fence,
-            ReplaceFence: self._asked_of_fence,
-            DeleteFence: self._asked_of_fence,
-            ReadFence: self._asked_of_fence,
-            PutConsumer: self._asked_of_fence,
-            DropConsumer: self._asked_of_fence,
-            DropEvents: self._asked_of_fence,
-            PassTime: self._asked_of_fence,
+            **dict.fromkeys(FENCE_REQUESTS, self._asked_of_fence),
             Gone: self._gone,
             Computed: self._computed,
             Committed: self._committed,
@@ -245,9 +225,7 @@ class Core:
 
     def restore_fences(self, kept: "Sequence[KeptFence]") -> None:
         """Add the fences that the storage has kept. Call this after `restore`, and before the first step."""
-        self._queues.add_fences(recovery.bring_back(kept, self._registry))
-        for fence in self._registry.fences.values():
-            self._schedule.plan_fence(fence)
+        self._fences.restore(kept)
 
     # Requests
 
@@ -376,8 +354,8 @@ class Core:
 
     def _begin(self, queues: list[Queue], requests: list[Request], rows: int, effects: list[Effect]) -> Trip:
         trip = self._new_trip(queues, requests)
-        if isinstance(trip, LineTrip):
-            rows = max(rows, trip.weight)
+        if trip.fences is not None:
+            rows = max(rows, trip.fences.weight)
         if rows > SMALL_TRIP or (rows > SMALL and any(request.rows > SMALL for request in requests)):
             effects.append(Compute(trip))
             return trip
@@ -387,13 +365,13 @@ class Core:
 
     def _new_trip(self, queues: list[Queue], requests: list[Request]) -> Trip:
         if all(queue.line is None for queue in queues) and not isinstance(requests[0], FenceRequest):
-            place = None
+            places = {}
             if queues[0].hull is None and len(queues) == 1:
-                place = self._registry.reserve_hull()
-            legs = [Leg(queue.name, queue.hull, keeps=self._keeps) for queue in queues]
-            trip = Trip(legs, requests, self._now, FIRST_PAUSE, place)
+                places[queues[0].name] = self._registry.reserve_hull()
+            legs = {queue.name: Leg(queue.name, queue.hull, keeps=self._keeps) for queue in queues}
+            trip = Trip(legs, requests, self._now, FIRST_PAUSE, places)
         else:
-            trip = self._line_trip(queues, requests)
+            trip = self._fences.trip(queues, requests, self._now, FIRST_PAUSE)
         trip.queues = queues
         for queue in queues:
             queue.trip = trip
@@ -406,11 +384,8 @@ class Core:
         self._go_on(trip.queues, effects)
 
     def _ran(self, trip: Trip, effects: list[Effect]) -> None:
-        if isinstance(trip, LineTrip) and trip.left:
-            for request in reversed(trip.left):
-                if not request.abandoned:
-                    for queue in self._queues.at(names_of(request)):
-                        queue.waiting.insert(0, request)
+        if trip.fences is not None:
+            self._fences.ran(trip.fences)
         if trip.torn:
             self._fail(trip, MemoryError("a batch was applied in part"), effects)
             return
@@ -434,24 +409,17 @@ class Core:
 
     def _over(self, trip: Trip) -> None:
         self._trips -= 1
-        if trip.place is not None:
-            self._registry.give_back(1)
-        if isinstance(trip, LineTrip):
-            if trip.creates:
-                self._queues.end_creation(trip)
-            self._registry.give_back(len(trip.places), trip.creates)
+        self._registry.give_back(len(trip.places))
+        if trip.fences is not None:
+            self._fences.over(trip, trip.fences)
         for queue in trip.queues:
             queue.trip = None
             if queue.hull is not None:
                 self._schedule.plan(queue.hull)
             elif queue.line is not None:
-                for leg in trip.legs:
-                    if leg.name in self._registry.hulls:
-                        self._schedule.plan(self._registry.hulls[leg.name])
-        if isinstance(trip, LineTrip):
-            for each in trip.fence_legs.values():
-                if self._registry.fences.get(each.fence.name) is each.fence:
-                    self._schedule.plan_fence(each.fence)
+                for name in trip.legs:
+                    if name in self._registry.hulls:
+                        self._schedule.plan(self._registry.hulls[name])
 
     # Commits
 
@@ -463,7 +431,7 @@ class Core:
     def _keep(self, trip: Trip, effects: list[Effect]) -> None:
         """Publish the changes of the trip, which are committed: those of all its hulls in one step."""
         moved = []
-        for leg in trip.legs:
+        for leg in trip.legs.values():
             before, after = leg.before, leg.after
             if after is not None:
                 after.counts = after.state.counts
@@ -482,8 +450,8 @@ class Core:
             hull = after or before
             if hull is not None:
                 moved.append(hull)
-        if isinstance(trip, LineTrip):
-            self._keep_fences(trip, effects)
+        if trip.fences is not None:
+            self._fences.keep(trip, trip.fences, effects)
         self._end(trip, effects, tuple(moved))
 
     def _failed(self, event: Failed, effects: list[Effect]) -> None:
@@ -499,11 +467,13 @@ class Core:
         """Handle a trip whose changes were not committed."""
         trip.failure = error
         self._refuse_changes(trip, _not_stored(error), effects)
-        if trip.place is None and (trip.applied or trip.torn):
+        if trip.fences is None and trip.places:  # the new hull is forgotten
+            self._again(trip)
+        elif trip.applied or trip.torn:
             self._examine(trip, effects)  # the states in memory include the batches
         else:
-            if isinstance(trip, LineTrip):
-                trip.undo_created()
+            if trip.fences is not None:
+                trip.fences.undo_created()
             self._again(trip)
 
     def _refuse_changes(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
@@ -541,15 +511,14 @@ class Core:
 
     def _examine(self, trip: Trip, effects: list[Effect]) -> None:
         hulls: list[tuple[int, Callable[[Kept], HullState]]] = []
-        for leg in trip.legs:
+        for leg in trip.legs.values():
             hull = leg.before or leg.after
             number, settings = (0, DEFAULT) if hull is None else (hull.row.number, hull.row.settings)
             hulls.append((number, partial(state_of, self._registry.limits, settings, now=self._now)))
-        if isinstance(trip, LineTrip):
-            trip.examined, restored = recovery.reading(trip)
-            effects.append(Examine(trip, hulls, trip.examined, restored))
-        else:
-            effects.append(Examine(trip, hulls))
+        examine = Examine(trip, hulls)
+        if trip.fences is not None:
+            self._fences.examine(trip, trip.fences, examine)
+        effects.append(examine)
 
     def _under_way(self, trip: Trip) -> bool:
         """Whether a trip is in progress; False where the server is stopping and did not wait for it."""
@@ -559,7 +528,7 @@ class Core:
         trip = event.ticket
         if not self._under_way(trip):
             return
-        found = list(zip(trip.legs, event.states, strict=True))
+        found = list(zip(trip.legs.values(), event.states, strict=True))
         if trip.unknown and trip.landed(event.states, event.fences):
             self._keep(trip, effects)
         elif any(leg.before is not None and state is None for leg, state in found):
@@ -568,10 +537,8 @@ class Core:
             for leg, state in found:
                 if leg.before is not None and state is not None:
                     leg.before.state = state
-            if isinstance(trip, LineTrip):
-                assert event.restored is not None  # the changes were not committed
-                recovery.give_back(trip, event.restored, self._registry)
-                self._queues.renew(trip)
+            if trip.fences is not None:
+                self._fences.give_back(trip, trip.fences, event.restored)
             assert trip.failure is not None  # a trip is examined only after a failure
             if trip.unknown:
                 self._refuse_changes(trip, _not_stored(trip.failure), effects)
@@ -616,71 +583,6 @@ class Core:
         effects.append(Reply(refused))
         return others
 
-    # Fences
-
-    def _line_trip(self, queues: list[Queue], requests: list[Request]) -> LineTrip:
-        """A trip on hulls with fences, or one that gives them a fence."""
-        lines = [queue.line for queue in queues if queue.line is not None]
-        names: dict[str, None] = {}
-        fences: dict[str, Fence | None] = {}
-        numbers: dict[str, int] = {}
-        births: set[str] = set()
-        for request in requests:
-            if type(request) is WriteBatch:  # as a rule
-                names[request.name] = None
-                if request.birth is not None:
-                    births.add(request.name)
-            elif isinstance(request, FenceRequest):
-                fences[request.name] = self._registry.fences.get(request.name)
-                names |= dict.fromkeys(request.names[1:])
-                if isinstance(request, CreateFence):
-                    self._reserve_fence(request, numbers)
-            else:
-                names |= dict.fromkeys(names_of(request))
-                if isinstance(request, CreateHull):
-                    births.add(request.name)
-        new = sorted(name for name in births if name not in self._registry.hulls)
-        places = {name: self._registry.reserve_hull() for name in new}
-        ground = Ground(lines, places, fences, numbers, self._registry.tallies, self._registry.limits.fences)
-        legs = [Leg(name, self._registry.hulls.get(name), keeps=self._keeps) for name in names]
-        return LineTrip(legs, requests, self._now, FIRST_PAUSE, ground)
-
-    def _reserve_fence(self, request: CreateFence, numbers: dict[str, int]) -> None:
-        number = self._registry.reserve_fence()
-        if number is not None:
-            numbers[request.name] = number
-        if request.config.kind == "prefix" and request.name not in self._registry.fences:
-            self._queues.reserve_prefix(request.name, request.config.subjects)
-
-    def _keep_fences(self, trip: LineTrip, effects: list[Effect]) -> None:
-        """Publish what a trip has committed of fences, and join or part the queues."""
-        events, stirred = trip.events, []
-        if trip.log.told is not None:
-            self._registry.tallies.take(trip.log.told)
-        moved = any(leg.area is not leg.fence.area for leg in trip.fence_legs.values())
-        trip.dismiss()
-        for leg in trip.fence_legs.values():
-            fence = leg.fence
-            if leg.created:
-                self._registry.add_fence(fence)
-                for subjects in fence.subjects.values():
-                    subjects.fences[fence.number] = fence
-            changed = leg.row is not fence.row
-            leg.publish()
-            if leg.deleted:
-                self._queues.free_prefix(fence.name)
-                for subjects in fence.subjects.values():
-                    subjects.dropped(fence)
-            if leg.events or changed:
-                stirred.append(fence)
-        if events is not None:
-            self._registry.recent.add(events, len(self._registry.fences))
-        self._registry.remove_fences([leg.fence for leg in trip.fence_legs.values() if leg.deleted])
-        if stirred or events is not None:
-            effects.append(Stir(stirred, events))
-        if trip.structural:
-            self._queues.rejoin(trip, moved=moved)
-
     # Time and shutdown
 
     def _tick(self, event: Tick, effects: list[Effect]) -> None:
@@ -688,20 +590,11 @@ class Core:
         self._now = event.now
         for each in () if self._stopping else self._schedule.take(event.time):
             if isinstance(each, Fence):
-                self._pass_time(each, event, effects)
+                request = self._fences.due(each, event)
+                if request is not None:
+                    self._asked_of_fence(request, effects)
             else:
                 self._asked(Expire(event.to, each, event.time, rows=each.counts.points), effects)
-
-    def _pass_time(self, fence: Fence, event: Tick, effects: list[Effect]) -> None:
-        """Begin the events of those who have been inside of a fence for long enough."""
-        due = fence.next_due
-        if due is None or due > event.time:
-            self._schedule.plan_fence(fence)
-            return
-        # It is looked at again even if the request is refused, because the storage cannot be read.
-        self._schedule.look_again(fence, event.time)
-        rows = min(fence.waiting, MOST_DUE)
-        self._asked_of_fence(PassTime(event.to, fence.name, event.time, fence, rows=rows), effects)
 
     def _stop(self, _: Stopping, effects: list[Effect]) -> None:
         self._stopping = True

@@ -15,7 +15,7 @@ from .events import ReadHull, ReadTogether, Request, WriteTogether
 from .fences.components import SPANNING, components, depends_on, merged
 from .fences.fence import Fence
 from .fences.line import Line
-from .fences.line_trip import LineTrip
+from .fences.part import FencePart
 from .fences.requests import PREFIX, CreateFence, FenceRequest, ReplaceFence
 from .hull import Hull
 from .registry import Registry
@@ -187,22 +187,22 @@ class Queues:
         """Forget the prefix of a fence that is deleted."""
         self._prefixes.pop(PREFIX + fence, None)
 
-    def end_creation(self, trip: LineTrip) -> None:
+    def end_creation(self, trip: Trip, part: FencePart) -> None:
         """Forget the prefix of a fence that was not created after all."""
         for key in [key for key in self._prefixes if key.removeprefix(PREFIX) not in self._registry.fences]:
             if any(queue.name == key for queue in trip.queues):
                 del self._prefixes[key]
-                self.renew(trip)
+                self.renew(trip, part)
 
-    def renew(self, trip: LineTrip) -> None:
+    def renew(self, trip: Trip, part: FencePart) -> None:
         """Join and part the queues of a trip as the fences demand that are left."""
-        fences = {fence.name: fence for line in trip.lines for fence in line.fences.values()}
+        fences = {fence.name: fence for line in part.lines for fence in line.fences.values()}
         trip.queues = self.regroup(trip.queues, fences.values(), trip)
 
-    def rejoin(self, trip: LineTrip, *, moved: bool) -> None:
+    def rejoin(self, trip: Trip, part: FencePart, *, moved: bool) -> None:
         """Join and part queues after fences were created or deleted, or have moved to the area of another hull."""
-        created = [leg.fence for leg in trip.fence_legs.values() if leg.created]
-        deleted = [leg.fence for leg in trip.fence_legs.values() if leg.deleted]
+        created = [leg.fence for leg in part.legs.values() if leg.created]
+        deleted = [leg.fence for leg in part.legs.values() if leg.deleted]
         if not (created or deleted or moved):
             return
         home = max(
@@ -217,11 +217,11 @@ class Queues:
             if not created and len(deleted) < len(home.line.fences) and all(map(_is_leaf, deleted)):
                 self._part(trip, home, home.line, deleted)
                 return
-        fences = {fence.name: fence for line in trip.lines for fence in line.fences.values() if not fence.ended}
+        fences = {fence.name: fence for line in part.lines for fence in line.fences.values() if not fence.ended}
         fences |= {fence.name: fence for fence in created}
         trip.queues = self.regroup(trip.queues, fences.values(), trip)
 
-    def _join(self, trip: LineTrip, home: Queue, line: Line, fences: list[Fence]) -> None:
+    def _join(self, trip: Trip, home: Queue, line: Line, fences: list[Fence]) -> None:
         """Let the queues of the hulls that new fences depend on, all the same ones, become part of a line.
 
         O(names and fences of the other queues, and requests).
@@ -244,7 +244,7 @@ class Queues:
         home.waiting = waiting
         trip.queues = [home, *(queue for queue in trip.queues if queue not in joined)]
 
-    def _part(self, trip: LineTrip, home: Queue, line: Line, fences: list[Fence]) -> None:
+    def _part(self, trip: Trip, home: Queue, line: Line, fences: list[Fence]) -> None:
         """Take deleted fences from a line that stays together without them. O(fences and requests)."""
         parted = []
         for fence in fences:

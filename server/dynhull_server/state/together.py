@@ -19,7 +19,7 @@ def apply_together(
     hulls: list[Hull],
     records: list[list[Record] | None],
     now: float,
-    expired: Callable[[Hull], None],
+    expired: Callable[[Hull], None] | None,
 ) -> list[Applied]:
     """Apply each part of the request to its hull, as the next revision of each.
 
@@ -42,7 +42,8 @@ def apply_together(
     results: list[Applied] = []
     try:
         for part, hull, batch, kept in zip(request.parts, hulls, batches, records, strict=True):
-            results.append(hull.state.apply_decoded(part, batch, now, kept, partial(expired, hull)))
+            left = None if expired is None else partial(expired, hull)
+            results.append(hull.state.apply_decoded(part, batch, now, kept, left))
     except BaseException:
         if results:
             for state in states:

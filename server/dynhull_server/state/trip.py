@@ -1,7 +1,8 @@
 """One trip: requests that run together, and whose changes are committed together."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .batch import Applied, Batch, KeyedBatch
@@ -19,6 +20,7 @@ from .events import (
     WriteBatch,
     WriteTogether,
 )
+from .fences.requests import FenceRequest
 from .hull import Hull
 from .hull_state import Counts, HullState
 from .limits import Limits
@@ -27,6 +29,7 @@ from .root_state import RootState, state_of
 from .together import apply_together
 
 if TYPE_CHECKING:
+    from .fences.part import FencePart
     from .fences.records import KeptFence
 
 
@@ -46,25 +49,27 @@ class Leg:
         name: the name of the hull.
         hull: the hull of that name, or None.
         keeps: whether the storage keeps batches.
+        fenced: whether fences look at what the batches have changed.
 
     Attributes:
         before: the hull before the trip, or None.
         after: the hull after it, or None.
-        records: the batches applied; None where the storage keeps none.
+        records: the batches applied; None where neither the storage nor a fence needs them.
         unsaved: the number of points in them.
     """
 
-    __slots__ = ("after", "before", "name", "records", "unsaved")
+    __slots__ = ("_keeps", "after", "before", "name", "records", "unsaved")
 
-    def __init__(self, name: str, hull: Hull | None, *, keeps: bool) -> None:
+    def __init__(self, name: str, hull: Hull | None, *, keeps: bool, fenced: bool = False) -> None:
         self.name = name
         self.before = self.after = hull
-        self.records: list[Record] | None = [] if keeps else None
+        self.records: list[Record] | None = [] if keeps or fenced else None
         self.unsaved = 0
+        self._keeps = keeps
 
     def changes(self) -> list[Change]:
         """The changes to commit."""
-        before, after, records = self.before, self.after, self.records
+        before, after, records = self.before, self.after, self.records if self._keeps else None
         if after is before:
             return [Append(after.row.number, records)] if records and after is not None else []
         changes: list[Change] = []
@@ -87,13 +92,16 @@ class Trip:
     """Runs requests in order. Clients see the changes only after the trip is committed.
 
     Args:
-        legs: the hulls: one, or those of the requests to several hulls.
+        legs: the hulls that the requests name.
         requests: the requests to run.
         now: seconds on a monotonic clock.
-        place: for a hull that the trip may create, or None.
+        pause: seconds before the storage is examined again.
+        places: for the hulls that the trip may create, by name.
+        fences: what it does to fences; None where none depends on its hulls.
 
     Attributes:
-        applied: whether any batch was applied.
+        legs: the hulls by name.
+        applied: whether any batch was applied, or a fence has changed in memory.
         torn: whether the requests were applied in part, because memory ran out in the middle of one.
         queues: the queues that it occupies; only the core looks into them.
         failure: the error of the commit, or None.
@@ -106,20 +114,30 @@ class Trip:
         "_now",
         "applied",
         "failure",
+        "fences",
         "ill",
         "legs",
         "pause",
-        "place",
+        "places",
         "queues",
         "requests",
         "torn",
         "unknown",
     )
 
-    def __init__(self, legs: list[Leg], requests: list[Request], now: float, pause: float, place: Place | None) -> None:
+    def __init__(
+        self,
+        legs: Mapping[str, Leg],
+        requests: list[Request],
+        now: float,
+        pause: float,
+        places: Mapping[str, Place],
+        fences: "FencePart | None" = None,
+    ) -> None:
         self.legs = legs
         self.requests = requests
-        self.place = place
+        self.places = places
+        self.fences = fences
         self.pause = pause
         self.applied = self.torn = self.unknown = False
         self.failure: Exception | None = None
@@ -129,6 +147,7 @@ class Trip:
 
     def run(self) -> None:
         """Run the requests; their results and errors are stored in them."""
+        fences = self.fences
         for request in self.requests:
             try:
                 if type(request) is WriteBatch:
@@ -141,24 +160,32 @@ class Trip:
                     request.result = self._do(request)
             except Exception as error:  # any error is the answer to the caller
                 refuse(request, error)
+            if fences is not None:
+                self.applied |= fences.applied
+                self.torn |= fences.torn
             if self.torn:  # later requests would see a part of a batch
-                return
+                break
+        if fences is not None:
+            fences.settle(self.requests)
 
     def changes(self) -> list[Change]:
         """The changes to commit."""
-        if len(self.legs) == 1:
-            return self.legs[0].changes()
-        return [change for leg in self.legs for change in leg.changes()]
+        changes = [change for leg in self.legs.values() for change in leg.changes()]
+        return changes if self.fences is None else [*changes, *self.fences.changes()]
 
-    def landed(self, states: list[HullState | None], _: "list[KeptFence | None]") -> bool:
-        """Whether the trip was committed, given the state of each hull in the storage: it has all changes, or none."""
-        return all(leg.landed(state) for leg, state in zip(self.legs, states, strict=True))
+    def landed(self, states: list[HullState | None], fences: "list[KeptFence | None]") -> bool:
+        """Whether the trip was committed, given what the storage has of its hulls and of the examined fences.
 
-    def _leg(self, _: Request) -> Leg:
-        return self.legs[0]
+        It has all changes, or none.
+        """
+        hulls = all(leg.landed(state) for leg, state in zip(self.legs.values(), states, strict=True))
+        return hulls and (self.fences is None or self.fences.landed(fences))
 
     def _do(self, request: Request) -> object:
-        leg = self._leg(request)
+        if isinstance(request, FenceRequest):
+            assert self.fences is not None  # only the fences' room makes trips of them
+            return self.fences.do(request)
+        leg = self.legs[request.hull.name if isinstance(request, ReadHull) else request.name]  # type: ignore[attr-defined]
         match request:
             case ReadHull():
                 return _read(request, leg)
@@ -174,16 +201,23 @@ class Trip:
             case Recenter():
                 return self._recenter(request, leg)
             case DeleteHull():
-                if leg.after is None:
-                    raise HullNotFoundError(leg.name)
-                if leg.after is not leg.before:
-                    raise AssertionError("a hull is deleted in a trip of its own")
-                leg.after = None
+                self._delete(request, leg)
                 return None
         raise AssertionError(f"not a request: {request}")
 
+    def _delete(self, request: DeleteHull, leg: Leg) -> None:
+        if self.fences is not None:
+            self.fences.require_free(leg.name)
+        if leg.after is None:
+            raise HullNotFoundError(leg.name)
+        if leg.after is not leg.before:
+            raise AssertionError("a hull is deleted in a trip of its own")
+        leg.after = None
+        if self.fences is not None:
+            self.fences.hull_deleted(leg.name, request.time)
+
     def _write(self, request: WriteBatch) -> None:
-        leg = self._leg(request)
+        leg = self.legs[request.name]
         stream, hull = request.stream, leg.after
         if stream is not None and stream.stopped:
             request.abandoned = True
@@ -194,20 +228,21 @@ class Trip:
             hull = self._new_hull(request, leg)
         elif hull.divided:  # it is created by the same trip, so the batch came before the hull
             raise HullNotFoundError(leg.name)
-        applied = self._apply(request, hull, leg)
+        fences = self.fences
+        expired = None if fences is None else partial(fences.expired, hull, request.arrived)
+        applied = write(request, hull, self._now, leg.records, expired)
         self.torn = hull.state.torn
+        if fences is not None:
+            fences.wrote(leg, hull, applied, request.arrived)
         if applied is None:
             return
         leg.after = hull
         self._count(leg, applied)
 
-    def _apply(self, request: WriteBatch, hull: Hull, leg: Leg) -> Applied | None:
-        return write(request, hull, self._now, leg.records)
-
     def _write_together(self, request: WriteTogether) -> None:
         """Apply a batch to each hull. All requests of such a trip name the same hulls, perhaps in another order."""
-        legs = {leg.name: leg for leg in self.legs}
-        ordered = [legs[part.name] for part in request.parts]
+        fences = self.fences
+        ordered = [self.legs[part.name] for part in request.parts]
         hulls: list[Hull] = []
         for index, leg in enumerate(ordered):
             if leg.after is None:
@@ -218,24 +253,18 @@ class Trip:
                 raise HullUnsuitableError(leg.name, "is divided among shards, so no batch is over it and other hulls")
             hulls.append(leg.after)
         try:
-            journals = [self._journal(leg) for leg in ordered]
-            request.result = apply_together(request, hulls, journals, self._now, self._left)
+            expired = None if fences is None else fences.expired_before
+            request.result = apply_together(request, hulls, [leg.records for leg in ordered], self._now, expired)
         finally:
             self.torn = any(hull.state.torn for hull in hulls)
         for leg, applied in zip(ordered, request.result, strict=True):
             self._count(leg, applied)
-
-    def _journal(self, leg: Leg) -> list[Record] | None:
-        """The list that receives the batches of one of several hulls; None where the storage keeps none."""
-        return leg.records
-
-    def _left(self, hull: Hull) -> None:
-        """Called where points have left one of several hulls before its batch."""
+        if fences is not None:
+            fences.wrote_together(ordered, request.result, request.parts[0].arrived)
 
     def _read_together(self, request: ReadTogether) -> object:
-        legs = {leg.name: leg for leg in self.legs}
         for hull in request.parts:
-            if legs[hull.name].after is not hull:
+            if self.legs[hull.name].after is not hull:
                 raise HullNotFoundError(hull.name)
         return [hull.state.counts for hull in request.parts], request.function([hull.state for hull in request.parts])
 
@@ -254,6 +283,8 @@ class Trip:
             self.torn = hull.state.torn
         self.applied |= expired > 0
         leg.unsaved += expired
+        if expired and self.fences is not None:
+            self.fences.expired(hull, request.time)
         return expired
 
     def _follow(self, request: Follow, leg: Leg) -> Counts:
@@ -273,6 +304,8 @@ class Trip:
 
     def _recenter(self, request: Recenter, leg: Leg) -> tuple[Counts, bool]:
         hull = leg.after
+        if self.fences is not None:
+            self.fences.require_free(leg.name)  # the projection of fences and subjects stays the same
         if hull is None:
             raise HullNotFoundError(leg.name)
         try:
@@ -283,14 +316,16 @@ class Trip:
         return hull.state.counts, hull_changed
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:
-        place, birth = self.place, request.birth
-        assert place is not None  # the hull is missing, so it may be created
+        place, birth = self.places[leg.name], request.birth  # the hull is missing, so it may be created
         if place.refusal is not None:
             raise place.refusal
         assert birth is not None  # otherwise the request was refused
         settings = request.settings if isinstance(request, CreateHull) else settings_for(request.make())
         row = HullRow(place.number, leg.name, birth.uid, birth.created, settings)
-        return Hull(row, state_of(place.limits, settings, Kept(), self._now))
+        hull = Hull(row, state_of(place.limits, settings, Kept(), self._now))
+        if self.fences is not None:
+            self.fences.admit(hull)
+        return hull
 
 
 def settings_for(batch: Batch | KeyedBatch) -> HullSettings:

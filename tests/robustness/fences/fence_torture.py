@@ -37,7 +37,7 @@ from dynhull_server.state.events import (
     Retry,
     Tick,
 )
-from dynhull_server.state.fences import fence_work
+from dynhull_server.state.fences import definition
 from dynhull_server.state.fences.event_order import EventOrder, subjects_of
 from dynhull_server.state.fences.fence import Fence
 from dynhull_server.state.fences.fence_leg import members
@@ -51,7 +51,7 @@ from dynhull_server.storage.memory import MemoryStorage
 
 LIMITS = Limits(max_hulls=99, max_points=10**6, max_producers=9, max_producers_per_caller=9, history_bytes=10**5)
 # Subjects inside of the fences of a trip after which it creates no more: few, as there are few subjects.
-fence_work.MOST_INSIDE = 5
+definition.MOST_INSIDE = 5
 # Steps with one seed.
 LIFE = 500
 # What the model does not know of an event.

@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ..hull_state import HullState
 from ..registry import Registry
+from ..trip import Trip
 from .fence import Fence
-from .line_trip import LineTrip
 from .pair import Pair
+from .part import FencePart
 from .records import KeptFence
 from .restoring import Restored, restore
 from .subjects import Subjects
@@ -39,31 +40,31 @@ def bring_back(kept: Sequence[KeptFence], registry: Registry) -> list[Fence]:
 
 
 def reading(
-    trip: LineTrip,
+    trip: Trip, part: FencePart
 ) -> tuple[list[int], Callable[[list[HullState | None], list[KeptFence | None]], Restored | None]]:
     """The numbers of the fences that a trip concerns, and what to make of those that the storage has.
 
     That is None if the trip was committed.
     """
-    touched = trip.touched()
+    touched = part.touched()
     numbers = sorted(
-        {number for subjects in touched.values() for number in subjects.fences} | trip.fence_legs.keys() | trip.pairs()
+        {number for subjects in touched.values() for number in subjects.fences} | part.legs.keys() | part.pairs()
     )
 
     def restored(states: list[HullState | None], kept: list[KeptFence | None]) -> Restored | None:
         if trip.unknown and trip.landed(states, kept):
             return None
         stored = dict(zip(numbers, kept, strict=True))
-        found = {leg.name: state for leg, state in zip(trip.legs, states, strict=True) if state is not None}
+        found = {name: state for name, state in zip(trip.legs, states, strict=True) if state is not None}
         there = {number: each for number, each in stored.items() if each is not None}
         return restore(touched.values(), found, there)
 
     return numbers, restored
 
 
-def give_back(trip: LineTrip, restored: Restored, registry: Registry) -> None:
+def give_back(part: FencePart, restored: Restored, registry: Registry) -> None:
     """Return fences to what the storage has of them: the changes of the trip were not committed."""
-    trip.undo_created()
+    part.undo_created()
     for kept in restored.kept.values():
         fence = registry.fences[kept.row.name]
         fence.restored(kept)
@@ -72,7 +73,7 @@ def give_back(trip: LineTrip, restored: Restored, registry: Registry) -> None:
             fence.pair = Pair(fence.area, fence.pair.other, fence.row.config.near)
             fence.pair.look()
             fence.count_inside()
-    _adopt(restored, trip.touched())
+    _adopt(restored, part.touched())
 
 
 def _adopt(restored: Restored, subjects: Mapping[str, Subjects]) -> None:

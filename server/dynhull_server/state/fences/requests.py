@@ -127,3 +127,4 @@ class PassTime(FenceRequest):
 
 # Requests that change which hulls share a queue, or what they are compared with.
 STRUCTURAL = (CreateFence, ReplaceFence, DeleteFence)
+FENCE_REQUESTS = (CreateFence, ReplaceFence, DeleteFence, ReadFence, PutConsumer, DropConsumer, DropEvents, PassTime)

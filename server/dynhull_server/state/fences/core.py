@@ -1,0 +1,146 @@
+"""What the core does for fences: their part of trips, and what follows once that is committed or fails."""
+
+from collections.abc import Sequence
+
+from ..events import CreateHull, Effect, Examine, Request, Stir, Tick, WriteBatch
+from ..queues import Queue, Queues, names_of
+from ..registry import Registry
+from ..schedule import Schedule
+from ..trip import Leg, Trip
+from . import recovery
+from .comparison import Ground
+from .deadlines import MOST_DUE
+from .fence import Fence
+from .part import FencePart
+from .records import KeptFence
+from .requests import CreateFence, FenceRequest, PassTime
+from .restoring import Restored
+
+
+class FenceCore:
+    """All fences of a server.
+
+    Args:
+        registry: the hulls and fences that are committed.
+        queues: the queues of all names.
+        schedule: when fences have something to do because time passes.
+        keeps: whether the storage keeps batches.
+    """
+
+    def __init__(self, registry: Registry, queues: Queues, schedule: Schedule, *, keeps: bool) -> None:
+        self._registry = registry
+        self._queues = queues
+        self._schedule = schedule
+        self._keeps = keeps
+
+    def restore(self, kept: Sequence[KeptFence]) -> None:
+        """Add the fences that the storage has kept."""
+        self._queues.add_fences(recovery.bring_back(kept, self._registry))
+        for fence in self._registry.fences.values():
+            self._schedule.plan_fence(fence)
+
+    # Trips
+
+    def trip(self, queues: Sequence[Queue], requests: list[Request], now: float, pause: float) -> Trip:
+        """A trip on hulls with fences, or one that gives them a fence."""
+        names: dict[str, None] = {}
+        fences: dict[str, Fence | None] = {}
+        numbers: dict[str, int] = {}
+        births: set[str] = set()
+        for request in requests:
+            if type(request) is WriteBatch:  # as a rule
+                names[request.name] = None
+                if request.birth is not None:
+                    births.add(request.name)
+            elif isinstance(request, FenceRequest):
+                fences[request.name] = self._registry.fences.get(request.name)
+                names |= dict.fromkeys(request.names[1:])
+                if isinstance(request, CreateFence):
+                    self._reserve(request, numbers)
+            else:
+                names |= dict.fromkeys(names_of(request))
+                if isinstance(request, CreateHull):
+                    births.add(request.name)
+        hulls = self._registry.hulls
+        places = {name: self._registry.reserve_hull() for name in sorted(births) if name not in hulls}
+        legs = {name: Leg(name, hulls.get(name), keeps=self._keeps, fenced=True) for name in names}
+        lines = [queue.line for queue in queues if queue.line is not None]
+        ground = Ground(legs, lines, fences, numbers, self._registry.tallies, self._registry.limits.fences)
+        return Trip(legs, requests, now, pause, places, FencePart(ground, requests))
+
+    def _reserve(self, request: CreateFence, numbers: dict[str, int]) -> None:
+        number = self._registry.reserve_fence()
+        if number is not None:
+            numbers[request.name] = number
+        if request.config.kind == "prefix" and request.name not in self._registry.fences:
+            self._queues.reserve_prefix(request.name, request.config.subjects)
+
+    def ran(self, part: FencePart) -> None:
+        """Let the requests that a trip has left wait before the others."""
+        for request in reversed(part.left):
+            if not request.abandoned:
+                for queue in self._queues.at(request.names):
+                    queue.waiting.insert(0, request)
+
+    def over(self, trip: Trip, part: FencePart) -> None:
+        """Give back what the trip has reserved, and plan the times of its fences."""
+        if part.creates:
+            self._queues.end_creation(trip, part)
+            self._registry.give_back(0, part.creates)
+        for leg in part.legs.values():
+            if self._registry.fences.get(leg.fence.name) is leg.fence:
+                self._schedule.plan_fence(leg.fence)
+
+    # Commits
+
+    def keep(self, trip: Trip, part: FencePart, effects: list[Effect]) -> None:
+        """Publish what a trip has committed of fences, and join or part the queues."""
+        events, stirred = part.events, []
+        if part.crossed is not None:
+            self._registry.tallies.take(part.crossed)
+        moved = any(leg.area is not leg.fence.area for leg in part.legs.values())
+        part.dismiss_deleted()
+        for leg in part.legs.values():
+            fence = leg.fence
+            if leg.created:
+                self._registry.add_fence(fence)
+                for subjects in fence.subjects.values():
+                    subjects.fences[fence.number] = fence
+            changed = leg.row is not fence.row
+            leg.publish()
+            if leg.deleted:
+                self._queues.free_prefix(fence.name)
+                for subjects in fence.subjects.values():
+                    subjects.dropped(fence)
+            if leg.events or changed:
+                stirred.append(fence)
+        if events is not None:
+            self._registry.recent.add(events, len(self._registry.fences))
+        self._registry.remove_fences([leg.fence for leg in part.legs.values() if leg.deleted])
+        if stirred or events is not None:
+            effects.append(Stir(stirred, events))
+        if part.structural:
+            self._queues.rejoin(trip, part, moved=moved)
+
+    def examine(self, trip: Trip, part: FencePart, effect: Examine) -> None:
+        """Let the storage be examined for the fences that a trip concerns, too."""
+        part.examined, effect.restore = recovery.reading(trip, part)
+        effect.fences = part.examined
+
+    def give_back(self, trip: Trip, part: FencePart, restored: Restored | None) -> None:
+        """Return fences to what the storage has of them: the changes of the trip were not committed."""
+        assert restored is not None  # so it says, too
+        recovery.give_back(part, restored, self._registry)
+        self._queues.renew(trip, part)
+
+    # Time
+
+    def due(self, fence: Fence, tick: Tick) -> PassTime | None:
+        """The request for the events of those who have been inside of a fence for long enough; None if nobody has."""
+        due = fence.next_due
+        if due is None or due > tick.time:
+            self._schedule.plan_fence(fence)
+            return None
+        # It is looked at again even if the request is refused, because the storage cannot be read.
+        self._schedule.look_again(fence, tick.time)
+        return PassTime(tick.to, fence.name, tick.time, fence, rows=min(fence.waiting, MOST_DUE))
