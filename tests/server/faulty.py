@@ -36,8 +36,9 @@ class Faulty(SQLiteStorage):
         fails("thread", SystemExit())
         while (FAULTS / "hang").exists():
             time.sleep(0.05)
-        super().commit(changes, now)
+        commit = super().commit(changes, now)
         fails("commit", no_disk())
+        return commit
 
     def settle(self):
         fails("settle", no_disk())

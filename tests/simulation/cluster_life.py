@@ -23,6 +23,7 @@ from dynhull_cluster.postgres import ownership, processes
 from dynhull_cluster.postgres.ownership import LOOK, REQUIRE, Leases, Ownership, taken_over, writer_name
 from dynhull_server.state.errors import NotStoredError, OutcomeUnknownError
 from dynhull_server.state.limits import Limits
+from dynhull_server.state.records import Committed
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import Contents, NotCommittedError, Progress, StorageError, TakenOverError
 
@@ -97,7 +98,7 @@ class OwnedStorage:
         self._commits = self._site.commits
         return self._site.store.open(progress)
 
-    def commit(self, changes: Sequence[Any], now: int = 0) -> None:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> Committed:
         """Keep the changes, unless another server owns them, or the connection is lost before."""
         try:
             session = self._begun()
@@ -107,13 +108,14 @@ class OwnedStorage:
             raise NotCommittedError(str(error)) from error
         self._process.give_way()
         if session.open:
-            self._site.store.commit(changes, now)
+            commit = self._site.store.commit(changes, now)
             self._site.commits += 1
             self._site.database.carry_out(session, "COMMIT", [])
         self._process.give_way()
         if not session.open:
             raise StorageError("the connection is lost while a commit is under way, as planned")
         self._commits += 1
+        return commit
 
     def settle(self) -> None:
         """Decide what was left undecided: connect again, and look."""

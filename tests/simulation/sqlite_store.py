@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from dynhull_server.state.fences.records import KeptFence
+from dynhull_server.state.records import Committed
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import Contents, Progress
@@ -93,15 +94,16 @@ class SQLiteLives(FaultyStorage):
         """Have the next life find the last backup, if there is one."""
         self._restores = True
 
-    def commit(self, changes: Sequence[Any], now: int = 0) -> None:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> Committed:
         """Keep the changes."""
         self.give_way()
         self._pending = changes
         try:
-            self._inner.commit(changes, now)
+            commit = self._inner.commit(changes, now)
         finally:
             self._pending = ()
         self.give_way()
+        return commit
 
     def _landed(self) -> None:
         self._model.landed(self._pending)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from dynhull_server.state.fences.records import FenceEvent, Inside, KeptFence
-from dynhull_server.state.records import HullRow, Kept
+from dynhull_server.state.records import Committed, HullRow, Kept
 from dynhull_server.storage.port import NEWEST, Contents, NotCommittedError, Progress, Step, Storage
 
 from .model import Model
@@ -70,14 +70,14 @@ class FaultyStorage:
         """Have the next life find the last copy, if there is one, in place of what is there."""
         raise NotImplementedError("only folders are copied")
 
-    def commit(self, changes: Sequence[Any], now: int = 0) -> None:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> Committed:
         """Keep the changes, and fail before, instead or afterwards."""
         self.give_way()
         kind = self._fault("commit")
         self._decide()
         match kind:
             case None:
-                self._keep(changes, now)
+                commit = self._keep(changes, now)
             case "nothing":
                 raise NotCommittedError("the commit fails, as planned")
             case "full":
@@ -90,11 +90,12 @@ class FaultyStorage:
                     self._keep(changes, now)
                 raise (MemoryError if kind.endswith("memory") else OSError)("the commit fails, as planned")
         self.give_way()
+        return commit
 
-    def _keep(self, changes: Sequence[Any], now: int) -> None:
+    def _keep(self, changes: Sequence[Any], now: int) -> Committed:
         self._model.landed(changes)
         try:
-            self._inner.commit(changes, now)
+            return self._inner.commit(changes, now)
         except Exception as error:
             raise self._model.finds(f"the storage was asked for the impossible: {changes}: {error!r}") from error
 

@@ -136,7 +136,7 @@ class Window(_message.Message):
     def __init__(self, max_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_points: _Optional[int] = ..., clock: _Optional[_Union[Clock, str]] = ..., max_skew: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., ahead: _Optional[_Union[AheadPolicy, str]] = ...) -> None: ...
 
 class Measures(_message.Message):
-    __slots__ = ("area", "perimeter", "centroid_x", "centroid_y", "min_x", "min_y", "max_x", "max_y")
+    __slots__ = ("area", "perimeter", "centroid_x", "centroid_y", "min_x", "min_y", "max_x", "max_y", "diameter", "width")
     AREA_FIELD_NUMBER: _ClassVar[int]
     PERIMETER_FIELD_NUMBER: _ClassVar[int]
     CENTROID_X_FIELD_NUMBER: _ClassVar[int]
@@ -145,6 +145,8 @@ class Measures(_message.Message):
     MIN_Y_FIELD_NUMBER: _ClassVar[int]
     MAX_X_FIELD_NUMBER: _ClassVar[int]
     MAX_Y_FIELD_NUMBER: _ClassVar[int]
+    DIAMETER_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_FIELD_NUMBER: _ClassVar[int]
     area: float
     perimeter: float
     centroid_x: float
@@ -153,4 +155,6 @@ class Measures(_message.Message):
     min_y: float
     max_x: float
     max_y: float
-    def __init__(self, area: _Optional[float] = ..., perimeter: _Optional[float] = ..., centroid_x: _Optional[float] = ..., centroid_y: _Optional[float] = ..., min_x: _Optional[float] = ..., min_y: _Optional[float] = ..., max_x: _Optional[float] = ..., max_y: _Optional[float] = ...) -> None: ...
+    diameter: float
+    width: float
+    def __init__(self, area: _Optional[float] = ..., perimeter: _Optional[float] = ..., centroid_x: _Optional[float] = ..., centroid_y: _Optional[float] = ..., min_x: _Optional[float] = ..., min_y: _Optional[float] = ..., max_x: _Optional[float] = ..., max_y: _Optional[float] = ..., diameter: _Optional[float] = ..., width: _Optional[float] = ...) -> None: ...

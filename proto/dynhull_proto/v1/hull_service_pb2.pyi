@@ -20,9 +20,38 @@ class HullView(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     HULL_VIEW_UNSPECIFIED: _ClassVar[HullView]
     HULL_VIEW_BASIC: _ClassVar[HullView]
     HULL_VIEW_FULL: _ClassVar[HullView]
+
+class HullContents(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    HULL_CONTENTS_UNSPECIFIED: _ClassVar[HullContents]
+    HULL_CONTENTS_SUMMARY: _ClassVar[HullContents]
+    HULL_CONTENTS_OUTLINE: _ClassVar[HullContents]
+
+class Picture(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    PICTURE_UNSPECIFIED: _ClassVar[Picture]
+    PICTURE_BEGINS: _ClassVar[Picture]
+    PICTURE_BEGINS_ANEW: _ClassVar[Picture]
+    PICTURE_COMPLETE: _ClassVar[Picture]
+
+class HullPresence(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    HULL_PRESENCE_UNSPECIFIED: _ClassVar[HullPresence]
+    HULL_PRESENCE_UNCHANGED: _ClassVar[HullPresence]
+    HULL_PRESENCE_GONE: _ClassVar[HullPresence]
 HULL_VIEW_UNSPECIFIED: HullView
 HULL_VIEW_BASIC: HullView
 HULL_VIEW_FULL: HullView
+HULL_CONTENTS_UNSPECIFIED: HullContents
+HULL_CONTENTS_SUMMARY: HullContents
+HULL_CONTENTS_OUTLINE: HullContents
+PICTURE_UNSPECIFIED: Picture
+PICTURE_BEGINS: Picture
+PICTURE_BEGINS_ANEW: Picture
+PICTURE_COMPLETE: Picture
+HULL_PRESENCE_UNSPECIFIED: HullPresence
+HULL_PRESENCE_UNCHANGED: HullPresence
+HULL_PRESENCE_GONE: HullPresence
 
 class CreateHullRequest(_message.Message):
     __slots__ = ("name", "config")
@@ -889,6 +918,68 @@ class ReadError(_message.Message):
     message: str
     details: _containers.RepeatedCompositeFieldContainer[_any_pb2.Any]
     def __init__(self, code: _Optional[int] = ..., message: _Optional[str] = ..., details: _Optional[_Iterable[_Union[_any_pb2.Any, _Mapping]]] = ...) -> None: ...
+
+class WatchManyRequest(_message.Message):
+    __slots__ = ("prefix", "names", "contents", "max_vertices", "max_events_per_second", "position", "encoding")
+    PREFIX_FIELD_NUMBER: _ClassVar[int]
+    NAMES_FIELD_NUMBER: _ClassVar[int]
+    CONTENTS_FIELD_NUMBER: _ClassVar[int]
+    MAX_VERTICES_FIELD_NUMBER: _ClassVar[int]
+    MAX_EVENTS_PER_SECOND_FIELD_NUMBER: _ClassVar[int]
+    POSITION_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    prefix: str
+    names: _containers.RepeatedScalarFieldContainer[str]
+    contents: HullContents
+    max_vertices: int
+    max_events_per_second: float
+    position: bytes
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, prefix: _Optional[str] = ..., names: _Optional[_Iterable[str]] = ..., contents: _Optional[_Union[HullContents, str]] = ..., max_vertices: _Optional[int] = ..., max_events_per_second: _Optional[float] = ..., position: _Optional[bytes] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class WatchManyResponse(_message.Message):
+    __slots__ = ("hulls", "picture", "position")
+    HULLS_FIELD_NUMBER: _ClassVar[int]
+    PICTURE_FIELD_NUMBER: _ClassVar[int]
+    POSITION_FIELD_NUMBER: _ClassVar[int]
+    hulls: _containers.RepeatedCompositeFieldContainer[HullNow]
+    picture: Picture
+    position: bytes
+    def __init__(self, hulls: _Optional[_Iterable[_Union[HullNow, _Mapping]]] = ..., picture: _Optional[_Union[Picture, str]] = ..., position: _Optional[bytes] = ...) -> None: ...
+
+class HullNow(_message.Message):
+    __slots__ = ("name", "presence", "uid", "revision", "point_count", "held_count", "vertex_count", "frame", "center", "measures", "changed_time", "clock_time", "vertices", "error", "commit")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    PRESENCE_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    HELD_COUNT_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_COUNT_FIELD_NUMBER: _ClassVar[int]
+    FRAME_FIELD_NUMBER: _ClassVar[int]
+    CENTER_FIELD_NUMBER: _ClassVar[int]
+    MEASURES_FIELD_NUMBER: _ClassVar[int]
+    CHANGED_TIME_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
+    VERTICES_FIELD_NUMBER: _ClassVar[int]
+    ERROR_FIELD_NUMBER: _ClassVar[int]
+    COMMIT_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    presence: HullPresence
+    uid: str
+    revision: int
+    point_count: int
+    held_count: int
+    vertex_count: int
+    frame: _hull_pb2.Frame
+    center: _hull_pb2.LonLat
+    measures: _hull_pb2.Measures
+    changed_time: _timestamp_pb2.Timestamp
+    clock_time: _timestamp_pb2.Timestamp
+    vertices: _points_pb2.Points
+    error: float
+    commit: int
+    def __init__(self, name: _Optional[str] = ..., presence: _Optional[_Union[HullPresence, str]] = ..., uid: _Optional[str] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., held_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., frame: _Optional[_Union[_hull_pb2.Frame, str]] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., changed_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., error: _Optional[float] = ..., commit: _Optional[int] = ...) -> None: ...
 
 class WatchRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys", "outline_only", "layer", "max_vertices")

@@ -225,6 +225,11 @@ class HullServiceStub(object):
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchRequest.SerializeToString,
                 response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchResponse.FromString,
                 _registered_method=True)
+        self.WatchMany = channel.unary_stream(
+                '/dynhull.v1.HullService/WatchMany',
+                request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchManyRequest.SerializeToString,
+                response_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchManyResponse.FromString,
+                _registered_method=True)
         self.Verify = channel.unary_unary(
                 '/dynhull.v1.HullService/Verify',
                 request_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.VerifyRequest.SerializeToString,
@@ -524,6 +529,23 @@ class HullServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def WatchMany(self, request, context):
+        """Sends the state of each of many hulls, then of each that changes, comes or goes. Many states are in one message, and a
+        hull that changes often, or a watcher that reads slowly, gets newer states rather than more of them. Through a server
+        of several workers, too.
+
+        A picture comes first: from PICTURE_BEGINS to PICTURE_COMPLETE every hull that exists is named, so what a watcher
+        holds of others is no more. A watcher that has a position gets the states that differ from those it had there, and of
+        the others their names. States may come twice, and never go back, unless PICTURE_BEGINS_ANEW says that a backup was
+        restored, or that the position is of other data.
+
+        PERMISSION_DENIED if a hull of that prefix, or of these names, may not be read; the stream ends when the token loses
+        that.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def Verify(self, request, context):
         """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
         which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
@@ -690,6 +712,11 @@ def add_HullServiceServicer_to_server(servicer, server):
                     servicer.Watch,
                     request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchRequest.FromString,
                     response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchResponse.SerializeToString,
+            ),
+            'WatchMany': grpc.unary_stream_rpc_method_handler(
+                    servicer.WatchMany,
+                    request_deserializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchManyRequest.FromString,
+                    response_serializer=dynhull__proto_dot_v1_dot_hull__service__pb2.WatchManyResponse.SerializeToString,
             ),
             'Verify': grpc.unary_unary_rpc_method_handler(
                     servicer.Verify,
@@ -1570,6 +1597,33 @@ class HullService(object):
             '/dynhull.v1.HullService/Watch',
             dynhull__proto_dot_v1_dot_hull__service__pb2.WatchRequest.SerializeToString,
             dynhull__proto_dot_v1_dot_hull__service__pb2.WatchResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def WatchMany(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/dynhull.v1.HullService/WatchMany',
+            dynhull__proto_dot_v1_dot_hull__service__pb2.WatchManyRequest.SerializeToString,
+            dynhull__proto_dot_v1_dot_hull__service__pb2.WatchManyResponse.FromString,
             options,
             channel_credentials,
             insecure,

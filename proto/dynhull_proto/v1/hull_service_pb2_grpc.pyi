@@ -186,6 +186,19 @@ class HullServiceStub:
     """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
     rate: the events received so far always give the exact hull at the revision of the last one.
     """
+    WatchMany: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.WatchManyRequest, _hull_service_pb2.WatchManyResponse]
+    """Sends the state of each of many hulls, then of each that changes, comes or goes. Many states are in one message, and a
+    hull that changes often, or a watcher that reads slowly, gets newer states rather than more of them. Through a server
+    of several workers, too.
+
+    A picture comes first: from PICTURE_BEGINS to PICTURE_COMPLETE every hull that exists is named, so what a watcher
+    holds of others is no more. A watcher that has a position gets the states that differ from those it had there, and of
+    the others their names. States may come twice, and never go back, unless PICTURE_BEGINS_ANEW says that a backup was
+    restored, or that the position is of other data.
+
+    PERMISSION_DENIED if a hull of that prefix, or of these names, may not be read; the stream ends when the token loses
+    that.
+    """
     Verify: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
     which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
@@ -349,6 +362,19 @@ class HullServiceAsyncStub(HullServiceStub):
     Watch: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchRequest, _hull_service_pb2.WatchResponse]  # type: ignore[assignment]
     """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
     rate: the events received so far always give the exact hull at the revision of the last one.
+    """
+    WatchMany: _aio.UnaryStreamMultiCallable[_hull_service_pb2.WatchManyRequest, _hull_service_pb2.WatchManyResponse]  # type: ignore[assignment]
+    """Sends the state of each of many hulls, then of each that changes, comes or goes. Many states are in one message, and a
+    hull that changes often, or a watcher that reads slowly, gets newer states rather than more of them. Through a server
+    of several workers, too.
+
+    A picture comes first: from PICTURE_BEGINS to PICTURE_COMPLETE every hull that exists is named, so what a watcher
+    holds of others is no more. A watcher that has a position gets the states that differ from those it had there, and of
+    the others their names. States may come twice, and never go back, unless PICTURE_BEGINS_ANEW says that a backup was
+    restored, or that the position is of other data.
+
+    PERMISSION_DENIED if a hull of that prefix, or of these names, may not be read; the stream ends when the token loses
+    that.
     """
     Verify: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]  # type: ignore[assignment]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
@@ -696,6 +722,25 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.WatchResponse], _abc.AsyncIterator[_hull_service_pb2.WatchResponse]]:
         """Sends a snapshot of the vertices, then changes. Changes are combined for a watcher that reads slowly or limits the
         rate: the events received so far always give the exact hull at the revision of the last one.
+        """
+
+    @_abc_1.abstractmethod
+    def WatchMany(
+        self,
+        request: _hull_service_pb2.WatchManyRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.WatchManyResponse], _abc.AsyncIterator[_hull_service_pb2.WatchManyResponse]]:
+        """Sends the state of each of many hulls, then of each that changes, comes or goes. Many states are in one message, and a
+        hull that changes often, or a watcher that reads slowly, gets newer states rather than more of them. Through a server
+        of several workers, too.
+
+        A picture comes first: from PICTURE_BEGINS to PICTURE_COMPLETE every hull that exists is named, so what a watcher
+        holds of others is no more. A watcher that has a position gets the states that differ from those it had there, and of
+        the others their names. States may come twice, and never go back, unless PICTURE_BEGINS_ANEW says that a backup was
+        restored, or that the position is of other data.
+
+        PERMISSION_DENIED if a hull of that prefix, or of these names, may not be read; the stream ends when the token loses
+        that.
         """
 
     @_abc_1.abstractmethod

@@ -19,6 +19,7 @@ from psycopg.errors import DiskFull
 
 from dynhull_server.state.changes import Change
 from dynhull_server.state.errors import words, words_for_callers
+from dynhull_server.state.records import Committed
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import (
     Contents,
@@ -198,9 +199,11 @@ class PostgresStorage(RowStorage):
 
     # Committing
 
-    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> None:
+    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> Committed:
         """Commit all of the changes or none."""
-        self._write(self._group(changes, now))
+        group = self._group(changes, now)
+        self._write(group)
+        return group.commit
 
     def settle(self) -> None:
         """Decide the outcome of the last commit, as described at the top of this file."""

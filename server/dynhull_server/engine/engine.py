@@ -2,19 +2,19 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, assert_never
 
+from ..state import events
 from ..state.batch import Applied
 from ..state.core import Core
 from ..state.errors import HullUnsuitableError, StoppingError
 from ..state.events import (
     Birth,
     Commit,
-    Committed,
     Compute,
     Computed,
     CreateHull,
@@ -40,7 +40,7 @@ from ..state.events import (
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
-from ..state.records import DEFAULT, Create, Delete, HullRow, HullSettings, Kept
+from ..state.records import DEFAULT, Committed, Create, Delete, HullRow, HullSettings, Kept
 from ..state.root_state import state_of
 from ..state.trip import Trip, unsaved_of
 from ..storage.port import Contents, FollowedStorage, NotCommittedError, Progress, Storage, StorageError
@@ -53,7 +53,9 @@ from .group_commit import GroupCommit
 from .housekeeping import Housekeeping
 from .layers import COPIES
 from .live_hull import LiveHull
+from .positions import Standing, incarnation_of, standing
 from .recalls import Recalls
+from .rosters import Rosters
 from .server_time import ServerTime
 from .supervisor import Supervisor
 from .threads import Machine, Pool
@@ -114,6 +116,7 @@ class Engine:
     Attributes:
         fences: the fences.
         copies: limits the copies of hulls that large reads make.
+        rosters: those of the watches of many hulls.
     """
 
     def __init__(
@@ -132,6 +135,10 @@ class Engine:
         self.fences = Fences(self, storage)
         self.copies = asyncio.Semaphore(COPIES)
         self.divisions = divisions
+        self.rosters = Rosters(lambda: self._core.hulls.values())
+        self._incarnation = machine.token()  # that of hulls in memory; others find theirs in the storage
+        self._published = Committed(0, 0)
+        self._standing = standing(self._incarnation, self._published)
         self._live: dict[Hull, LiveHull] = {}
         self._events: deque[Event] = deque()
         self._calls: deque[Callable[[], None]] = deque()
@@ -188,6 +195,9 @@ class Engine:
         await self.run(self._turns, partial(self._restore_fences, contents))
         latest = self._core.latest_time
         self._time = ServerTime(clock, latest)
+        if self._storage.keeps:
+            self._incarnation = incarnation_of(contents.hulls)
+            self._published = Committed(contents.commits, contents.committed)
         # A window does not follow the last commit: the clock that it was made by may have been wrong.
         self._commit_time = ServerTime(clock, max(latest or 0, contents.committed))
         self._commits = GroupCommit(
@@ -395,6 +405,13 @@ class Engine:
         return self._time.now()
 
     @property
+    def standing(self) -> Standing:
+        """How far what is published has come."""
+        if not self._core.undecided:  # otherwise it may lack an earlier commit than the latest
+            self._standing = standing(self._incarnation, self._published)
+        return self._standing
+
+    @property
     def expired(self) -> int:
         """The number of points that have left by the server's clock, without those that left before a batch."""
         return self._expiries.points
@@ -546,8 +563,8 @@ class Engine:
     def _carry_out(self, effect: Effect) -> None:
         match effect:
             case Reply():
-                for hull in effect.moved:
-                    self._move(hull)
+                if effect.moved:
+                    self._publish(effect.moved)
                 for request in effect.requests:
                     request.to.answer(request)
             case Divide():
@@ -567,6 +584,14 @@ class Engine:
             case _:
                 assert_never(effect)
 
+    def _publish(self, moved: Iterable[Hull]) -> None:
+        if not self._storage.keeps:  # it does not number them
+            self._published = Committed(self._published.number + 1, self._commit_time.now())
+        for hull in moved:
+            hull.committed = self._published
+            self._move(hull)
+        self.rosters.moved(moved)
+
     def _move(self, hull: Hull) -> None:
         if hull.divided and self.divisions is not None:
             if hull.ended:
@@ -581,14 +606,21 @@ class Engine:
 
     def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
         if trip is None:  # the storage is immediate
-            self._storage.commit(changes, self._commit_time.now())
+            self._published = self._storage.commit(changes, self._commit_time.now())
             return
 
         def done(error: Exception | None, unknown: bool) -> None:
-            event = Committed(trip) if error is None else Failed(trip, error, unknown)
-            self._from_thread(partial(self.dispatch, event))
+            if error is None:
+                assert self._commits.latest is not None  # it has just been made
+                self._from_thread(partial(self._committed, trip, self._commits.latest))
+            else:
+                self._from_thread(partial(self.dispatch, Failed(trip, error, unknown)))
 
         self._commits.submit(changes, done)
+
+    def _committed(self, trip: Trip, commit: Committed) -> None:
+        self._published = commit
+        self.dispatch(events.Committed(trip))
 
     def _compute(self, trip: Trip) -> None:
         def ran(_: "Future[None]") -> None:

@@ -6,12 +6,15 @@ Large changes are committed in pieces, as far as the storage allows, each togeth
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from ..state.changes import Change
 from ..state.errors import words, words_for_callers
 from ..storage.port import NotCommittedError, Step, Storage, TakenOverError
 from .threads import Clock, Inbox, Threads
+
+if TYPE_CHECKING:
+    from ..state.records import Committed
 
 # Called with the outcome of a commit: its error or None, and whether the outcome is unknown.
 Done = Callable[[Exception | None, bool], None]
@@ -71,6 +74,7 @@ class GroupCommit:
 
     Attributes:
         since: the time by the clock when the commit in progress began; None while there is none.
+        latest: the last commit, while those are told of it that it has the changes of; None before the first.
     """
 
     def __init__(
@@ -88,6 +92,7 @@ class GroupCommit:
         self._time = time
         self._undecided = False
         self.since: float | None = None
+        self.latest: Committed | None = None
         self._inbox: Inbox[_Waiting] = threads.inbox()
         self._thread = threads.spawn("commits", self._run, died)
 
@@ -157,7 +162,7 @@ class GroupCommit:
         if not group:
             return
         try:
-            self._storage.commit([change for each in group for change in each.changes], self._time())
+            self.latest = self._storage.commit([change for each in group for change in each.changes], self._time())
         except NotCommittedError as error:
             if len(group) == 1:
                 group[0].done(error, False)

@@ -1,12 +1,12 @@
 """One hull as its callers use it: reads at one revision, waits for the next, and earlier revisions."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +32,7 @@ from ..state.fences.recomputing import Sides, sides_of
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.outline import GlobeOutline, Outline
-from ..state.records import Center, Contents, HullSettings, Keys, QuarantineRules
+from ..state.records import Center, Committed, Contents, HullSettings, Keys, QuarantineRules
 from ..state.sample import sample
 from .difference import Differences
 from .fence_verification import MOST_FAULTS, verify_events, verify_sides
@@ -71,6 +71,8 @@ class LiveHull:
         self._outlined: asyncio.Event | None = None
         self._last_outlined = hull.counts.outlined
         self._outline: tuple[Points, Center | None, Outline] | None = None
+        self._measures: tuple[Points, Any] | None = None
+        self._measuring: asyncio.Lock | None = None  # made for those of ten thousand hulls that are measured
 
     @property
     def name(self) -> str:
@@ -106,6 +108,11 @@ class LiveHull:
     def counts(self) -> Counts:
         """The counts at the latest committed revision."""
         return self._hull.counts
+
+    @property
+    def committed(self) -> Committed | None:
+        """The commit of the latest revision; None where it is not known."""
+        return self._hull.committed
 
     @property
     def vertex_count(self) -> int:
@@ -437,6 +444,16 @@ class LiveHull:
             self._outlined.set()
             self._outlined = None
         self._last_outlined = self.counts.outlined
+
+    async def measured(self, vertices: Points, measure: Callable[[], Awaitable[T]]) -> T:
+        """The measures of these vertices: measured once, however many ask, until the vertices change."""
+        if self._measuring is None:
+            self._measuring = asyncio.Lock()
+        async with self._measuring:
+            if self._measures is None or self._measures[0] is not vertices:
+                self._measures = vertices, await measure()
+            measures: T = self._measures[1]
+            return measures
 
     async def outline(self, counts: Counts, vertices: Points) -> Outline:
         """A separate hull with these vertices, shared by large reads of one revision."""

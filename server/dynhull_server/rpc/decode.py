@@ -13,6 +13,8 @@ from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
 
 from ..engine.layers import MOST_LAYERS
+from ..engine.positions import Standing, decode_position
+from ..engine.rosters import Choice
 from ..state.contents.deadlines import Key
 from ..state.frames import off_globe
 from .readings import Reading
@@ -257,6 +259,43 @@ def decode_max_vertices(request: hull_service_pb2.WatchRequest) -> int:
                 problem = f"cannot be combined with {other}"
                 raise InvalidFieldError(field, getattr(request, field), problem)
     return request.max_vertices
+
+
+def decode_many(request: hull_service_pb2.WatchManyRequest) -> Choice:
+    """The hulls of a request about many."""
+    if not request.names:
+        if not NAME_CHARACTERS.fullmatch(request.prefix):
+            raise InvalidFieldError("prefix", request.prefix, 'names consist of letters, digits and "._-/"')
+        return Choice(request.prefix)
+    if request.prefix:
+        raise InvalidFieldError("names", f"{len(request.names)} names", "cannot be combined with prefix")
+    for row, name in enumerate(request.names):
+        if not NAME.fullmatch(name):
+            raise InvalidFieldError("names", name, f"a hull's name is {NAME_WORDS}", row)
+    return Choice(None, frozenset(request.names))
+
+
+def decode_many_contents(request: hull_service_pb2.WatchManyRequest) -> tuple[bool, int]:
+    """Whether vertices are wanted, and the most of each hull, 0 for all."""
+    if request.contents not in hull_service_pb2.HullContents.values():
+        raise InvalidFieldError("contents", request.contents, "not contents that this server knows")
+    outline = request.contents == hull_service_pb2.HULL_CONTENTS_OUTLINE
+    if request.max_vertices and not outline:
+        problem = "only with HULL_CONTENTS_OUTLINE: a summary has no vertices"
+        raise InvalidFieldError("max_vertices", request.max_vertices, problem)
+    if request.max_vertices > LARGEST_SKETCH:
+        raise InvalidFieldError("max_vertices", request.max_vertices, f"must be at most {LARGEST_SKETCH}")
+    return outline, request.max_vertices
+
+
+def decode_many_position(request: hull_service_pb2.WatchManyRequest) -> list[Standing] | None:
+    """The position to go on from, None for the beginning."""
+    if not request.position:
+        return None
+    try:
+        return decode_position(request.position)
+    except ValueError as error:
+        raise InvalidFieldError("position", f"{len(request.position)} bytes", str(error)) from None
 
 
 def decode_sample_size(size: int) -> int:

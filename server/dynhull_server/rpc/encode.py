@@ -228,7 +228,9 @@ def encode_held(
 
 async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
     """The measures of the hull with these vertices, one step per measure."""
-    area, perimeter = (globe.area, globe.perimeter) if geographic else (measure.area, measure.perimeter)
+    area, perimeter, diameter = measure.area, measure.perimeter, measure.diameter
+    if geographic:
+        area, perimeter, diameter = globe.area, globe.perimeter, globe.diameter
     x = y = min_x = min_y = max_x = max_y = math.nan
     if not geographic:
         x, y = await run(partial(measure.centroid, vertices))
@@ -242,6 +244,8 @@ async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hu
         min_y=min_y,
         max_x=max_x,
         max_y=max_y,
+        diameter=await run(partial(diameter, vertices)),
+        width=None if geographic else await run(partial(measure.width, vertices)),
     )
 
 

@@ -16,9 +16,11 @@ from ..engine import entities
 from ..engine.engine import Engine
 from ..engine.entities import KeyAnswers, Question
 from ..engine.live_hull import LiveHull
+from ..engine.roster import Roster
 from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
+from ..engine.watch_many import watch_many
 from ..state.errors import HullEmptyError, HullFencedError
 from ..state.frames import require_lines, require_reach
 from ..state.records import Contents
@@ -26,6 +28,7 @@ from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
 from .decode_settings import decode_center, decode_quarantine, decode_settings, decode_shards
+from .many import HullStates, encode_many
 from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
@@ -40,6 +43,8 @@ from .writing import (
     require_present,
 )
 
+# Seconds between two states of one of many hulls, where the watcher does not say.
+MANY_INTERVAL = 0.1
 # The side of a missing key.
 MISSING_SIDE = -128
 # The number of points in a part of all points, so that none exceeds the 4 MiB that gRPC receives by default.
@@ -486,6 +491,31 @@ class HullService:
                         )
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
                         await call.write_within(self._max_watch_lag, message)
+
+    async def WatchMany(self, request: pb.WatchManyRequest, call: Call) -> None:
+        choice = decode.decode_many(request)
+        if choice.prefix is None:
+            for name in choice.names:
+                call.access.require_read(name)
+        else:
+            call.access.require_read(choice.prefix)
+        encoding = decode.decode_encoding(request.encoding)
+        outline, most = decode.decode_many_contents(request)
+        position = decode.decode_many_position(request)
+        interval = decode.decode_rate(request.max_events_per_second) or MANY_INTERVAL
+        states = HullStates(self._engine, encoding, outline=outline, most=most)
+        kind = encoding, outline, most
+        with (
+            self._engine.rosters.use(kind, choice, lambda: Roster(states)) as roster,
+            self._metrics.watcher() as watcher,
+        ):
+            async with aclosing(watch_many(roster, position, interval)) as parts:
+                while True:
+                    with call.cutoff():
+                        part = await anext(parts)
+                        call.require_entitled()
+                    with self._metrics.sending(watcher, "many"):
+                        await call.write_within(self._max_watch_lag, encode_many(part))
 
     def _run(self, rows: int) -> Run:
         """The way to run the steps of an answer that reads this many rows."""

@@ -117,6 +117,7 @@ class Core:
         self._schedule = Schedule(self._registry)
         self._fences = FenceCore(self._registry, self._queues, self._schedule, keeps=keeps)
         self._trips = 0
+        self._undecided = 0
         self._stopping = False
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
             WriteBatch: self._asked,
@@ -201,6 +202,11 @@ class Core:
     def busy(self) -> bool:
         """Whether any trip is in progress."""
         return self._trips > 0
+
+    @property
+    def undecided(self) -> bool:
+        """Whether a commit has perhaps taken place, and what it has changed is not published."""
+        return self._undecided > 0
 
     @property
     def ill(self) -> bool:
@@ -409,6 +415,7 @@ class Core:
 
     def _over(self, trip: Trip) -> None:
         self._trips -= 1
+        self._undecided -= trip.unknown
         self._registry.give_back(len(trip.places))
         if trip.fences is not None:
             self._fences.over(trip, trip.fences)
@@ -458,6 +465,7 @@ class Core:
         trip = event.ticket
         if event.unknown:
             trip.failure, trip.unknown = event.error, True
+            self._undecided += 1
             self._examine(trip, effects)
             return
         self._fail(trip, event.error, effects)

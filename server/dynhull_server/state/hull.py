@@ -1,7 +1,7 @@
 """A hull as clients see it: its committed state."""
 
 from .hull_state import Counts, HullState
-from .records import HullRow
+from .records import Committed, HullRow
 
 
 class Hull:
@@ -11,6 +11,8 @@ class Hull:
         row: its identity and settings, as stored.
         state: its points; read and change them only in a trip of its queue.
         counts: the counts at the latest committed revision.
+        committed: the commit of its latest revision, or of its creation, or a later one before anything else was
+            published; None for one of formats that did not store it.
         unsaved: points in batches since the last snapshot.
         timed: whether times matter: its points may leave by themselves.
         divided: whether its points are divided among shards, and the state is that of their root.
@@ -18,12 +20,13 @@ class Hull:
         ended: whether it has been deleted.
     """
 
-    __slots__ = ("counts", "divided", "due", "ended", "row", "state", "timed", "unsaved")
+    __slots__ = ("committed", "counts", "divided", "due", "ended", "row", "state", "timed", "unsaved")
 
     def __init__(self, row: HullRow, state: HullState, unsaved: int = 0) -> None:
         self.row = row
         self.state = state
         self.counts: Counts = state.counts
+        self.committed: Committed | None = state.committed
         self.unsaved = unsaved
         self.ended = False
         self.timed = row.settings.identity != "multiset" or row.settings.window is not None

@@ -66,6 +66,7 @@ class HullState:
     Attributes:
         contents: the points, and the times at which they leave.
         counts: the counts after the last batch.
+        committed: the commit of the last revision that was read from the storage.
         torn: whether a batch has been applied in part, because memory ran out in the middle of it.
     """
 
@@ -83,6 +84,7 @@ class HullState:
     def _stand_at(self, kept: Kept) -> None:
         """Derive what follows from the points, as of the last revision: what was before it is not known."""
         last = kept.last_revision
+        self.committed = kept.records[-1].committed if kept.records else kept.committed
         self._follow_center()
         self.counts = self._counted(last, len(self.hull), _last_cause(kept), last)
         self._vertices = self.hull.vertices().copy()  # a copy of a few vertices takes a third of the memory

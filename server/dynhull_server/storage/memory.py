@@ -80,15 +80,16 @@ class MemoryStorage:
         progress(0, len(self._hulls))
         rows = sorted((hull.row for hull in self._hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._fences.values()), key=lambda row: row.name)
-        return Contents(rows, self._next_number, [], fences, self._commit.time)
+        return Contents(rows, self._next_number, [], fences, self._commit.time, self._commit.number)
 
-    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> None:
+    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> Committed:
         """Keep the changes."""
         with self._turn:
             self._examine(changes)
             self._commit = Committed(self._commit.number + 1, max(self._commit.time, now))
             for change in changes:
                 self._carry_out(change)
+            return self._commit
 
     def entitled(self) -> bool:
         """True: nobody else has this memory."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from ..state.fences.records import FenceEvent, FenceRow, Inside, KeptFence
-from ..state.records import HullRow, Kept, Record
+from ..state.records import Committed, HullRow, Kept, Record
 from .refusals import Meaning
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ class Contents:
         notes: messages about what was lost or repaired.
         fences: the fences, ordered by name.
         committed: the time of the last commit, in microseconds since 1970; 0 for none.
+        commits: the number of the last commit; 0 for none.
     """
 
     hulls: list[HullRow]
@@ -85,6 +86,7 @@ class Contents:
     notes: list[str]
     fences: list[FenceRow] = field(default_factory=list)
     committed: int = 0
+    commits: int = 0
 
 
 class Storage(Protocol):
@@ -109,7 +111,7 @@ class Storage(Protocol):
             DamagedError: acknowledged batches are lost, and it is uncertain which.
         """
 
-    def commit(self, changes: Sequence["Change | Step"], now: int = 0) -> None:
+    def commit(self, changes: Sequence["Change | Step"], now: int = 0) -> Committed:
         """Commit all of the changes or none, with the configured durability.
 
         Changes apply in order. A step of a deleted hull changes nothing. The records keep the number of the commit, and
@@ -119,6 +121,9 @@ class Storage(Protocol):
             changes: the changes.
             now: the time of the commit, in microseconds since 1970; an earlier one than that of the last commit counts
                 as that.
+
+        Returns:
+            The commit.
 
         Raises:
             NotCommittedError: none was committed, and none will be found later. Also if a hull or fence to create

@@ -245,12 +245,13 @@ class Group:
     Attributes:
         statements: the changes of rows.
         before, totals: the totals before and after them.
+        commit: the commit that they are.
     """
 
     def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep], now: int = 0) -> None:
         self._ledger = ledger
         self.before = self.totals = ledger.totals
-        self._commit = Committed(self.before.commits + 1, max(self.before.committed, now))
+        self.commit = Committed(self.before.commits + 1, max(self.before.committed, now))
         # The hulls it concerns, after the changes so far.
         self._now: dict[int, _Now] = {}
         self._effects: list[Callable[[], object]] = []
@@ -262,7 +263,7 @@ class Group:
         fences.finish()
         next_number = max(self.totals.next_number, fences.next_number)
         self.totals = self.totals.plus(0, 0, fences.sum, fences.rows)
-        number, time = self._commit
+        number, time = self.commit
         self.totals = self.totals._replace(commits=number, next_number=next_number, committed=time)
 
     def adopt(self) -> None:
@@ -341,12 +342,12 @@ class Group:
             )
         payload = encode(change.records)
         keys = change.number, first, last
-        stored = batch_checksum(payload, *keys, *self._commit)
+        stored = batch_checksum(payload, *keys, *self.commit)
         each = weight(stored, *keys)
         place = next(self._ledger.batch_ids)
         now.batches, now.sum, now.last = now.batches + 1, now.sum + each, last
         self.totals = self.totals.plus(0, 1, each)
-        self.statements.append(Insert("batches", (place, *keys, stored, payload, *self._commit)))
+        self.statements.append(Insert("batches", (place, *keys, stored, payload, *self.commit)))
         self._effects.append(lambda: now.rows.append(first, last, place, each))
 
     def _delete(self, number: int) -> None:

@@ -84,7 +84,7 @@ class RowStorage(ABC):
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
         totals = self._ledger.totals
-        return Contents(rows, totals.next_number, notes, fences, totals.committed)
+        return Contents(rows, totals.next_number, notes, fences, totals.committed, totals.commits)
 
     def _group(self, changes: Sequence[Change | Step], now: int) -> Group:
         """The statements of a commit, and what it does to the ledger."""

@@ -17,6 +17,7 @@ from threading import Lock
 
 from ...state.changes import Change
 from ...state.errors import words
+from ...state.records import Committed
 from ..durability import Durability
 from ..port import Contents, DamagedError, LockedError, NotCommittedError, Progress, Step, StorageError
 from ..refusals import Meaning
@@ -135,11 +136,13 @@ class SQLiteStorage(RowStorage):
     # Committing
 
     @_as_storage_errors()
-    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> None:
+    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> Committed:
         """Commit all of the changes or none."""
         if self._gone is not None and not self._unsettled:
             raise NotCommittedError(_gone(self._gone))
-        self._write(self._group(changes, now))
+        group = self._group(changes, now)
+        self._write(group)
+        return group.commit
 
     @_as_storage_errors()
     def settle(self) -> None:

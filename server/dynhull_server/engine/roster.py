@@ -1,0 +1,245 @@
+"""The newest states of many hulls, in the order in which they last changed.
+
+Whoever follows them remembers how far it is, and takes what has changed since: the newest state of each. So there are
+no queues, and a state is encoded once, however many follow.
+"""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import AsyncGenerator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..state.records import Committed
+from .positions import Standing
+
+# Bytes of the states in one message, unless there is but one.
+MESSAGE_BYTES = 2**18
+# Names that are gone, and kept for those who have yet to hear of it, before it is looked who has.
+SOME_GONE = 1_000
+# Messages that are kept for others who are equally far.
+SHARED = 4
+# Seconds of encoding before others may run.
+SLICE = 0.005
+
+
+@dataclass(slots=True, eq=False)
+class Entry:
+    """One name.
+
+    Attributes:
+        name: the name.
+        version: a number that is greater than those of all that changed before it.
+        partition: the one that has it.
+        commit: the commit of its last change; None where that is not known.
+        new: whether it has never had a batch.
+        gone: whether it is there no more.
+        state: the encoded state, None until it is asked for.
+    """
+
+    name: str
+    version: int
+    partition: int = 0
+    commit: Committed | None = None
+    new: bool = False
+    gone: bool = False
+    state: bytes | None = None
+
+
+class Source(Protocol):
+    """Where the states come from."""
+
+    def standings(self) -> list[Standing]:
+        """How far each partition is: what its commits up to there have changed is in the roster."""
+
+    async def encode(self, entry: Entry) -> bytes:
+        """The state of an entry as a message that has only this one: the bytes of several are those of one with all."""
+
+    def unchanged(self, entry: Entry) -> bytes:
+        """The same of an entry that a follower has."""
+
+
+class Roster:
+    """The newest states.
+
+    Args:
+        source: where they come from.
+
+    Attributes:
+        version: that of what has changed last.
+        generation: the number of times that everything began anew.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.version = 0
+        self.generation = 0
+        self._source = source
+        self._entries: OrderedDict[str, Entry] = OrderedDict()
+        self._gone = 0
+        self._most_gone = SOME_GONE
+        self._moved = asyncio.Event()
+        self._encoding = asyncio.Lock()
+        self._heard: dict[object, int] = {}
+        self._shared: OrderedDict[tuple[int, int, int], tuple[bytes, int]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._entries) - self._gone
+
+    def get(self, name: str) -> Entry | None:
+        """The entry of a name that is there."""
+        entry = self._entries.get(name)
+        return None if entry is None or entry.gone else entry
+
+    def entries(self) -> list[Entry]:
+        """Those that are there, the one that has changed last at the end."""
+        return [entry for entry in self._entries.values() if not entry.gone]
+
+    def change(
+        self,
+        name: str,
+        commit: Committed | None,
+        *,
+        partition: int = 0,
+        new: bool = False,
+        state: bytes | None = None,
+    ) -> None:
+        """Note that a hull has changed, or is there. O(1)."""
+        entry = self._at_end(name)
+        self._gone -= entry.gone
+        entry.partition, entry.commit, entry.new, entry.gone, entry.state = partition, commit, new, False, state
+
+    def end(self, name: str) -> None:
+        """Note that a hull is gone. O(1)."""
+        if self.get(name) is None:
+            return
+        entry = self._at_end(name)
+        entry.gone, entry.state = True, None
+        self._gone += 1
+        if self._gone > self._most_gone:
+            self._forget_gone()
+
+    def begin_anew(self) -> None:
+        """Note that states may have gone back: all who follow begin anew."""
+        self.generation += 1
+        self._moved.set()
+
+    def _at_end(self, name: str) -> Entry:
+        self.version += 1
+        entry = self._entries.get(name)
+        if entry is None:
+            entry = self._entries[name] = Entry(name, self.version)
+        else:
+            entry.version = self.version
+            self._entries.move_to_end(name)
+        self._moved.set()
+        return entry
+
+    def _forget_gone(self) -> None:
+        """Forget the names that are gone, and of which all have heard. O(names)."""
+        heard = min(self._heard.values(), default=self.version)
+        for entry in [each for each in self._entries.values() if each.gone and each.version <= heard]:
+            del self._entries[entry.name]
+            self._gone -= 1
+        self._most_gone = 2 * self._gone + SOME_GONE
+
+    # Those who follow
+
+    def standings(self) -> list[Standing]:
+        """How far each partition is."""
+        return self._source.standings()
+
+    @contextmanager
+    def following(self) -> Iterator[object]:
+        """One who follows, and has to hear of all that is gone from now on."""
+        follower = object()
+        self._heard[follower] = self.version
+        try:
+            yield follower
+        finally:
+            del self._heard[follower]
+
+    def heard(self, follower: object, version: int) -> None:
+        """Note that a follower has what has changed up to a version."""
+        self._heard[follower] = version
+
+    async def beyond(self, version: int, generation: int) -> None:
+        """Wait until something has changed after a version, or everything has begun anew."""
+        while self.version <= version and self.generation == generation:
+            self._moved.clear()
+            await self._moved.wait()
+
+    def after(self, version: int) -> list[Entry]:
+        """What has changed after a version, in order. O(its number)."""
+        found = []
+        for entry in reversed(self._entries.values()):
+            if entry.version <= version:
+                break
+            found.append(entry)
+        found.reverse()
+        return found
+
+    async def changes(self, since: int) -> AsyncGenerator[bytes, None]:
+        """The states of what has changed after a version, many to a message.
+
+        Those who are equally far share the messages. A hull that changes meanwhile is sent as it is then, and again.
+        """
+        until, entries = self.version, self.after(since)
+        first = 0
+        while first < len(entries):
+            key = since, until, first
+            async with self._encoding:
+                shared = self._shared.get(key)
+                if shared is None:
+                    shared = self._shared[key] = await self._message(entries, first)
+                    while len(self._shared) > SHARED:
+                        self._shared.popitem(last=False)
+            message, first = shared
+            yield message
+
+    async def states(self, entries: Sequence[Entry]) -> AsyncGenerator[bytes, None]:
+        """The states of some entries, many to a message."""
+        first = 0
+        while first < len(entries):
+            async with self._encoding:
+                message, first = await self._message(entries, first)
+            yield message
+
+    async def names(self, entries: Sequence[Entry]) -> AsyncGenerator[bytes, None]:
+        """The names of entries that a follower has, many to a message."""
+        waiting: list[bytes] = []
+        size = 0
+        for entry in entries:
+            waiting.append(self._source.unchanged(entry))
+            size += len(waiting[-1])
+            if size > MESSAGE_BYTES:
+                yield b"".join(waiting)
+                waiting, size = [], 0
+        if waiting:
+            yield b"".join(waiting)
+
+    async def _message(self, entries: Sequence[Entry], first: int) -> tuple[bytes, int]:
+        """The next message, and the number of the first entry after it."""
+        loop = asyncio.get_running_loop()
+        begun, size = loop.time(), 0
+        states: list[bytes] = []
+        while first < len(entries):
+            state = entries[first].state
+            if state is None:
+                state = await self._encoded(entries[first])
+                if loop.time() - begun > SLICE:
+                    await asyncio.sleep(0)
+                    begun = loop.time()
+            if states and size + len(state) > MESSAGE_BYTES:
+                break
+            states.append(state)
+            size += len(state)
+            first += 1
+        return b"".join(states), first
+
+    async def _encoded(self, entry: Entry) -> bytes:
+        version = entry.version
+        state = await self._source.encode(entry)
+        if entry.version == version:  # otherwise it comes again, with what has changed meanwhile
+            entry.state = state
+        return state

@@ -1,0 +1,107 @@
+"""The states of many hulls, as their watchers get them."""
+
+from functools import partial
+
+from dynhull.arrays import Points
+from dynhull_proto.v1 import hull_pb2, points_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+
+from ..engine.engine import Engine
+from ..engine.live_hull import LiveHull
+from ..engine.positions import Standing
+from ..engine.roster import Entry
+from ..engine.steps import FEW_ROWS, at_once
+from ..engine.watch_many import Part, Picture
+from ..state.errors import HullNotFoundError
+from ..state.hull_state import Counts
+from .encode import FRAMES, encode_measures, encode_points
+
+PICTURES = {
+    Picture.BEGINS: pb.PICTURE_BEGINS,
+    Picture.BEGINS_ANEW: pb.PICTURE_BEGINS_ANEW,
+    Picture.COMPLETE: pb.PICTURE_COMPLETE,
+}
+
+
+class HullStates:
+    """The states of the hulls of an engine.
+
+    Args:
+        engine: the hulls.
+        encoding: that of vertices.
+        outline: whether to send vertices.
+        most: the most vertices of each hull, 0 for all.
+    """
+
+    def __init__(self, engine: Engine, encoding: points_pb2.PointEncoding, *, outline: bool, most: int) -> None:
+        self._engine = engine
+        self._encoding = encoding
+        self._outline = outline
+        self._most = most
+
+    def standings(self) -> list[Standing]:
+        """How far the server is."""
+        return [self._engine.standing]
+
+    async def encode(self, entry: Entry) -> bytes:
+        """The state of a hull."""
+        message = pb.WatchManyResponse()
+        now = message.hulls.add(name=entry.name)
+        try:
+            if entry.gone:
+                now.presence = pb.HULL_PRESENCE_GONE
+            else:
+                await self._describe(self._engine.get(entry.name), now)
+        except HullNotFoundError:  # it has gone meanwhile
+            now.presence = pb.HULL_PRESENCE_GONE
+        return message.SerializeToString()
+
+    def unchanged(self, entry: Entry) -> bytes:
+        """The name of a hull."""
+        message = pb.WatchManyResponse()
+        message.hulls.add(name=entry.name, presence=pb.HULL_PRESENCE_UNCHANGED)
+        return message.SerializeToString()
+
+    async def _describe(self, hull: LiveHull, now: pb.HullNow) -> None:
+        counts, vertices = await hull.vertices()
+        encode_counts(hull, counts, now)
+        now.vertex_count = len(vertices)
+        run = at_once if len(vertices) <= FEW_ROWS else self._engine.aside
+        if len(vertices):
+            measures: hull_pb2.Measures = await hull.measured(
+                vertices, partial(encode_measures, vertices, run, geographic=hull.geographic)
+            )
+            now.measures.CopyFrom(measures)
+        if self._outline:
+            chosen, now.error = await self._chosen(hull, counts, vertices)
+            now.vertices.CopyFrom(encode_points(chosen, self._encoding))
+
+    async def _chosen(self, hull: LiveHull, counts: Counts, vertices: Points) -> tuple[Points, float]:
+        if not self._most or len(vertices) <= self._most:
+            return vertices, 0.0
+        return await hull.sketch(counts, vertices, self._most)
+
+
+def encode_counts(hull: LiveHull, counts: Counts, now: pb.HullNow) -> None:
+    """Write what is known of a hull without its vertices."""
+    now.uid = hull.uid
+    now.revision, now.point_count, now.held_count = counts.revision, counts.points, counts.held
+    if hull.geographic:
+        now.frame = FRAMES["geographic"]
+    if counts.center is not None:
+        now.center.longitude, now.center.latitude = counts.center
+    if counts.clock is not None:
+        now.clock_time.FromMicroseconds(counts.clock)
+    if hull.committed is not None:
+        now.commit = hull.committed.number
+        now.changed_time.FromMicroseconds(hull.committed.time)
+
+
+def encode_many(part: Part) -> bytes:
+    """The message of what is sent at once: states come as one."""
+    if part.picture is None and not part.position:
+        return part.states
+    rest = pb.WatchManyResponse(position=part.position)
+    if part.picture is not None:
+        rest.picture = PICTURES[part.picture]
+    return part.states + rest.SerializeToString()
