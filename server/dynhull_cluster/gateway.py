@@ -33,6 +33,7 @@ from . import worker_link
 from .composed import Composed
 from .relay import Relay, Route, within
 from .shared_fences import WATCH_FENCE, SharedFences
+from .shared_many import WATCH_MANY, SharedMany
 from .shared_watches import WATCH, SharedWatches
 from .ways import Ways
 from .worker_link import WorkerLink
@@ -86,6 +87,7 @@ class Gateway:
         self._relay = Relay(self._links_to(workers, ways), settings.max_watch_lag)
         self._composed = Composed(self._relay, settings.max_fence_corners)
         self._watches = SharedWatches(self._relay, metrics)
+        self._many = SharedMany(self._relay, metrics)
         self._fences = SharedFences(self._relay, metrics)
         self._server = grpc_server(settings, shared_port=True)
         self._serving = False
@@ -173,6 +175,8 @@ class Gateway:
             return self._composed.works[path]
         if path == WATCH:
             return self._watches.watch
+        if path == WATCH_MANY:
+            return self._many.watch
         if path == WATCH_FENCE:
             return self._fences.watch
         if method.client_streaming:

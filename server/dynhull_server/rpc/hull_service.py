@@ -21,14 +21,14 @@ from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..engine.watch_many import watch_many
-from ..state.errors import HullEmptyError, HullFencedError
+from ..state.errors import HullEmptyError, HullFencedError, LimitExceededError
 from ..state.frames import require_lines, require_reach
 from ..state.records import Contents
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
 from .decode_settings import decode_center, decode_quarantine, decode_settings, decode_shards
-from .many import HullStates, encode_many
+from .many import MANY_INTERVAL, HullStates, encode_many, require_many
 from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
@@ -43,8 +43,6 @@ from .writing import (
     require_present,
 )
 
-# Seconds between two states of one of many hulls, where the watcher does not say.
-MANY_INTERVAL = 0.1
 # The side of a missing key.
 MISSING_SIDE = -128
 # The number of points in a part of all points, so that none exceeds the 4 MiB that gRPC receives by default.
@@ -494,11 +492,7 @@ class HullService:
 
     async def WatchMany(self, request: pb.WatchManyRequest, call: Call) -> None:
         choice = decode.decode_many(request)
-        if choice.prefix is None:
-            for name in choice.names:
-                call.access.require_read(name)
-        else:
-            call.access.require_read(choice.prefix)
+        require_many(choice, call.access)
         encoding = decode.decode_encoding(request.encoding)
         outline, most = decode.decode_many_contents(request)
         position = decode.decode_many_position(request)
@@ -512,10 +506,12 @@ class HullService:
             async with aclosing(watch_many(roster, position, interval)) as parts:
                 while True:
                     with call.cutoff():
-                        part = await anext(parts)
+                        message = encode_many(await anext(parts))
                         call.require_entitled()
+                        if len(message) > call.max_message_bytes:  # the outline of one hull
+                            raise LimitExceededError("max_message_bytes", call.max_message_bytes)
                     with self._metrics.sending(watcher, "many"):
-                        await call.write_within(self._max_watch_lag, encode_many(part))
+                        await call.write_within(self._max_watch_lag, message)
 
     def _run(self, rows: int) -> Run:
         """The way to run the steps of an answer that reads this many rows."""

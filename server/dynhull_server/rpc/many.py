@@ -10,12 +10,16 @@ from ..engine.engine import Engine
 from ..engine.live_hull import LiveHull
 from ..engine.positions import Standing
 from ..engine.roster import Entry
+from ..engine.rosters import Choice
 from ..engine.steps import FEW_ROWS, at_once
 from ..engine.watch_many import Part, Picture
 from ..state.errors import HullNotFoundError
 from ..state.hull_state import Counts
+from .access import Rights
 from .encode import FRAMES, encode_measures, encode_points
 
+# Seconds between two states of a hull, where the watcher does not say.
+MANY_INTERVAL = 0.1
 PICTURES = {
     Picture.BEGINS: pb.PICTURE_BEGINS,
     Picture.BEGINS_ANEW: pb.PICTURE_BEGINS_ANEW,
@@ -45,22 +49,18 @@ class HullStates:
 
     async def encode(self, entry: Entry) -> bytes:
         """The state of a hull."""
+        if entry.gone:
+            return name_only(entry, pb.HULL_PRESENCE_GONE)
         message = pb.WatchManyResponse()
-        now = message.hulls.add(name=entry.name)
         try:
-            if entry.gone:
-                now.presence = pb.HULL_PRESENCE_GONE
-            else:
-                await self._describe(self._engine.get(entry.name), now)
+            await self._describe(self._engine.get(entry.name), message.hulls.add(name=entry.name))
         except HullNotFoundError:  # it has gone meanwhile
-            now.presence = pb.HULL_PRESENCE_GONE
+            return name_only(entry, pb.HULL_PRESENCE_GONE)
         return message.SerializeToString()
 
     def unchanged(self, entry: Entry) -> bytes:
         """The name of a hull."""
-        message = pb.WatchManyResponse()
-        message.hulls.add(name=entry.name, presence=pb.HULL_PRESENCE_UNCHANGED)
-        return message.SerializeToString()
+        return name_only(entry, pb.HULL_PRESENCE_UNCHANGED)
 
     async def _describe(self, hull: LiveHull, now: pb.HullNow) -> None:
         counts, vertices = await hull.vertices()
@@ -80,6 +80,19 @@ class HullStates:
         if not self._most or len(vertices) <= self._most:
             return vertices, 0.0
         return await hull.sketch(counts, vertices, self._most)
+
+
+def require_many(choice: Choice, access: Rights) -> None:
+    """Raise PermissionDeniedError unless all of the hulls may be read, those to come too."""
+    for name in sorted(choice.names) if choice.prefix is None else [choice.prefix]:
+        access.require_read(name)
+
+
+def name_only(entry: Entry, presence: pb.HullPresence) -> bytes:
+    """What is sent of a hull that has no state, or none that is new."""
+    message = pb.WatchManyResponse()
+    message.hulls.add(name=entry.name, presence=presence)
+    return message.SerializeToString()
 
 
 def encode_counts(hull: LiveHull, counts: Counts, now: pb.HullNow) -> None:
