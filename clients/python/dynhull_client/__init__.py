@@ -20,15 +20,17 @@ from ._areas import Circle, Polygon, Prefix
 from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceWatch, AsyncWatch
+from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._batch import Batch
 from ._client import HullClient
 from ._errors import *  # noqa: F403  # all of them: `_errors.__all__`
 from ._fence_messages import Fence, FenceConsumer, FenceEvent, Inside, SubjectsInside
+from ._hull_copies import HullCopies
 from ._hull_copy import HullCopy
 from ._ingest import Ingest
 from ._layers import Influence, Layers
+from ._many_messages import ManyChange
 from ._messages import (
     Applied,
     Change,
@@ -61,7 +63,7 @@ from ._messages import (
 from ._pipeline import Pipeline
 from ._quarantine_messages import HeldPosition, Quarantine
 from ._uses import Efficient, Measured, Phases, Separation
-from ._watch import FenceWatch, Watch
+from ._watch import FenceWatch, ManyWatch, Watch
 from ._writer import Writer
 
 __all__ = [
@@ -69,6 +71,7 @@ __all__ = [
     "AsyncFenceWatch",
     "AsyncHullClient",
     "AsyncIngest",
+    "AsyncManyWatch",
     "AsyncPipeline",
     "AsyncWatch",
     "AsyncWriter",
@@ -92,6 +95,7 @@ __all__ = [
     "HeldPosition",
     "Hull",
     "HullClient",
+    "HullCopies",
     "HullCopy",
     "HullInfo",
     "Influence",
@@ -100,6 +104,8 @@ __all__ = [
     "Inside",
     "Layers",
     "Located",
+    "ManyChange",
+    "ManyWatch",
     "Measured",
     "Measures",
     "Phases",

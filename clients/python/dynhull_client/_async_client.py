@@ -7,12 +7,13 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from . import _calls as calls
 from . import _fences as fences
 from . import _layers as peeling
+from . import _many as many
 from . import _quarantine as quarantine
 from . import _uses as uses
 from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceWatch, AsyncWatch
+from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call, Pages
 from ._methods import Client, answer_of, described, documented, opening
@@ -113,6 +114,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     ingest = opening(AsyncIngest, calls.ingest)
     pipeline = opening(AsyncPipeline, calls.pipeline)
     watch = opening(AsyncWatch, calls.watch)
+    watch_many = opening(AsyncManyWatch, many.watch_many)
     watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
     writer = opening(AsyncWriter, calls.writer)
 

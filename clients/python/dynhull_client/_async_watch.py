@@ -17,6 +17,8 @@ from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
 from ._hull_place import HullPlace
+from ._many import ManyPlace, WatchingMany
+from ._many_messages import ManyChange
 from ._messages import Event
 from ._place import Happening, Place
 
@@ -89,7 +91,7 @@ class AsyncFollower(AsyncIterator[Happening]):
                 self._reading.cancel()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self._place.request.name!r}>"
+        return f"<{type(self).__name__} of {self._place.subject}>"
 
     def _begin(self) -> None:
         method = getattr(self._connection.stub, self._place.method)
@@ -102,6 +104,13 @@ class AsyncWatch(AsyncFollower[Event]):
 
     def __init__(self, connection: AsyncConnection, watching: Watching) -> None:
         super().__init__(connection, HullPlace(watching, connection.retries))
+
+
+class AsyncManyWatch(AsyncFollower[ManyChange]):
+    """`ManyWatch` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+
+    def __init__(self, connection: AsyncConnection, watching: WatchingMany) -> None:
+        super().__init__(connection, ManyPlace(watching, connection.retries))
 
 
 class AsyncFenceWatch(AsyncFollower[FenceEvent]):

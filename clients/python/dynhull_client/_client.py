@@ -7,6 +7,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 from . import _calls as calls
 from . import _fences as fences
 from . import _layers as peeling
+from . import _many as many
 from . import _quarantine as quarantine
 from . import _uses as uses
 from ._calls import Call, Pages
@@ -14,7 +15,7 @@ from ._connection import BlockingConnection
 from ._ingest import Ingest
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
-from ._watch import FenceWatch, Watch
+from ._watch import FenceWatch, ManyWatch, Watch
 from ._writer import Writer
 
 P = ParamSpec("P")
@@ -127,6 +128,7 @@ class HullClient(Client[BlockingConnection]):
     ingest = opening(Ingest, calls.ingest)
     pipeline = opening(Pipeline, calls.pipeline)
     watch = opening(Watch, calls.watch)
+    watch_many = opening(ManyWatch, many.watch_many)
     watch_fence = opening(FenceWatch, fences.watch_fence)
     writer = opening(Writer, calls.writer)
 

@@ -90,6 +90,11 @@ class HullCopy(Shown):
             self.revision, self.points, self.center = event.revision, event.points, event.center
             self._updated = monotonic()
 
+    def clear(self) -> None:
+        """Hold no hull, as after its deletion."""
+        with self._updating:
+            self._clear()
+
     def follow(self, watch: Iterator[Event], revision: int) -> None:
         """Apply events of the watch until the copy has reached the revision or a later one."""
         while self.revision < revision:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from datetime import datetime, timedelta
+from math import nan
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -108,13 +109,16 @@ class Measures(Value):
 
     Of a geographic hull, square metres and metres on WGS 84 between the geodesics; `centroid` and `bounds` are NaN.
 
-    `bounds` are the least x, least y, greatest x and greatest y.
+    `bounds` are the least x, least y, greatest x and greatest y. `diameter` is the greatest distance of two points, and
+    `width` the least one of parallel lines with all points between: NaN on the globe, and both from servers before 1.1.
     """
 
     area: float
     perimeter: float
     centroid: tuple[float, float]
     bounds: tuple[float, float, float, float]
+    diameter: float = nan
+    width: float = nan
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -501,6 +505,8 @@ def decode_measures(message: hull_pb2.Measures) -> Measures:
         message.perimeter,
         (message.centroid_x, message.centroid_y),
         (message.min_x, message.min_y, message.max_x, message.max_y),
+        message.diameter if message.HasField("diameter") else nan,
+        message.width if message.HasField("width") else nan,
     )
 
 

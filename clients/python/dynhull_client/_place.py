@@ -40,6 +40,11 @@ class Place(ABC, Generic[Happening]):
         self._retries = retries
         self._pauses = self._new_pauses()
 
+    @property
+    def subject(self) -> str:
+        """What is watched, for people."""
+        return repr(self.request.name)
+
     def timeout(self) -> float | None:
         """Seconds left for the watch."""
         return seconds_until(self._deadline)
@@ -69,9 +74,13 @@ class Place(ABC, Generic[Happening]):
             again = self._retries >= 0
         if not again or error.code != grpc.StatusCode.UNAVAILABLE:
             raise error from None
-        if not self.request.HasField("progress_interval"):  # reports the new connection even if nothing changes
-            self.request.progress_interval.seconds = 1
+        self._report_connection()
         self.pause = next(self._pauses)
+
+    def _report_connection(self) -> None:
+        """Have the server say that the next connection is there, even if nothing changes."""
+        if not self.request.HasField("progress_interval"):
+            self.request.progress_interval.seconds = 1
 
     def _new_pauses(self) -> Iterator[float]:
         return pauses(self._longest_pause)

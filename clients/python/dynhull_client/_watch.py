@@ -16,6 +16,8 @@ from ._fence_place import FencePlace
 from ._fences import WatchingFence
 from ._home import Home
 from ._hull_place import HullPlace
+from ._many import ManyPlace, WatchingMany
+from ._many_messages import ManyChange
 from ._messages import Event
 from ._place import Happening, Place
 
@@ -78,7 +80,7 @@ class Follower(Iterator[Happening]):
         self.close()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self._place.request.name!r}>"
+        return f"<{type(self).__name__} of {self._place.subject}>"
 
     def _begin(self) -> None:
         method = getattr(self._connection.stub, self._place.method)
@@ -97,6 +99,18 @@ class Watch(Follower[Event]):
 
     def __init__(self, connection: BlockingConnection, watching: Watching) -> None:
         super().__init__(connection, HullPlace(watching, connection.retries))
+
+
+class ManyWatch(Follower[ManyChange]):
+    """What becomes of many hulls: a `ManyChange` for each, one that says "complete", then what changes, until closed.
+
+    Iterating blocks until the next change, reconnects as often as necessary, and raises DynhullError if the watch
+    cannot continue. A context manager, which closes it; `close` may also be called by another thread, and ends the
+    iteration.
+    """
+
+    def __init__(self, connection: BlockingConnection, watching: WatchingMany) -> None:
+        super().__init__(connection, ManyPlace(watching, connection.retries))
 
 
 class FenceWatch(Follower[FenceEvent]):
