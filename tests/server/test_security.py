@@ -74,6 +74,7 @@ EVERY_CALL = {
     "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
+    "WatchMany": lambda stub, name: next(stub.WatchMany(pb.WatchManyRequest(names=[name]))),
     "GetLayers": lambda stub, name: stub.GetLayers(pb.GetLayersRequest(name=name, layer_count=1)),
     "GetInfluence": lambda stub, name: stub.GetInfluence(pb.GetInfluenceRequest(name=name)),
     "GetMeasures": lambda stub, name: stub.GetMeasures(pb.GetMeasuresRequest(name=name)),

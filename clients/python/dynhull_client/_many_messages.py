@@ -38,6 +38,7 @@ class ManyChange(Value, Shown):
         uid: differs from that of an earlier or later hull of the same name.
         revision: its revision.
         points: the number of points with duplicates: in a keyed hull, of keys.
+        distinct: the number of distinct points.
         held: the number of keys in quarantine.
         vertex_count: the number of vertices.
         measures: its measures; None for a hull without points.
@@ -55,6 +56,7 @@ class ManyChange(Value, Shown):
     uid: str = ""
     revision: int = 0
     points: int = 0
+    distinct: int = 0
     held: int = 0
     vertex_count: int = 0
     measures: Measures | None = None
@@ -93,6 +95,7 @@ def decode_now(message: pb.HullNow, position: bytes | None) -> ManyChange:
         message.uid,
         message.revision,
         message.point_count,
+        message.distinct_count,
         message.held_count,
         message.vertex_count,
         decode_measures(message.measures) if message.HasField("measures") else None,

@@ -119,9 +119,7 @@ def get_measures(name: str, *, layer: int = 1, min_revision: int = 0, timeout: f
 
     def decode(response: pb.GetMeasuresResponse) -> Measured:
         return Measured(
-            **asdict(decode_measures(response.measures)),
-            diameter=response.diameter,
-            width=response.width,
+            **asdict(decode_measures(response.measures)) | {"diameter": response.diameter, "width": response.width},
             min_box=decode_points(response.min_box),
             min_perimeter_box=decode_points(response.min_perimeter_box),
             min_circle=((response.min_circle_x, response.min_circle_y), response.min_circle_radius),

@@ -948,7 +948,7 @@ class WatchManyResponse(_message.Message):
     def __init__(self, hulls: _Optional[_Iterable[_Union[HullNow, _Mapping]]] = ..., picture: _Optional[_Union[Picture, str]] = ..., position: _Optional[bytes] = ...) -> None: ...
 
 class HullNow(_message.Message):
-    __slots__ = ("name", "presence", "uid", "revision", "point_count", "held_count", "vertex_count", "frame", "center", "measures", "changed_time", "clock_time", "vertices", "error", "commit")
+    __slots__ = ("name", "presence", "uid", "revision", "point_count", "held_count", "vertex_count", "frame", "center", "measures", "changed_time", "clock_time", "vertices", "error", "commit", "distinct_count")
     NAME_FIELD_NUMBER: _ClassVar[int]
     PRESENCE_FIELD_NUMBER: _ClassVar[int]
     UID_FIELD_NUMBER: _ClassVar[int]
@@ -964,6 +964,7 @@ class HullNow(_message.Message):
     VERTICES_FIELD_NUMBER: _ClassVar[int]
     ERROR_FIELD_NUMBER: _ClassVar[int]
     COMMIT_FIELD_NUMBER: _ClassVar[int]
+    DISTINCT_COUNT_FIELD_NUMBER: _ClassVar[int]
     name: str
     presence: HullPresence
     uid: str
@@ -979,7 +980,8 @@ class HullNow(_message.Message):
     vertices: _points_pb2.Points
     error: float
     commit: int
-    def __init__(self, name: _Optional[str] = ..., presence: _Optional[_Union[HullPresence, str]] = ..., uid: _Optional[str] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., held_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., frame: _Optional[_Union[_hull_pb2.Frame, str]] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., changed_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., error: _Optional[float] = ..., commit: _Optional[int] = ...) -> None: ...
+    distinct_count: int
+    def __init__(self, name: _Optional[str] = ..., presence: _Optional[_Union[HullPresence, str]] = ..., uid: _Optional[str] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., held_count: _Optional[int] = ..., vertex_count: _Optional[int] = ..., frame: _Optional[_Union[_hull_pb2.Frame, str]] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., changed_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., error: _Optional[float] = ..., commit: _Optional[int] = ..., distinct_count: _Optional[int] = ...) -> None: ...
 
 class WatchRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys", "outline_only", "layer", "max_vertices")

@@ -99,6 +99,7 @@ def encode_counts(hull: LiveHull, counts: Counts, now: pb.HullNow) -> None:
     """Write what is known of a hull without its vertices."""
     now.uid = hull.uid
     now.revision, now.point_count, now.held_count = counts.revision, counts.points, counts.held
+    now.distinct_count = counts.distinct
     if hull.geographic:
         now.frame = FRAMES["geographic"]
     if counts.center is not None:
