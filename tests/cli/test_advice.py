@@ -40,11 +40,8 @@ LOADS = [
     ("load {name} - --resume", "give --producer NAME", "load {name} - --resume --producer pipe"),
     ("load {name} - --replace", "--replace reads its input twice", "load {name} points.csv --replace"),
     ("load {name} packed.parquet.gz", "with gunzip", "gunzip packed.parquet.gz; load {name} packed.parquet"),
-    (
-        "load {name} utf16.json",
-        "iconv -f UTF-16 -t UTF-8",
-        "iconv -f UTF-16 -t UTF-8 utf16.json -o utf8.json; load {name} utf8.json",
-    ),
+    ("load {name} latin.csv", "--encoding cp1252", "load {name} latin.csv --encoding cp1252"),
+    ("load {name} latin.csv", "--bad-rows FILE", "load {name} latin.csv --bad-rows bad.csv"),
     ("load {name} points.csv --decimal ;", "neither . nor ,", "load {name} points.csv --decimal ."),
     ("load {name} points.csv --delimiter ab", "--delimiter 'ab' is not", "load {name} commas.csv --delimiter ,"),
     ("load {name} points.csv --vertices", "--vertices is for parquet", "load {name} line.ndjson --vertices"),
@@ -118,6 +115,7 @@ FOLLOWED_ELSEWHERE = {
         ("--max-speed", "--max-growth", "--confirmations", "--off", "--all"),
         "test_quarantine.py: test_held_positions_are_listed_released_and_dropped",
     ),
+    "iconv": "test_load_encodings.py: test_other_readers",
     "pip install": "by hand: needs an index of packages",
 }
 ADVICE = re.compile(r"--[a-z][a-z-]+|dynhull (?:list|create|serve|load)|pip install|iconv|gunzip")
@@ -143,7 +141,7 @@ def files(tmp_path, monkeypatch):
         Path(file).write_text(text)
     Path("utf16.csv").write_bytes(COMMA.encode("utf-16-le"))
     Path("utf16be.csv").write_bytes(COMMA.encode("utf-16-be"))
-    Path("utf16.json").write_bytes(json.dumps([[1, 2], [3, 4]]).encode("utf-16"))
+    Path("latin.csv").write_bytes("x,y,name\n1,2,ä\n3,4,a\n".encode("cp1252"))
     pq.write_table(pa.table({"x": [1.0, 3.0], "y": [2.0, 4.0]}), "points.parquet")
     Path("packed.parquet.gz").write_bytes(gzip.compress(Path("points.parquet").read_bytes()))
 

@@ -68,7 +68,7 @@ LATIN = "Länge,Breite\n1.5,2\n3,4.25\n-5,6\n".encode("latin-1")
         ("points.csv", COMMA.encode("utf-16-be"), ["--encoding", "utf-16-be"]),
         ("points.csv", COMMA.encode("utf-8-sig"), []),
         ("points.csv", LATIN, ["--encoding", "latin-1", "--x", "Länge", "--y", "Breite"]),
-        ("points.csv", LATIN, ["--x", "1", "--y", "2"]),
+        ("points.csv", LATIN, ["--encoding", "latin-1", "--x", "1", "--y", "2"]),
         ("points.json", json.dumps(TRIANGLE), []),
         ("points.json", json.dumps([{"lng": x, "lat": y} for x, y in TRIANGLE], indent=1), []),
         ("points.json", "\n".join(json.dumps({"lng": x, "lat": y}) for x, y in TRIANGLE), []),

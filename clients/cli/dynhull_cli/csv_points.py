@@ -86,7 +86,7 @@ def _read(table: CsvTable, time: int | None, identity: int | None, *, on_globe: 
     rows, bad = [], []
     for line, row, fields in records:
         try:
-            table.require_no_more_fields(row)
+            table.require_whole(row)
             x, y = (coordinate(fields.get(place), table.names[place], mark) for place in places)
             if on_globe and (problem := why_no_place(x, y)):
                 raise ValueError(problem)

@@ -1,6 +1,5 @@
 """Reads CSV files whose delimiter, header and encoding are given or detected."""
 
-import codecs
 import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
@@ -9,14 +8,13 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import IO, Any
 
-from .peek import peek
 from .reading.columns import coordinate_columns, has_pair
+from .reading.text import UTF8, UndecodableError, Utf8, lines_of, require_decoded
 from .reading.values import is_number
 
 DELIMITERS = "\t;,| "  # the first of these in the first line, outside quotes, separates the columns
 DELIMITER_NAMES = {"tab": "\t", "\\t": "\t", "space": " "}
 END_OF_TEXT = "\0\x04\0"  # after the last line: a row of its own unless a quote is open
-UTF16_MARKS = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 
 
 class UnclearTableError(ValueError):
@@ -37,6 +35,7 @@ class CsvFormat:
         delimiter: the character between columns, or its name: tab, space.
         header: whether the first row names the columns.
         encoding: a name that Python knows, such as latin-1.
+        keep_bytes: whether rows with bytes that are none of the encoding are bad rows, and not an error.
     """
 
     x: str | None = None
@@ -44,6 +43,7 @@ class CsvFormat:
     delimiter: str | None = None
     header: bool | None = None
     encoding: str | None = None
+    keep_bytes: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +58,7 @@ class CsvTable:
         first_line: the line of the first row.
         rows: the rows, without the header.
         next_line: returns the line of the row that `rows` gives next, once it has given one.
+        text: what decodes the file.
         notes: lines about what was detected and may surprise.
     """
 
@@ -68,13 +69,16 @@ class CsvTable:
     first_line: int
     rows: Iterator[list[str]]
     next_line: Callable[[], int]
+    text: Utf8
     notes: list[str]
 
-    def require_no_more_fields(self, row: list[str]) -> None:
-        """Raise ValueError if the row has more fields than there are columns, other than empty ones at its end."""
+    def require_whole(self, row: list[str]) -> None:
+        """Raise ValueError if the row has more fields than columns, but for empty ones, or bytes that are no text."""
         columns = len(self.names)
         if len(row) > columns and any(field.strip() for field in row[columns:]):
             raise ValueError(f"{len(row)} fields in a table of {columns} columns")
+        if self.text.kept:
+            require_decoded(",".join(row))
 
 
 @contextmanager
@@ -84,22 +88,22 @@ def csv_table(name: str, file: IO[bytes], given: CsvFormat) -> Iterator[CsvTable
     Raises:
         ValueError: the file is empty or no CSV, or its columns are not there. The message begins with `name`.
         UnclearTableError: an option is needed.
+        UndecodableError: bytes are none of the encoding.
     """
-    notes: list[str] = []
-    text = io.TextIOWrapper(file, _encoding(name, file, given.encoding, notes), errors="replace", newline="")
+    text = Utf8(name, file, given.encoding, keep=given.keep_bytes)
+    lines = lines_of(text)
+    skipped, first_line = _first_line(name, lines)
+    notes = [] if given.encoding or text.encoding == UTF8 else [f"{name} is {text.encoding.upper()}"]
+    delimiter = _delimiter(given.delimiter, first_line)
+    # Runs of spaces separate columns once.
+    reader = csv.reader(
+        chain([first_line], lines, [END_OF_TEXT]), delimiter=delimiter, skipinitialspace=delimiter == " "
+    )
     try:
-        skipped, first_line = _first_line(name, text)
-        delimiter = _delimiter(given.delimiter, first_line)
-        # Runs of spaces separate columns once.
-        lines = chain([first_line], text, [END_OF_TEXT])
-        reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
-        try:
-            yield _table(name, reader, given, delimiter, skipped, notes)
-        except csv.Error as error:
-            advice = ": is a quote not closed?" if "field limit" in str(error) else ""
-            raise ValueError(f"{name}, line {skipped + reader.line_num}: {error}{advice}") from None
-    finally:
-        text.detach()
+        yield _table(name, reader, given, delimiter, skipped, text, notes)
+    except csv.Error as error:
+        advice = ": is a quote not closed?" if "field limit" in str(error) else ""
+        raise ValueError(f"{name}, line {skipped + reader.line_num}: {error}{advice}") from None
 
 
 def numbered(rows: Iterable[list[str]], first_line: int) -> Iterator[tuple[int, list[str]]]:
@@ -122,7 +126,9 @@ def _closed(name: str, reader: Any, skipped: int) -> Iterator[list[str]]:
         before = reader.line_num
 
 
-def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: int, notes: list[str]) -> CsvTable:
+def _table(
+    name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: int, text: Utf8, notes: list[str]
+) -> CsvTable:
     rows = _closed(name, reader, skipped)
     first = [field.strip() for field in next(rows)]
     if len(first) == 1:
@@ -134,8 +140,12 @@ def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: in
         return skipped + int(reader.line_num) + 1
 
     if _is_header(first, given):
+        try:
+            require_decoded(",".join(first))
+        except ValueError as error:
+            raise UndecodableError(f"{name}, line {skipped + 1}: {error}") from None
         x, y = coordinate_columns(name, first, given.x, given.y)
-        return CsvTable(first, x, y, delimiter, next_line(), rows, next_line, notes)
+        return CsvTable(first, x, y, delimiter, next_line(), rows, next_line, text, notes)
     numbers = [f"column {number}" for number in range(1, len(first) + 1)]
     if given.x is not None or given.y is not None:
         x, y = coordinate_columns(name, numbers, given.x, given.y)
@@ -148,19 +158,7 @@ def _table(name: str, reader: Any, given: CsvFormat, delimiter: str, skipped: in
             "if the first row names the columns, add --header",
         )
     notes.append(f"{name} has no header: x is column {x + 1}, y is column {y + 1}")
-    return CsvTable(numbers, x, y, delimiter, skipped + 1, chain([first], rows), next_line, notes)
-
-
-def _encoding(name: str, file: IO[bytes], given: str | None, notes: list[str]) -> str:
-    if given is not None:
-        try:
-            return codecs.lookup(given).name
-        except LookupError:
-            raise ValueError(f"there is no encoding {given!r}: write for example utf-16 or latin-1") from None
-    if peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
-        notes.append(f"{name} is UTF-16")
-        return "utf-16"
-    return "utf-8-sig"
+    return CsvTable(numbers, x, y, delimiter, skipped + 1, chain([first], rows), next_line, text, notes)
 
 
 def _first_line(name: str, text: io.TextIOWrapper) -> tuple[int, str]:

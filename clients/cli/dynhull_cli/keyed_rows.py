@@ -11,6 +11,7 @@ import numpy as np
 from dynhull_client import HullClient, HullInfo, InvalidRequestError, Points
 
 from .reading.labels import integer_key
+from .reading.text import standard_input
 from .reading.values import plain
 from .rows import STANDARD_INPUT
 
@@ -64,7 +65,7 @@ def known_hull(client: HullClient, name: str, *, timeout: float | None = None) -
 def _lines(arguments: list[str] | None) -> Any:
     if not arguments and sys.stdin.isatty():
         raise ValueError("nothing given: give keys as arguments, or - to type them in")
-    return csv.reader(sys.stdin)
+    return csv.reader(standard_input(), skipinitialspace=True)
 
 
 def _position(place: str, fields: list[str]) -> tuple[float, float]:

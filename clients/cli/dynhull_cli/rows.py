@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from .load.chunks import CHUNK_ROWS, Points, cut
+from .reading.text import standard_input
 
 STANDARD_INPUT = ["-"]
 SHAPES = {2: "X,Y", 4: "X,Y,X,Y"}
@@ -26,7 +27,7 @@ def number_rows(arguments: list[str], columns: int = 2) -> Iterator[Points]:
     row that is not numbers, or says that there are none.
     """
     read = arguments == STANDARD_INPUT
-    texts: Iterable[str] = sys.stdin if read else arguments
+    texts: Iterable[str] = standard_input() if read else arguments
     placed = ((f"{'line' if read else 'argument'} {i}", text) for i, text in enumerate(texts, 1) if text.strip())
     empty = True
     for piece in cut(placed, CHUNK_ROWS):

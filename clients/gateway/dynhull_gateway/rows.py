@@ -324,7 +324,8 @@ def _cells(line: bytes) -> list[str]:
     try:
         return next(csv.reader([line.decode()], strict=True), [])
     except UnicodeDecodeError as error:
-        raise RowError(0, f"not UTF-8: {error.reason}", None, _text(line)) from None
+        byte = f"the byte 0x{line[error.start]:02x} is not UTF-8"
+        raise RowError(0, byte, None, _text(line)) from None
     except csv.Error as error:
         raise RowError(0, f"not CSV: {error}", None, _text(line)) from None
 
@@ -340,4 +341,4 @@ def _part(body: Any, path: Sequence[str | int]) -> int:
 
 
 def _text(line: Any) -> str:
-    return cut(line.decode(errors="replace") if isinstance(line, bytes) else str(line))
+    return cut(line.decode(errors="backslashreplace") if isinstance(line, bytes) else str(line))

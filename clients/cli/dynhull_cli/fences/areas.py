@@ -2,9 +2,10 @@
 
 import json
 import re
-import sys
 from pathlib import Path
 from typing import Any
+
+from ..reading.text import UndecodableError, Utf8, lines_of, standard_input
 
 WKT_NAMES = ("POLYGON", "MULTIPOLYGON")
 WKT_WORDS = (*WKT_NAMES, "Z", "M", "ZM", "EMPTY")
@@ -20,7 +21,7 @@ def read_polygon(text: str) -> Any:
     if text.lstrip().upper().startswith(WKT_NAMES):
         return _of_wkt(text, "--polygon")
     source = "standard input" if text == "-" else text
-    content = sys.stdin.read() if text == "-" else Path(text).read_text("utf-8")
+    content = _read(text)
     if content.lstrip().upper().startswith(WKT_NAMES):
         return _of_wkt(content, source)
     try:
@@ -30,6 +31,16 @@ def read_polygon(text: str) -> Any:
     if not isinstance(geojson, dict):
         raise ValueError(f"{source} is not GeoJSON: it must be an object with a type")
     return geojson
+
+
+def _read(name: str) -> str:
+    if name == "-":
+        return standard_input().read()
+    with Path(name).open("rb") as file:
+        try:
+            return lines_of(Utf8(name, file)).read()
+        except UndecodableError as error:
+            raise ValueError(f"{error}: convert the file, for example with iconv -f CP1252 -t UTF-8") from None
 
 
 def _of_wkt(text: str, source: str) -> Any:

@@ -8,6 +8,7 @@ from typing import TextIO
 
 from ..csv_points import SHOWN_BAD_ROWS, bad_rows_left_out
 from ..plural import plural
+from ..reading.text import KEPT_BYTES
 from .chunks import BadRow, Chunk, Rows
 from .refusals import TOO_FAR
 from .source import Source
@@ -58,4 +59,4 @@ def open_bad_rows(path: Path | None, source: Source) -> AbstractContextManager[T
         return nullcontext()
     if path.exists() and source.is_file(path):
         raise ValueError(f"--bad-rows {path} is the file that is loaded, and would replace it: name another file")
-    return path.open("w", encoding="utf-8", newline="")
+    return path.open("w", encoding="utf-8", errors=KEPT_BYTES, newline="")

@@ -58,7 +58,8 @@ def load(
         ),
     ] = None,
     encoding: Annotated[
-        str | None, _input("Encoding of CSV. Default: UTF-8, or UTF-16 with a byte order mark.")
+        str | None,
+        _input("Encoding of the file, such as cp1252. Default: UTF-8, or UTF-16 or UTF-32 with a byte order mark."),
     ] = None,
     vertices: Annotated[
         bool,
@@ -107,7 +108,14 @@ def load(
     producer: Annotated[
         str | None, typer.Option(help="Name of the load, for --resume. Default: made from the contents of the file.")
     ] = None,
-    bad_rows: Annotated[Path | None, typer.Option(help="CSV file to write the bad rows to.", dir_okay=False)] = None,
+    bad_rows: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV file to write the bad rows to. Rows of CSV and NDJSON with bytes that are none of the encoding "
+            "are among them; otherwise they end the load.",
+            dir_okay=False,
+        ),
+    ] = None,
     max_bad: Annotated[
         int | None, typer.Option(min=0, help="Stop if there are more bad rows than this. Default: never.")
     ] = None,
@@ -153,7 +161,13 @@ def load(
     integers = key is not None and _has_integer_keys(there(), name)
     with (
         integers_of_any_size(),
-        open_source(STANDARD_INPUT if file is None else file, format, options, integer_keys=integers) as opened,
+        open_source(
+            STANDARD_INPUT if file is None else file,
+            format,
+            options,
+            integer_keys=integers,
+            keep_bytes=bad_rows is not None,
+        ) as opened,
         open_bad_rows(bad_rows, opened) as bad_file,
     ):
         bad = BadRows(bad_file, max_bad)

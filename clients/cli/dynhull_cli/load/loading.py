@@ -220,7 +220,7 @@ def _resumable(option: str, producer: str | None) -> Iterator[None]:
                 there = "Of the points acknowledged so far, the hull lacks some"
             typer.echo(
                 f"{there}. The same command with {option} loads the rest; "
-                f"if you correct the file first, add --producer {producer}.",
+                f"if you correct the file or an option first, add --producer {producer}.",
                 err=True,
             )
         raise

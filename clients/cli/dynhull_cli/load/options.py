@@ -35,7 +35,7 @@ class Options:
         delimiter: the character between columns of CSV.
         decimal: the decimal mark of CSV.
         header: whether the first row of CSV names the columns.
-        encoding: the encoding of CSV.
+        encoding: the encoding of text.
         vertices: whether to take the vertices of geometries other than single points.
         key: the column or member of the keys; None for points without keys.
         time: the column or member of the times; None for points without times.

@@ -17,7 +17,7 @@ def read_csv(source: Source) -> Chunks:
     """Chunks of points from the columns of x and y."""
     options = source.options
     delimiter = "tab" if source.format is Format.TSV else options.delimiter
-    given = CsvFormat(options.x, options.y, delimiter, options.header, options.encoding)
+    given = CsvFormat(options.x, options.y, delimiter, options.header, options.encoding, source.keep_bytes)
     try:
         with csv_table(source.name, source.file, given) as table:
             source.notes.extend(table.notes)
@@ -65,14 +65,14 @@ def _chunk(
 ) -> Chunk:
     """The points of rows that begin on that line; `following` is the one after them."""
     places = table.x, table.y
-    points = None if labels is not None else _all_points(rows, places, decimal, len(table.names))
+    points = None if labels is not None or table.text.kept else _all_points(rows, places, decimal, len(table.names))
     if points is not None:
         plain = following - line == len(rows)  # no row has several lines
         lines = range(line, following) if plain else [at for at, _ in numbered(rows, line)]
         return Chunk(Rows(points, np.array(lines, np.int64), LINE))
 
     def positions(row: list[str]) -> list[Position]:
-        table.require_no_more_fields(row)
+        table.require_whole(row)
         x, y = (coordinate(row[place] if place < len(row) else None, table.names[place], decimal) for place in places)
         return [(x, y)]
 

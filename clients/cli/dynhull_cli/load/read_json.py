@@ -1,6 +1,5 @@
 """Points of JSON: GeoJSON, an array of rows, or one row per line."""
 
-import codecs
 import json
 import re
 from collections.abc import Callable, Iterator
@@ -13,6 +12,7 @@ from ..peek import peek
 from ..plural import plural
 from ..reading.columns import coordinate_columns
 from ..reading.labels import Labels
+from ..reading.text import KEPT_BYTES, require_decoded
 from ..reading.values import coordinate, json_text
 from .chunks import CHUNK_ROWS, LINE, Chunks, Position, cut, picked
 from .geometry import position, positions
@@ -28,15 +28,17 @@ ALONE = re.compile(rb'"type"\s*:\s*"(Feature|(Multi)?(Point|LineString|Polygon)|
 
 def read_json(source: Source) -> Chunks:
     """Chunks of points of any of the three kinds."""
-    start = _skip_byte_order_mark(source.file).lstrip()
+    text = source.utf8()
+    start = peek(text, PREFIX).lstrip()
     if start.startswith(b"["):
-        return _read_items(source, "item", "item", _row_reader(source))
-    if _is_row(start.partition(b"\n")[0]):
-        return read_ndjson(source)
-    if b'"features"' not in start and ALONE.search(start):
-        return _read_items(source, "", "feature", _row_reader(source))
-    _note_reference_system(source, start)
-    return _read_collection(source)
+        yield from _read_items(source, text, "item", "item", _row_reader(source))
+    elif _is_row(start.partition(b"\n")[0]):
+        yield from _read_lines(source, text)
+    elif b'"features"' not in start and ALONE.search(start):
+        yield from _read_items(source, text, "", "feature", _row_reader(source))
+    else:
+        _note_reference_system(source, start)
+        yield from _read_collection(source, text)
 
 
 def _note_reference_system(source: Source, start: bytes) -> None:
@@ -49,11 +51,11 @@ def _note_reference_system(source: Source, start: bytes) -> None:
         source.notes.append(f"{source.name}: its coordinates are not degrees: its crs is {name}")
 
 
-def _read_collection(source: Source) -> Chunks:
+def _read_collection(source: Source, text: IO[bytes]) -> Chunks:
     """Chunks of points of the features of a FeatureCollection, which is never in memory as a whole."""
     empty = True
     for chunk in _read_items(
-        source, "features.item", "feature", lambda value: _of_feature(value, source.options.vertices)
+        source, text, "features.item", "feature", lambda value: _of_feature(value, source.options.vertices)
     ):
         empty = False
         yield chunk
@@ -63,9 +65,12 @@ def _read_collection(source: Source) -> Chunks:
 
 def read_ndjson(source: Source) -> Chunks:
     """Chunks of points, one row per line."""
-    _skip_byte_order_mark(source.file)
+    return _read_lines(source, source.utf8(keep=True))
+
+
+def _read_lines(source: Source, text: IO[bytes]) -> Chunks:
     read = _row_reader(source)
-    lines = ((i, line) for i, line in enumerate(source.file, start=1) if not line.isspace())
+    lines = ((i, line) for i, line in enumerate(text, start=1) if not line.isspace())
     parsed = ((i, _Line(line)) for i, line in lines)
     labels = _labels(source)
     for rows in cut(parsed, CHUNK_ROWS):
@@ -78,26 +83,24 @@ def read_ndjson(source: Source) -> Chunks:
         )
 
 
-def _read_items(source: Source, path: str, unit: str, read: Callable[[Any], list[Position]]) -> Chunks:
+def _read_items(source: Source, text: IO[bytes], path: str, unit: str, read: Callable[[Any], list[Position]]) -> Chunks:
     labels = _labels(source)
-    for rows in cut(_numbered_items(source, path, unit), CHUNK_ROWS):
+    for rows in cut(_numbered_items(source.name, text, path, unit), CHUNK_ROWS):
         yield picked(unit, rows, read, json_text, labels)
 
 
-def _numbered_items(source: Source, path: str, unit: str) -> Iterator[tuple[int, Any]]:
+def _numbered_items(name: str, text: IO[bytes], path: str, unit: str) -> Iterator[tuple[int, Any]]:
     """The items with their numbers from 1; ValueError on one line where the file is not JSON.
 
     Integers of any size are exact, other numbers are Decimals.
     """
     read = 0
     try:
-        for read, item in enumerate(ijson.items(source.file, path), start=1):
+        for read, item in enumerate(ijson.items(text, path), start=1):
             yield read, item
     except ijson.JSONError as error:
         lines = "; if each line is a row or a feature, add --format ndjson" if "trailing garbage" in str(error) else ""
-        raise ValueError(
-            f"{source.name} is not valid JSON after {plural(read, unit)}: {_cause(error)}{lines}"
-        ) from None
+        raise ValueError(f"{name} is not valid JSON after {plural(read, unit)}: {_cause(error)}{lines}") from None
 
 
 def _cause(error: ijson.JSONError) -> str:
@@ -116,14 +119,16 @@ class _Line:
 
     @cached_property
     def value(self) -> Any:
+        text = self._line.decode(errors=KEPT_BYTES)
+        require_decoded(text)
         try:
-            return json.loads(self._line)
+            return json.loads(text)
         except json.JSONDecodeError as error:
             raise ValueError(f"not valid JSON at column {error.pos + 1}: {error.msg}") from None
 
     @property
     def text(self) -> str:
-        return self._line.decode(errors="replace").strip()
+        return self._line.decode(errors=KEPT_BYTES).strip()
 
 
 def _labels(source: Source) -> Callable[[Any], Labels] | None:
@@ -185,10 +190,3 @@ def _is_row(line: bytes) -> bool:
     except ValueError:
         return False
     return not (isinstance(value, dict) and value.get("type") == "FeatureCollection")
-
-
-def _skip_byte_order_mark(file: IO[bytes]) -> bytes:
-    """Skip the mark; the first bytes after it, which remain to be read."""
-    if peek(file, PREFIX).startswith(codecs.BOM_UTF8):
-        file.read(len(codecs.BOM_UTF8))
-    return peek(file, PREFIX)

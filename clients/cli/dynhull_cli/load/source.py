@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
-from ..csv_table import UTF16_MARKS
 from ..peek import peek
 from ..reading.columns import LONGITUDE_LATITUDE, are_degrees
 from ..reading.labels import LabelReader
+from ..reading.text import PART, UndecodableError, Utf8
 from .chunks import Chunks
 from .interruptible import InterruptibleInput, can_be_interrupted
 from .options import STANDARD_INPUT, Format, Options
@@ -42,7 +42,7 @@ APPLIES_TO = {
     "delimiter": {Format.CSV},
     "decimal": TABLES,
     "header": TABLES,
-    "encoding": TABLES,
+    "encoding": TABLES | JSON,
     "vertices": set(Format) - TABLES,
     "key": set(Format),
     "time": set(Format),
@@ -65,6 +65,8 @@ class Source:
         format: its format.
         options: how to read it.
         integer_keys: whether keys are integers.
+        keep_bytes: whether rows with bytes that are none of the encoding are bad rows; otherwise the first one is an
+            error. Documents of JSON have no such rows.
         notes: lines about what was detected while reading and may surprise.
         axes: the names of the columns of x and y, once they are known; empty for geometries that are not in degrees.
         geographic: returns whether the points are places on the globe, None if the names of the columns say so. Called
@@ -78,6 +80,7 @@ class Source:
     format: Format
     options: Options
     integer_keys: bool = False
+    keep_bytes: bool = False
     notes: list[str] = field(default_factory=list)
     axes: list[str] = field(default_factory=list)
     geographic: Callable[[], bool | None] = lambda: None
@@ -93,11 +96,21 @@ class Source:
 
     def chunks(self) -> Chunks:
         """The points; those that are no places are bad rows. ValueError where the input is not of this format."""
-        with closing(_reader(self.format)(self)) as chunks:
-            for chunk in chunks:
-                known = self.geographic()
-                on_globe = self.degrees if known is None else known
-                yield places_only(chunk) if on_globe else chunk
+        try:
+            with closing(_reader(self.format)(self)) as chunks:
+                for chunk in chunks:
+                    known = self.geographic()
+                    on_globe = self.degrees if known is None else known
+                    yield places_only(chunk) if on_globe else chunk
+        except UndecodableError as error:
+            has_rows = self.format in {*TABLES, Format.NDJSON} and not self.keep_bytes
+            other = "; --bad-rows FILE leaves such rows out, and copies them as they are" if has_rows else ""
+            raise ValueError(f"{error}: name the encoding of the file, for example --encoding cp1252{other}") from None
+
+    def utf8(self, *, keep: bool = False) -> IO[bytes]:
+        """Its text as UTF-8. With `keep`, bytes that are none of its encoding are kept if they may be."""
+        text = Utf8(self.name, self.file, self.options.encoding, keep=keep and self.keep_bytes)
+        return io.BufferedReader(text, PART)
 
     def label_reader(self) -> LabelReader | None:
         """Checks the labels of its rows; None if the options name no such column.
@@ -149,7 +162,9 @@ Reader = Callable[[Source], Chunks]
 
 
 @contextmanager
-def open_source(name: str, kind: Format | None, options: Options, *, integer_keys: bool = False) -> Iterator[Source]:
+def open_source(
+    name: str, kind: Format | None, options: Options, *, integer_keys: bool = False, keep_bytes: bool = False
+) -> Iterator[Source]:
     """Open a file, or standard input for "-". Without a `kind`, the suffix of the name decides; standard input is CSV.
 
     ValueError if the format is unknown, an option does not apply to it, or the compressed data is damaged.
@@ -165,14 +180,14 @@ def open_source(name: str, kind: Format | None, options: Options, *, integer_key
             with InterruptibleInput(raw) if can_be_interrupted(raw) else nullcontext(raw) as unbuffered:
                 stdin = io.BufferedReader(unbuffered)
                 try:
-                    yield _source("standard input", stdin, None, kind, options, integer_keys)
+                    yield _source("standard input", stdin, None, kind, options, integer_keys, keep_bytes)
                 finally:
                     stdin.detach()
         else:
             path = Path(name)
             with path.open("rb") as file:
                 size = path.stat().st_size if path.is_file() else None
-                yield _source(name, file, size, kind, options, integer_keys)
+                yield _source(name, file, size, kind, options, integer_keys, keep_bytes)
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
         raise ValueError(f"{name}: the compressed data is damaged: {error}") from None
 
@@ -199,7 +214,13 @@ def _format_of(name: str) -> Format:
 
 
 def _source(
-    name: str, stored: IO[bytes], size: int | None, kind: Format, options: Options, integer_keys: bool
+    name: str,
+    stored: IO[bytes],
+    size: int | None,
+    kind: Format,
+    options: Options,
+    integer_keys: bool,
+    keep_bytes: bool,
 ) -> Source:
     file = stored
     if peek(stored, len(GZIP_MARK)) == GZIP_MARK:
@@ -208,9 +229,7 @@ def _source(
         file = cast("IO[bytes]", gzip.GzipFile(fileobj=stored))
     if not peek(file, 1):
         raise ValueError(f"{name} is empty")
-    if kind in JSON and peek(file, len(UTF16_MARKS[0])) in UTF16_MARKS:
-        raise ValueError(f"{name} is UTF-16, and JSON is UTF-8: convert it with iconv -f UTF-16 -t UTF-8")
-    return Source(name, file, stored, size, kind, options, integer_keys)
+    return Source(name, file, stored, size, kind, options, integer_keys, keep_bytes)
 
 
 def _given(options: Options) -> dict[str, object]:
