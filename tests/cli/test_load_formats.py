@@ -51,6 +51,12 @@ LATIN = "Länge,Breite\n1.5,2\n3,4.25\n-5,6\n".encode("latin-1")
         ("points.csv", COMMA.replace(",", ":"), ["--delimiter", ":"]),
         ("points.csv", COMMA.replace(",", "\t"), ["--delimiter", "tab"]),
         ("points.csv", GERMAN, []),
+        ("points.csv", "lat,lon,name (short; long)\n2,1.5,a\n4.25,3,b\n6,-5,c\n", []),
+        ("points.csv", 'lat,lon,"name; long"\n2,1.5,a\n4.25,3,b\n6,-5,"c;d"\n', []),
+        ("points.csv", "x,y,a|b\n1.5,2,a\n3,4.25,b|c\n-5,6,c\n", []),
+        ("points.csv", "x, y, a\tb\n1.5, 2, a\n3, 4.25, b\n-5, 6, c\n", []),
+        ("points.txt", "x|y|name, first\n1.5|2|a\n3|4.25|b, c\n-5|6|c\n", []),
+        ("points.csv", 'x,y,note\n1.5,2,"a\nb"\n3,4.25,"c;\n;d"\n-5,6,\n', []),
         ("points.csv", "2020,x,y\n7,1.5,2\n8,3,4.25\n9,-5,6\n", []),
         ("points.tsv", GERMAN.replace(";", "\t"), []),
         ("points.csv", '"x","y"\n"1,5","2"\n"3","4,25"\n"-5","6"\n', ["--decimal", ","]),
@@ -90,6 +96,14 @@ def test_the_same_triangle(tmp_path, served, name, file, content, options):
         hull = client.get_hull(name)
         assert hull.vertices.tolist() == TRIANGLE
         assert hull.info.points == (VERTICES if "--vertices" in options else 3)
+
+
+def test_spaces_after_delimiters_are_no_part_of_keys(tmp_path, served, name):
+    path = tmp_path / "keys.csv"
+    path.write_text('lat, lon, id\n0, 0, A\n4, 0, B\n4, 4, "C, D"\n0, 4," E"\n')
+    assert dynhull("load", name, path, "--key", "id").exit_code == 0
+    with HullClient(served) as client:
+        assert sorted(client.entities(name).keys) == [" E", "A", "B", "C, D"]
 
 
 @pytest.mark.usefixtures("served")

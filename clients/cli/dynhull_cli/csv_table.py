@@ -3,16 +3,17 @@
 import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from typing import IO, Any
 
 from .reading.columns import coordinate_columns, has_pair
 from .reading.text import UTF8, UndecodableError, Utf8, lines_of, require_decoded
 from .reading.values import is_number
 
-DELIMITERS = "\t;,| "  # the first of these in the first line, outside quotes, separates the columns
+DELIMITERS = "\t;,| "  # of these, in case of doubt the first, one separates the columns
+LOOKED_AT = 20  # lines that show which
 DELIMITER_NAMES = {"tab": "\t", "\\t": "\t", "space": " "}
 END_OF_TEXT = "\0\x04\0"  # after the last line: a row of its own unless a quote is open
 
@@ -93,12 +94,10 @@ def csv_table(name: str, file: IO[bytes], given: CsvFormat) -> Iterator[CsvTable
     text = Utf8(name, file, given.encoding, keep=given.keep_bytes)
     lines = lines_of(text)
     skipped, first_line = _first_line(name, lines)
+    first_lines = [first_line, *islice(lines, LOOKED_AT)]
     notes = [] if given.encoding or text.encoding == UTF8 else [f"{name} is {text.encoding.upper()}"]
-    delimiter = _delimiter(given.delimiter, first_line)
-    # Runs of spaces separate columns once.
-    reader = csv.reader(
-        chain([first_line], lines, [END_OF_TEXT]), delimiter=delimiter, skipinitialspace=delimiter == " "
-    )
+    delimiter = _delimiter(given.delimiter, first_lines)
+    reader = _reader(chain(first_lines, lines, [END_OF_TEXT]), delimiter)
     try:
         yield _table(name, reader, given, delimiter, skipped, text, notes)
     except csv.Error as error:
@@ -174,14 +173,28 @@ def _first_line(name: str, text: io.TextIOWrapper) -> tuple[int, str]:
     raise ValueError(f"{name} is empty")
 
 
-def _delimiter(given: str | None, line: str) -> str:
+def _delimiter(given: str | None, lines: list[str]) -> str:
     if given is None:
-        outside_quotes = "".join(line.split('"')[::2]).strip("\r\n ")
-        return next((each for each in DELIMITERS if each in outside_quotes), ",")
+        return max(DELIMITERS, key=lambda each: _agreement(lines, each))  # the first one of several
     delimiter = DELIMITER_NAMES.get(given, given)
     if len(delimiter) != 1 or delimiter in '"\r\n':
         raise ValueError(f"--delimiter {given!r} is not one character, nor tab or space")
     return delimiter
+
+
+def _agreement(lines: list[str], delimiter: str) -> float:
+    """The share of rows that have as many fields as the first one, with this delimiter; 0 if that is a single one."""
+    fields: list[int] = []
+    with suppress(csv.Error):  # which is reported when the row is read
+        fields.extend(len(row) for row in _reader((line.strip(" \r\n") for line in lines), delimiter) if row)
+    if len(lines) > LOOKED_AT:
+        del fields[-1:]  # may go on in lines that are not looked at
+    return fields.count(fields[0]) / len(fields) if fields and fields[0] > 1 else 0
+
+
+def _reader(lines: Iterable[str], delimiter: str) -> Any:
+    """A reader for which spaces after a delimiter are no part of a field, and runs of spaces separate columns once."""
+    return csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
 
 
 def _is_header(first: list[str], given: CsvFormat) -> bool:

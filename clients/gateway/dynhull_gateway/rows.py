@@ -322,7 +322,7 @@ def with_keys(found: Found, kind: Literal["str", "int"] | None) -> Found:
 
 def _cells(line: bytes) -> list[str]:
     try:
-        return next(csv.reader([line.decode()], strict=True), [])
+        return next(csv.reader([line.decode()], strict=True, skipinitialspace=True), [])
     except UnicodeDecodeError as error:
         byte = f"the byte 0x{line[error.start]:02x} is not UTF-8"
         raise RowError(0, byte, None, _text(line)) from None

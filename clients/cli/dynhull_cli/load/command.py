@@ -43,7 +43,7 @@ def load(
     ] = None,
     y: Annotated[str | None, _input("Column of y. Default: y, lat, latitude or northing.")] = None,
     delimiter: Annotated[
-        str | None, _input("Character between the columns of CSV, or tab or space. Default: found in the first line.")
+        str | None, _input("Character between the columns of CSV, or tab or space. Default: found in the first lines.")
     ] = None,
     decimal: Annotated[
         str | None,
