@@ -94,6 +94,8 @@ def _area(area: Any) -> Any:
         case schemas.CircleArea():
             x, y = area.center
             return Circle(x, y, area.radius)
+        case schemas.GeometryArea():
+            return area.model_dump()
         case schemas.PolygonArea():
             return Polygon(np.array(area.exterior), tuple(map(np.array, area.holes)))
         case _:

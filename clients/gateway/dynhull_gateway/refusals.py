@@ -14,6 +14,7 @@ from dynhull_surface.reasons import http_of
 
 from .problems import Cause, named, pointer, problem, said, shown
 
+RING = 2  # where the way to an area's ring has its name: after `area` and the number of the polygon
 OF_SEVERAL = re.compile(r"batches\[(\d+)\]\.")
 BATCH = re.compile(r"(?:batches\[(\d+)\]\.)?batch(?:\.(.*))?")
 SDK = re.compile(r"(\w+)(?: row (\d+))? is .*?: (.*)", re.DOTALL)
@@ -143,10 +144,20 @@ def _path(field: str, body: Any) -> list[str | int] | None:
     if found.path.startswith("batch"):
         within = ["batches", list(body["batches"])[int(of_several[1])]] if of_several else []
         return [] if isinstance(body, list) else [*within, *way]
-    if way[1:] and way[0] == "area" and isinstance(way[1], int) and not isinstance(_at(body, ["area"]), list):
-        del way[1]  # one polygon is no list
+    if way[1:] and way[0] == "area" and isinstance(way[1], int):
+        way = _in_area(way, _at(body, ["area"]))
     in_body = not way or found.path.startswith("config") or (isinstance(body, dict) and way[0] in body)
     return way if in_body else None
+
+
+def _in_area(way: list[Any], area: Any) -> list[str | int]:
+    """The way to a ring of a polygon, in the form in which the body has the area."""
+    if not isinstance(area, dict):
+        return way
+    if "coordinates" not in area or len(way) <= RING:
+        return [way[0], *way[2:]]  # one polygon is no list
+    polygon = way[1:RING] if area.get("type") == "MultiPolygon" else []
+    return [way[0], "coordinates", *polygon, 0 if way[RING] == "exterior" else way[RING + 1] + 1]
 
 
 def _parameter(field: str) -> str:

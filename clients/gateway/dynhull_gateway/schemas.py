@@ -613,11 +613,22 @@ class PolygonArea(Request):
     holes: list[Points] = []
 
 
+class GeometryArea(Request):
+    """A polygon or several as a geometry of GeoJSON, such as that of a hull."""
+
+    model_config = ConfigDict(extra="ignore")  # GeoJSON has members for everybody
+
+    type: Literal["Polygon", "MultiPolygon"]
+    coordinates: list[Any]
+
+
 def _form_of_area(area: Any) -> str:
     """The form of an area, by the fields that it has."""
     if isinstance(area, list):
         return "polygons"
     fields = area if isinstance(area, dict) else type(area).model_fields if isinstance(area, BaseModel) else ()
+    if "coordinates" in fields:
+        return "geometry"
     return "hull" if "hull" in fields else "circle" if {"center", "radius"} & set(fields) else "polygon"
 
 
@@ -629,12 +640,21 @@ Area = Annotated[
     Discriminator(_form_of_area),
 ]
 
+GivenArea = Annotated[
+    Annotated[HullArea, Tag("hull")]
+    | Annotated[CircleArea, Tag("circle")]
+    | Annotated[PolygonArea, Tag("polygon")]
+    | Annotated[list[PolygonArea], Tag("polygons")]
+    | Annotated[GeometryArea, Tag("geometry")],
+    Discriminator(_form_of_area),
+]
+
 
 @with_settings(surface.FenceSettings)
 class FenceSettings(Request):
     """What a fence compares, and when it makes events."""
 
-    area: Area
+    area: GivenArea
     subjects: Name | None = Field(None, description="The keyed hull whose keys are compared,")
     subject_prefix: Annotated[str, Field(strict=True, max_length=200)] | None = Field(
         None, description="or a prefix of the names of several,"

@@ -22,6 +22,8 @@ CIRCLE_CORNERS = 720
 # Metres between places that are as far from each other as possible.
 HALF_ROUND = 20_003_931.5
 
+POLE, ROUND = 90, 360  # degrees
+
 Rings = Sequence[Sequence[Points]]
 
 
@@ -77,7 +79,33 @@ def rings_of(area: Area, vertices: Points | None) -> Rings:
 
 def projected(frame: Gnomonic, rings: Rings) -> list[list[Points]]:
     """The rings in the plane; ValueError names a ring with a corner that is no place or out of reach."""
-    return [[_projected(frame, ring, f"polygon {i} ring {j}") for j, ring in enumerate(p)] for i, p in enumerate(rings)]
+    return [
+        [_projected(frame, without_border(ring), f"polygon {i} ring {j}") for j, ring in enumerate(p)]
+        for i, p in enumerate(rings)
+    ]
+
+
+def without_border(ring: Points) -> Points:
+    """The ring without its way along the border of a map, to a pole and back: on the globe that way has no inside.
+
+    A map needs it where a pole is inside, as in `GeoHull.geojson()`: a corner on one border, the pole on both, and the
+    corner on the other border.
+    """
+    at_pole = np.abs(ring[:, 1]) == POLE
+    if not at_pole.any() or at_pole.all():
+        return ring
+    start = int(np.argmin(at_pole))
+    ring, at_pole = np.roll(ring, -start, axis=0), np.roll(at_pole, -start)
+    if (ring[0] == ring[-1]).all():  # the closing corner
+        ring, at_pole = ring[:-1], at_pole[:-1]
+    keep = np.ones(len(ring), np.bool_)
+    ends = np.flatnonzero(np.diff(at_pole, append=False)) + 1  # of runs of corners, those at a pole are every second
+    for first, end in zip(ends[::2], ends[1::2], strict=True):
+        (west, south), (east, north) = ring[first - 1], ring[end % len(ring)]
+        if abs(east - west) == ROUND and len(set(ring[first:end, 1])) == 1:
+            keep[first:end] = False
+            keep[end % len(ring)] = south != north  # otherwise one place
+    return ring[keep]
 
 
 def outline(frame: Gnomonic, vertices: Points) -> Points:
