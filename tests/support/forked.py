@@ -31,10 +31,11 @@ COMMAND = str(Path(sys.executable).with_name("dynhull"))
 
 # What the commands import when they run, and those that serve with several processes.
 RUN_BY = {
-    "serve": ["dynhull_server.process"],
+    "serve": ["dynhull_server.process", "dynhull_cluster.alone"],
     "gateway": ["dynhull_client", "dynhull_gateway.serve"],
     "dashboard": ["dynhull_client", "dynhull_dashboard.serve"],
     "ingest": ["dynhull_client", "dynhull_bridges.ingest.ingest", "dynhull_bridges.ingest.jetstream"],
+    "relay": ["dynhull_client", "dynhull_bridges.relay", "dynhull_bridges.webhook"],
 }
 RUN_BY_SEVERAL = ["dynhull_cluster.process", "dynhull_cluster.child"]
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
@@ -106,7 +107,7 @@ def _wait_to_be(connection: socket.socket) -> None:
         if not request:
             sys.exit()
         command, folder, environment = json.loads(request)
-        _import_for(command)
+        import_for(command)
         reads, writes = os.pipe()
         if (middle := os.fork()) == 0:
             if (process := os.fork()) != 0:
@@ -124,8 +125,9 @@ def _wait_to_be(connection: socket.socket) -> None:
             os.close(each)
 
 
-def _import_for(command: list[str]) -> None:
-    importlib.import_module("dynhull_client" if command[0] == sys.executable else "dynhull_cli.commands")
+def import_for(command: list[str]) -> None:
+    for module in ("dynhull_client",) if command[0] == sys.executable else ("dynhull_cli.main", "dynhull_cli.commands"):
+        importlib.import_module(module)
     for entry in entry_points(group="dynhull.commands"):
         if entry.name in command:
             for module in (entry.module, *RUN_BY.get(entry.name, RUN_BY_OTHERS)):
