@@ -38,6 +38,7 @@ RUN_BY = {
     "relay": ["dynhull_client", "dynhull_bridges.relay", "dynhull_bridges.webhook"],
 }
 RUN_BY_SEVERAL = ["dynhull_cluster.process", "dynhull_cluster.child"]
+RUN_ON_DATABASE = ["dynhull_cluster.machines.only_member"]
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
 
 CHILD_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl
@@ -132,9 +133,14 @@ def import_for(command: list[str]) -> None:
         if entry.name in command:
             for module in (entry.module, *RUN_BY.get(entry.name, RUN_BY_OTHERS)):
                 importlib.import_module(module)
-    if {"--workers", "--cluster"} & set(command):
-        for module in RUN_BY_SEVERAL:
-            importlib.import_module(module)
+    for option, modules in (
+        ("--workers", RUN_BY_SEVERAL),
+        ("--cluster", RUN_BY_SEVERAL),
+        ("--journal", RUN_ON_DATABASE),
+    ):
+        if option in command:
+            for module in modules:
+                importlib.import_module(module)
     gc.freeze()  # a collection would write to, and so copy, all of the memory that the processes share
 
 
