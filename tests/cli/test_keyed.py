@@ -184,7 +184,7 @@ def test_a_row_with_a_bad_time_is_named(served, name):
         "  line 2: seen is missing",
         "  line 3: seen is '1e30', as nanoseconds not from the years 1685 to 2255",
         "  line 4: seen is '1000-01-01T00:00:00Z', not from the years 1685 to 2255",
-        "  line 5: until is 'later', neither ISO 8601 with a time zone nor a number",
+        "  line 5: until is 'later', neither ISO 8601 with a time zone nor a number; --time-format reads other forms",
     ]
     assert entities(served, name)[0] == {"e": [1, 1], "f": [1, 1]}
 

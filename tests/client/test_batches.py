@@ -29,6 +29,8 @@ COLUMN = pd.Series([NOON, NOON])
         [np.datetime64("2026-03-01T12:00"), np.int64(MICROS)],
         np.array(["2026-03-01T12:00:00.000000999"] * 2, "datetime64[ns]"),
         np.array([MICROS] * 2),
+        ["2026-03-01T12:00:00Z", "2026-03-01T11:59:60Z"],
+        pd.Series(["2026-03-01T21:00:00+09:00"] * 2),
         COLUMN,
         list(COLUMN),
         COLUMN.dt.tz_convert("Asia/Tokyo"),
@@ -86,7 +88,12 @@ REFUSED = [
     (A | {"times": [NAIVE]}, ValueError, r"times row 0 is 2026-03-01T12:00:00, which has no time zone: write"),
     (A | {"times": pd.Series([NAIVE])}, ValueError, "times has no time zone: give it one, in pandas with"),
     (A | {"times": pa.array([NAIVE])}, ValueError, "times has no time zone"),
-    (A | {"times": ["2026-03-01T12:00:00Z"]}, TypeError, "times row 0 is '2026-03-01T12:00:00Z': must be a datetime"),
+    (A | {"times": ["2026-03-01T12:00:61Z"]}, ValueError, "times row 0 is '2026-03-01T12:00:61Z': must be a datetime"),
+    (
+        A | {"times": ["2026-03-01T12:00:60"]},
+        ValueError,
+        "times row 0 is '2026-03-01T12:00:60', which has no time zone",
+    ),
     (A | {"times": NOON}, TypeError, "must be one time for each point"),
     (A | {"times": [1.5]}, TypeError, "times row 0 is 1.5: must be a datetime"),
     (A | {"times": [True]}, TypeError, "times row 0 is True: must be a datetime"),
@@ -110,6 +117,25 @@ REFUSED = [
 def test_bad_arguments_are_refused(arguments: dict[str, Any], error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         Batch(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("times", "unit"),
+    [
+        ([1_772_366_400], "seconds"),
+        (np.array([1_772_366_400_000]), "milliseconds"),
+        (pd.Series([1_772_366_400]), "seconds"),
+        ([7], None),
+    ],
+)
+def test_integers_that_are_times_of_1970_are_warned_about(times: Any, unit: str | None) -> None:
+    meant = "" if unit is None else f", which as {unit} would be of our age"
+    words = f"times: integers are microseconds since 1970, and some are times of 1970{meant}. Give datetimes"
+    with pytest.warns(UserWarning, match=words):
+        Batch(keys=["a"], points=POINT, times=times)
+    Batch(
+        keys=["a"], points=POINT, times=[datetime(1970, 1, 1, tzinfo=UTC)], expire_times=np.array([7], "datetime64[us]")
+    )
 
 
 def test_a_batch_prints_its_size() -> None:

@@ -3,6 +3,8 @@
 import http.client
 import json
 from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlencode
 
 import numpy as np
 import pytest
@@ -258,6 +260,8 @@ GRAMMAR = [
      f'{{"time": {UNIX}}}}}'.encode()),
     (CSV, b"key,lng,lat,time,speed\na,1,2,%d,7\n" % UNIX),
     (CSV, b"key,long,lat,time\na, 1,2 ,2026-01-01 00:00Z\n"),
+    (CSV, b"key,long,lat,time\na,1,2,2025-12-31T23:59:60Z\n"),
+    (NDJSON, b'{"key": "a", "lon": 1, "lat": 2, "time": "2025-12-31t23:59:60z"}'),
     (SEQUENCE, FEATURE.replace('"properties": {}', f'"properties": {{"time": {UNIX}.0}}').encode()),
 ]  # fmt: skip
 
@@ -268,6 +272,31 @@ def test_a_row_is_read_alike_in_every_kind_of_body(gateway: Gateway, keyed: str,
     assert (done.status, done.json.get("inserted")) == (200, 1), done.json
     found = gateway.get(f"/hulls/{keyed}/entities").json
     assert (found["keys"], found["points"], found["times"]) == (["a"], [[1, 2]], ["2026-01-01T00:00:00.000000Z"])
+
+
+def test_times_without_a_time_zone_are_read_as_the_call_says(gateway: Gateway, keyed: str) -> None:
+    def upload(time: str, **query: str) -> Any:
+        body = f"key,x,y,time\na,1,2,{time}\n".encode()
+        return gateway.post(f"/hulls/{keyed}/rows?{urlencode(query)}", body, CSV).json
+
+    assert "or an offset, or name it with time_zone" in upload("2026-03-01 12:00")["detail"]
+    berlin = {"time_zone": "Europe/Berlin"}
+    for time, query, told in (
+        ("2026-03-01 12:00", berlin, "2026-03-01T11:00:00.000000Z"),
+        ("2026-10-25 02:30", berlin | {"ambiguous": "later"}, "2026-10-25T01:30:00.000000Z"),
+        ("01/02/2026 12:00", berlin | {"time_format": "%d/%m/%Y %H:%M"}, "2026-02-01T11:00:00.000000Z"),
+    ):
+        assert "detail" not in upload(time, **query)
+        assert gateway.get(f"/hulls/{keyed}/entities").json["times"] == [told]
+    twice = upload("2026-10-25 02:30", **berlin)
+    assert (twice["field"], "exists twice in Europe/Berlin" in twice["detail"]) == ("time", True), twice
+    assert "; ambiguous says which moment it is" in twice["detail"]
+    for query, field in (
+        ({"time_zone": "Mars/Base"}, "time_zone"),
+        ({"ambiguous": "later"}, "ambiguous"),
+        ({"time_format": "%s"}, "time_format"),
+    ):
+        assert (upload("2026-03-01", **query)["field"], upload("2026-03-01", **query)["status"]) == (field, 400)
 
 
 def test_rows_say_when_keys_leave_and_which_keys_are_put(gateway: Gateway, name: str) -> None:

@@ -64,10 +64,10 @@ def put(
     by `dynhull create vehicles --keyed str`. Use `dynhull load --key` for files and for more than fits into one batch.
     """
     from .keyed_rows import keyed_rows, keys_for
-    from .reading.times import TimeReader
+    from .reading.times import TimeReader, as_times
 
     keys, points = keyed_rows(row)
-    times = None if time is None else [TimeReader("--time").read(time)] * len(keys)
+    times = None if time is None else as_times([TimeReader("--time").read(time)] * len(keys))
     applied = client.put(name, keys_for(client, name, keys), points, times, ttl=duration(ttl, "--ttl"))
     _report(
         name, applied, f"{plural(applied.inserted, 'key')} new, {applied.moved:,} moved{_left_out(applied)}", as_json

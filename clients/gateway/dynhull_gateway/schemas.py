@@ -26,6 +26,7 @@ from pydantic import (
 import dynhull_client as sdk
 from dynhull_surface import settings as surface
 from dynhull_surface.counts import COUNTS
+from dynhull_surface.iso_times import LEAP_SECOND, from_iso
 
 from . import examples
 from .answers import Finite, Place, Rows, answering, listed, rows
@@ -52,9 +53,11 @@ def _times(value: Any) -> Any:
     return [None if np.isnat(each) or each == NO_TIME else f"{each}Z" for each in value]
 
 
-def _not_a_number(value: Any) -> Any:
+def _time(value: Any) -> Any:
     if isinstance(value, int | float):
         raise ValueError("must be a time such as 2026-01-31T12:00:00Z")  # pydantic reports ValueErrors
+    if isinstance(value, str) and LEAP_SECOND.search(value):
+        return from_iso(value)
     return value
 
 
@@ -64,7 +67,7 @@ Key = (
     Annotated[str, Field(strict=True, min_length=1, max_length=255)]
     | Annotated[int, Field(strict=True, ge=0, le=LARGEST)]
 )
-Time = Annotated[AwareDatetime, BeforeValidator(_not_a_number)]
+Time = Annotated[AwareDatetime, BeforeValidator(_time)]
 Points = list[Point]
 
 Pairs = Annotated[list[Annotated[list[Place], Field(min_length=2, max_length=2)]], BeforeValidator(rows)]

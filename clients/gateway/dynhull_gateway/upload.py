@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull_cli.counts import Counts
+from dynhull_cli.reading.times import as_times
 from dynhull_client import Applied, AsyncHullClient, DynhullError, InvalidRequestError
 
 from .problems import ProblemError
@@ -265,9 +266,9 @@ def _good(rows: Sequence[Row | None]) -> tuple[list[int], list[Row]]:
     return [place for place, row in enumerate(rows) if row is not None], good
 
 
-def _times(times: list[int | None]) -> npt.NDArray[np.int64] | None:
+def _times(times: list[int | None]) -> npt.NDArray[np.datetime64] | None:
     """The times of rows that are alike."""
-    return None if times[0] is None else np.array(times, np.int64)
+    return None if times[0] is None else as_times(times)
 
 
 def _kind(kind: type, column: str) -> str:

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, Request
 
 from dynhull_cli.reading.labels import LabelReader
-from dynhull_cli.reading.times import TimeUnit
+from dynhull_cli.reading.time_forms import AMBIGUOUS, FORMAT, ZONE, Ambiguous, TimeForm, TimeUnit, time_form
+from dynhull_cli.reading.values import BadValueError
 from dynhull_client import DynhullError
 
 from . import rows, schemas
@@ -61,6 +62,9 @@ TimeUnits = Annotated[
     TimeUnit | None,
     Query(description="Unit of times that are numbers: s, ms, us or ns; by default by the size of the first one."),
 ]
+TimeZone = Annotated[str | None, Query(max_length=100, description=ZONE)]
+TimeFormat = Annotated[str | None, Query(min_length=1, max_length=100, description=FORMAT)]
+OfAmbiguous = Annotated[Ambiguous, Query(description=AMBIGUOUS)]
 OnlyKeys = Annotated[
     Literal["absent", "present"] | None, Query(description="Which keys are put: only new ones, or only known ones.")
 ]
@@ -79,6 +83,9 @@ async def upload_rows(
     coalesce: Coalesce = False,
     max_bad: MaxBad = 0,
     time_unit: TimeUnits = None,
+    time_zone: TimeZone = None,
+    ambiguous: OfAmbiguous = Ambiguous.REFUSE,
+    time_format: TimeFormat = None,
     only: OnlyKeys = None,
     ttl: TimeToLive = None,
     idempotency_key: IdempotencyKey = None,
@@ -94,6 +101,7 @@ async def upload_rows(
     kind = require_type(request, TYPES)
     if delete and kind.startswith("application/geo+json") and keys != "none":
         keys = "none"
+    form = _form(time_unit, time_zone, ambiguous, time_format)
     producer, first = numbered(idempotency_key)
     numbers = await numbering(client, name, producer, first, may_skip=may_skip) if producer else None
     upload = Upload(
@@ -105,11 +113,20 @@ async def upload_rows(
         max_bad=max_bad,
         conditions={"only": only, "ttl": ttl},
     )
-    labels = LabelReader(*LABELS, unit=time_unit, optional=True)
+    labels = LabelReader(*LABELS, form=form, optional=True)
     try:
         return await _uploaded(request, upload, _reader(kind, labels, delete=delete), TYPES[kind], keys)
     finally:
         request.app.state.figures.rows.inc(upload.settled)
+
+
+def _form(unit: TimeUnit | None, zone: str | None, ambiguous: Ambiguous, form: str | None) -> TimeForm:
+    try:
+        return time_form(str, unit, zone, ambiguous, form)
+    except BadValueError as error:
+        raise ProblemError(
+            HTTPStatus.BAD_REQUEST, str(error), "INVALID_FIELD", field=error.name, value=error.value
+        ) from None
 
 
 async def _uploaded(request: Request, upload: Upload, read: Reader, mark: bytes | None, keys: Any) -> Any:

@@ -351,8 +351,8 @@ def put(
         keys: n keys: strings or integers in a list, a numpy array, a column of pandas, polars or pyarrow; or
             `dynhull.keys.PackedKeys`.
         points: (n, 2) their positions.
-        times: (n,) their event times: datetimes with a time zone, datetime64 in UTC, a column of such times with a time
-            zone, or integers of microseconds since 1970.
+        times: (n,) their event times: datetimes or ISO 8601 with a time zone, datetime64 in UTC, a column of such times
+            with a time zone, or integers of microseconds since 1970.
         remove: keys to remove in the same batch.
         only: "absent" puts new keys only, "present" known keys only; the others are skipped and counted.
         ttl: the time after which the keys leave the hull, in seconds or as a timedelta.

@@ -9,7 +9,7 @@ from dynhull.arrays import as_points
 
 from ._batch import Batch, join_batches, keep_last_rows
 from ._keys import checked_keys, plain_keys
-from ._times import as_microseconds
+from ._times import as_microseconds, as_times
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -84,7 +84,7 @@ def put_parts(
     checked, xy = checked_keys(keys), as_points(points, "points")
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")
-    columns: dict[str, Any] = {"keys": checked, "points": xy, "times": micros, "expire_times": ends}
+    columns: dict[str, Any] = {"keys": checked, "points": xy, "times": as_times(micros), "expire_times": as_times(ends)}
     whole = Batch(**options, **columns)
     names = plain_keys(checked)
     stamps = [UNTIMED] * len(names) if micros is None else micros.tolist()

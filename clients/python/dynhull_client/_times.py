@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
+from warnings import warn
 
 import numpy as np
 import numpy.typing as npt
 from google.protobuf.duration_pb2 import Duration
 
 from dynhull_proto.v1 import points_pb2
+from dynhull_surface.iso_times import from_iso
 
 if TYPE_CHECKING:
     from google.protobuf.timestamp_pb2 import Timestamp
@@ -20,7 +22,11 @@ Times = npt.NDArray[np.datetime64]
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 MICROSECOND = timedelta(microseconds=1)
 LARGEST_TIME = 2**53  # microseconds: the years 1685 to 2255
-A_TIME = "a datetime with a time zone, a numpy.datetime64, or an integer of microseconds since 1970"
+YEAR_1970 = 365 * 86_400 * 1_000_000  # microseconds
+# Integers that are times of our age in another unit: more than 1990, less than 2100.
+OTHER_UNITS = {"seconds": 1, "milliseconds": 1000}
+EARLIEST, LATEST = 631_152_000, 4_102_444_800
+A_TIME = "a datetime or ISO 8601 with a time zone, a numpy.datetime64, or an integer of microseconds since 1970"
 NO_ZONE = "has no time zone: write datetime.now(UTC), or value.replace(tzinfo=UTC) if it is in UTC"
 
 
@@ -28,8 +34,9 @@ def as_microseconds(times: Any, rows: int, name: str) -> npt.NDArray[np.int64]:
     """One time for each row, (rows,). Nanoseconds are cut off.
 
     Args:
-        times: datetimes with a time zone; a numpy array of datetime64, which numpy defines to be in UTC; a column of
-            pandas, polars or pyarrow with a time zone; or integers of microseconds since 1970.
+        times: datetimes or ISO 8601 with a time zone; a numpy array of datetime64, which numpy defines to be in UTC; a
+            column of pandas, polars or pyarrow with a time zone; or integers of microseconds since 1970. Those of that
+            year are warned about: they are seconds or milliseconds, as a rule.
         rows: their number.
         name: what error messages call them.
 
@@ -44,6 +51,11 @@ def as_microseconds(times: Any, rows: int, name: str) -> npt.NDArray[np.int64]:
     if bad.size:
         raise ValueError(f"{name} row {bad[0]} is {micros[bad[0]]} microseconds: not from the years 1685 to 2255")
     return micros
+
+
+def as_times(micros: npt.NDArray[np.int64] | None) -> Times | None:
+    """The microseconds as times."""
+    return None if micros is None else micros.view("datetime64[us]")
 
 
 def encode_times(times: Any, rows: int, name: str) -> points_pb2.Times:
@@ -82,8 +94,26 @@ def _microseconds(times: Any, name: str) -> npt.NDArray[np.int64]:
         missing = np.flatnonzero(np.isnat(values)) if values.dtype.kind == "M" else np.empty(0, np.intp)
         if missing.size:
             raise ValueError(f"{name} row {missing[0]} is missing: must be {A_TIME}")
-        return (values.astype("datetime64[us]") if values.dtype.kind == "M" else values).astype(np.int64)
-    return np.array([_microsecond(value, f"{name} row {row}") for row, value in enumerate(values)], np.int64)
+        if values.dtype.kind == "M":
+            return values.astype("datetime64[us]").astype(np.int64)
+        return _of_integers(values.astype(np.int64), name)
+    rows = list(values)
+    micros = np.array([_microsecond(value, f"{name} row {row}") for row, value in enumerate(rows)], np.int64)
+    if any(isinstance(value, int | np.integer) for value in rows):
+        return _of_integers(micros, name)
+    return micros
+
+
+def _of_integers(micros: npt.NDArray[np.int64], name: str) -> npt.NDArray[np.int64]:
+    """The same, with a warning if there are times of 1970: the same one for all batches, which Python shows once."""
+    early = micros[(micros >= 0) & (micros < YEAR_1970)]
+    if early.size:
+        first = int(early[0])
+        units = (unit for unit, factor in OTHER_UNITS.items() if EARLIEST <= first / factor < LATEST)
+        meant = next((f", which as {unit} would be of our age" for unit in units), "")
+        message = f"{name}: integers are microseconds since 1970, and some are times of 1970{meant}"
+        warn(f"{message}. Give datetimes, or datetime64 if these are meant", UserWarning, stacklevel=2)
+    return micros
 
 
 def _values(times: Any, name: str) -> Any:
@@ -106,8 +136,20 @@ def _microsecond(value: Any, name: str) -> int:
         if value.tzinfo is None:
             raise ValueError(f"{name} is {value.isoformat()}, which {NO_ZONE}")
         return (value - EPOCH) // MICROSECOND
+    if isinstance(value, str):
+        return _of_text(value, name)
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
         raise TypeError(f"{name} is {value!r}: must be {A_TIME}")
     if abs(int(value)) > LARGEST_TIME:
         raise ValueError(f"{name} is {value} microseconds: not from the years 1685 to 2255")
     return int(value)
+
+
+def _of_text(text: str, name: str) -> int:
+    try:
+        time = from_iso(text)
+    except ValueError:
+        raise ValueError(f"{name} is {text!r}: must be {A_TIME}") from None
+    if time.tzinfo is None:
+        raise ValueError(f"{name} is {text!r}, which has no time zone: add Z for UTC, or an offset")
+    return (time - EPOCH) // MICROSECOND

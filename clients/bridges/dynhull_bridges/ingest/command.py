@@ -8,7 +8,8 @@ import typer
 
 from dynhull_cli.connected import Connect, connecting, fail
 from dynhull_cli.durations import duration
-from dynhull_cli.reading.times import TimeUnit
+from dynhull_cli.reading.time_forms import AMBIGUOUS, FORMAT, ZONE, Ambiguous, TimeUnit, time_form
+from dynhull_surface.described import option_of
 from dynhull_surface.reasons import Exit
 
 from ..command import LogForm
@@ -22,7 +23,11 @@ class Tombstones(StrEnum):
 
 
 def _mapping(text: str, *names: str) -> Any:
-    return typer.Option(*names, metavar="EXPRESSION", help=text, rich_help_panel="From messages to points")
+    return _reading(text, *names, metavar="EXPRESSION")
+
+
+def _reading(text: str, *names: str, **more: Any) -> Any:
+    return typer.Option(*names, help=text, rich_help_panel="From messages to points", **more)
 
 
 @connecting
@@ -42,21 +47,16 @@ def ingest(
         str | None, _mapping("Event time: ISO 8601 with a time zone, or a number since 1970. Default: none.")
     ] = None,
     time_unit: Annotated[
-        TimeUnit | None,
-        typer.Option(
-            help="Unit of times that are numbers. Default: by the size of the first one; logged.",
-            rich_help_panel="From messages to points",
-        ),
+        TimeUnit | None, _reading("Unit of times that are numbers. Default: by the size of the first one; logged.")
     ] = None,
+    time_zone: Annotated[str | None, _reading(ZONE)] = None,
+    ambiguous: Annotated[Ambiguous, _reading(AMBIGUOUS)] = Ambiguous.REFUSE,
+    time_format: Annotated[str | None, _reading(FORMAT)] = None,
     each: Annotated[
         str | None, _mapping("Path to an array with a point in each element. Default: a message is one point.")
     ] = None,
     tombstones: Annotated[
-        Tombstones,
-        typer.Option(
-            help="What a message without contents is: bad, or one that deletes its key.",
-            rich_help_panel="From messages to points",
-        ),
+        Tombstones, _reading("What a message without contents is: bad, or one that deletes its key.")
     ] = Tombstones.BAD,
     create: Annotated[bool, typer.Option(help="Create hulls that do not exist.")] = True,
     geographic: Annotated[
@@ -137,7 +137,8 @@ def ingest(
     from .pump import Settings
 
     deletes = tombstones is Tombstones.DELETE
-    mapping = Mapping(hull, x, y, key, time, time_unit, each, deletes=deletes)
+    form = time_form(option_of, time_unit, time_zone, ambiguous, time_format)
+    mapping = Mapping(hull, x, y, key, time, form, each, deletes=deletes)
     on_globe = mapping.degrees if geographic is None else geographic
     given = (("--grace", grace), ("--report", report), ("--patience", patience))
     seconds = {option: duration(text, option) for option, text in given}

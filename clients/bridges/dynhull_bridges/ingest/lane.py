@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import structlog
 
+from dynhull_cli.reading.times import as_times
 from dynhull_client import (
     Applied,
     AsyncHullClient,
@@ -194,7 +195,7 @@ class Lane:
             return
         self._flying.append(rest)
         sequence = rest.number if self._producer is not None else None
-        times = rest.times if rest.times[0] is not None else None
+        times = as_times(rest.times) if rest.times[0] is not None else None
         try:
             if rest.deletes:
                 outcome = await writer.remove(self._keys(rest), sequence=sequence)

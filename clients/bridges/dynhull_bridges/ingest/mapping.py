@@ -10,7 +10,8 @@ import orjson
 
 from dynhull_cli.reading.columns import are_degrees
 from dynhull_cli.reading.labels import key_of
-from dynhull_cli.reading.times import EPOCH, NAMES, TimeReader, TimeUnit
+from dynhull_cli.reading.time_forms import TimeForm
+from dynhull_cli.reading.times import EPOCH, NAMES, TimeReader
 from dynhull_cli.reading.values import BadValueError, coordinate, is_number
 
 from .expressions import MISSING, Value, is_fixed, is_in_document, last_name, value_of
@@ -38,7 +39,7 @@ class Mapping:
         x, y: expressions for the coordinates.
         key: an expression for the key; None for points without keys.
         time: an expression for the event time; None for none.
-        time_unit: the unit of times that are numbers; None for that which the first one seems to have.
+        form: how times are written.
         each: a path to an array with a row in each element; None if a message is one row.
         deletes: whether a message without contents deletes its key.
 
@@ -61,15 +62,15 @@ class Mapping:
         y: str,
         key: str | None,
         time: str | None,
-        time_unit: TimeUnit | None,
+        form: TimeForm,
         each: str | None,
         *,
         deletes: bool = False,
     ) -> None:
         self.hull = hull if is_fixed(hull) else None
         self.keyed = key is not None
-        more = ("delete",) if deletes else ()
-        self.digest = sha256(repr((hull, x, y, key, time, str(time_unit), each, *more)).encode()).hexdigest()[:12]
+        more = [*_written(form), *(["delete"] if deletes else [])]
+        self.digest = sha256(repr((hull, x, y, key, time, str(form.unit), each, *more)).encode()).hexdigest()[:12]
         self.degrees = are_degrees(last_name(x), last_name(y))
         self.swapped = are_degrees(last_name(y), last_name(x))
         self.warning: str | None = None
@@ -81,7 +82,7 @@ class Mapping:
                 raise ValueError(f"--{name} {text!r} is the same for all messages: give a path, such as '$.{name}'")
         self._key = None if key is None else value_of(key, "--key")
         self._time = None if time is None else value_of(time, "--time")
-        self.times = TimeReader("time", time_unit)
+        self.times = TimeReader("time", form)
         if each is not None and not each.startswith("$"):
             raise ValueError(f"--each {each!r} is no path: it begins with $")
         self._each = None if each is None else value_of(each, "--each")
@@ -147,6 +148,12 @@ class Mapping:
         unit, when = self.times.unit, EPOCH + timedelta(microseconds=time)
         if unit is not None and is_number(str(found)) and not EARLIEST <= when.year < LATEST:
             self.warning = f"time: {found} {NAMES[unit]} since 1970 are {when.isoformat()}: is --time-unit right?"
+
+
+def _written(form: TimeForm) -> list[str]:
+    """What a form of times has that is not as usual, but for the unit."""
+    zone = [] if form.zone is None else ["zone", form.zone.key, form.ambiguous]
+    return zone + ([] if form.format is None else ["format", form.format])
 
 
 def _found(value: Value, message: Message, document: Any) -> Any:

@@ -11,7 +11,7 @@ import typer
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..plural import plural
-from ..reading.times import TimeUnit
+from ..reading.time_forms import AMBIGUOUS, FORMAT, ZONE, Ambiguous, TimeUnit
 from .options import STANDARD_INPUT, Format, Options
 
 if TYPE_CHECKING:
@@ -75,6 +75,9 @@ def load(
     time_unit: Annotated[
         TimeUnit | None, _input("Unit of times that are numbers. Default: by the size of the first one; printed.")
     ] = None,
+    time_zone: Annotated[str | None, _input(ZONE)] = None,
+    ambiguous: Annotated[Ambiguous, _input(AMBIGUOUS)] = Ambiguous.REFUSE,
+    time_format: Annotated[str | None, _input(FORMAT)] = None,
     expires: Annotated[
         str | None,
         _input("Column of the times at which keys leave the hull, written like --time; empty for never. With --key."),
@@ -148,13 +151,30 @@ def load(
     from .source import integers_of_any_size, open_source
 
     _check(decimal, replace=replace, resume=resume, again=again)
-    if time_unit is not None and time is None and expires is None:
-        raise ValueError("--time-unit is given with --time or --expires")
+    for option, value in (("--time-unit", time_unit), ("--time-zone", time_zone), ("--time-format", time_format)):
+        if value is not None and time is None and expires is None:
+            raise ValueError(f"{option} is given with --time or --expires")
     if expires is not None and key is None:
         raise ValueError("--expires is given with --key: only keys leave at times of their own")
     options = Options(
-        x, y, delimiter, decimal, header, encoding, vertices, key, time, time_unit, expires, layer, geometry
+        x,
+        y,
+        delimiter,
+        decimal,
+        header,
+        encoding,
+        vertices,
+        key,
+        time,
+        time_unit,
+        expires,
+        layer,
+        geometry,
+        time_zone=time_zone,
+        ambiguous=ambiguous,
+        time_format=time_format,
     )
+    options.time_form()  # what is wrong with it is said before the file is opened
     if file is None and sys.stdin.isatty():
         raise ValueError("no file: give its name, or - to type the points in")
     there = cache(partial(hull_if_served if dry_run else known_hull, client, name))

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from ..reading.times import TimeUnit
+from dynhull_surface.described import option_of
+
+from ..reading.time_forms import Ambiguous, TimeForm, TimeUnit, time_form
 
 STANDARD_INPUT = "-"
 
@@ -43,6 +45,9 @@ class Options:
         expires: the column or member of the times at which keys leave; None for points that stay.
         layer: the layer, of files that have several.
         geometry: the column of geometries.
+        time_zone: the time zone of times that have none.
+        ambiguous: what becomes of times that exist twice or not at all in it.
+        time_format: the form of times, for strptime.
     """
 
     x: str | None = None
@@ -58,8 +63,15 @@ class Options:
     expires: str | None = None
     layer: str | None = None
     geometry: str | None = None
+    time_zone: str | None = None
+    ambiguous: Ambiguous = Ambiguous.REFUSE
+    time_format: str | None = None
 
     @property
     def labels(self) -> tuple[tuple[str, str | None], ...]:
         """The options that name the columns of keys, times and times to leave, and these columns."""
         return ("--key", self.key), ("--time", self.time), ("--expires", self.expires)
+
+    def time_form(self) -> TimeForm:
+        """How times are written. ValueError names the option that is wrong."""
+        return time_form(option_of, self.time_unit, self.time_zone, self.ambiguous, self.time_format)

@@ -10,6 +10,7 @@ from dynhull_client import Applied, DynhullError, HullClient, InvalidRequestErro
 
 from ..counts import Counts
 from ..keyed_rows import known_hull
+from ..reading.times import as_times
 from .bad_rows import BadRows
 from .chunks import Rows
 from .refusals import TOO_FAR, refused_rows
@@ -161,6 +162,8 @@ def _put(writer: Writer, rows: Rows) -> "Future[Applied]":
         outcome = writer.put(insert=rows.points)
         writer.flush()
         return outcome
+    times = None if rows.times is None else as_times(rows.times)
     if rows.keys is None:
-        return writer.put(insert=rows.points, times=rows.times)
-    return writer.put(keys=rows.keys, points=rows.points, times=rows.times, expire_times=rows.expires)
+        return writer.put(insert=rows.points, times=times)
+    expires = None if rows.expires is None else as_times(rows.expires)
+    return writer.put(keys=rows.keys, points=rows.points, times=times, expire_times=expires)

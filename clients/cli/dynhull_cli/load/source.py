@@ -50,6 +50,9 @@ APPLIES_TO = {
     "expires": set(Format),
     "layer": LAYERS,
     "geometry": {Format.PARQUET} | LAYERS,
+    "time_zone": set(Format),
+    "ambiguous": set(Format),
+    "time_format": set(Format),
 }
 
 
@@ -121,7 +124,7 @@ class Source:
         if not any(names):
             return None
         kind: KeyType = "int" if self.integer_keys else "str"
-        return LabelReader(*names, kind=kind, unit=self.options.time_unit, noted=self.notes.append)
+        return LabelReader(*names, kind=kind, form=self.options.time_form(), noted=self.notes.append)
 
     def rewind(self) -> None:
         """Return to the beginning; not possible with a pipe."""

@@ -6,7 +6,8 @@ from typing import Any
 
 from dynhull.keys import KeyType, as_key
 
-from .times import TimeReader, TimeUnit
+from .time_forms import TimeForm
+from .times import TimeReader
 from .values import BadValueError
 
 Key = str | int
@@ -21,8 +22,8 @@ class LabelReader:
     Args:
         key, time, expires: the names of their columns or members; None for rows that have none.
         kind: that of the keys; None for the kind that they have.
-        unit: the unit of times that are numbers; None for that which the first one seems to have.
-        noted: called with a line about that unit.
+        form: how times are written; None for ISO 8601 with a time zone, and numbers.
+        noted: called with a line about the unit of times that are numbers.
         optional: whether rows may have no key, which is not an empty one, and no time. They may always have no time at
             which they leave.
     """
@@ -34,13 +35,13 @@ class LabelReader:
         expires: str | None = None,
         *,
         kind: KeyType | None = None,
-        unit: TimeUnit | None = None,
+        form: TimeForm | None = None,
         noted: Callable[[str], object] | None = None,
         optional: bool = False,
     ) -> None:
         self._key, self._kind, self._optional, self._noted = key, kind, optional, noted
-        self._time = None if time is None else TimeReader(time, unit)
-        self._expires = None if expires is None else TimeReader(expires, unit)
+        self._time = None if time is None else TimeReader(time, form)
+        self._expires = None if expires is None else TimeReader(expires, form)
 
     def __call__(self, key: Any, time: Any, expires: Any = None) -> Labels:
         """The labels of a row; BadValueError says what is wrong with them."""

@@ -1,21 +1,17 @@
 """Points in time, as files and people write them, in microseconds since 1970."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
-from enum import StrEnum
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from dynhull_surface.iso_times import from_iso
+
+from .time_forms import Ambiguous, TimeForm, TimeUnit, from_format
 from .values import BadValueError
-
-
-class TimeUnit(StrEnum):
-    """The units of times that are numbers."""
-
-    SECONDS = "s"
-    MILLISECONDS = "ms"
-    MICROSECONDS = "us"
-    NANOSECONDS = "ns"
-
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 MICROSECOND = timedelta(microseconds=1)
@@ -43,27 +39,31 @@ LIMITS = {
 
 
 class TimeReader:
-    """Reads times: ISO 8601 with a time zone, or numbers since 1970, all in one unit.
+    """Reads times: ISO 8601, or numbers since 1970, all in one unit; or those of another form.
 
     Attributes:
         unit: the unit of numbers; None until the first number decides it.
         note: a line about the unit that the first number decided; None without one.
     """
 
-    def __init__(self, name: str, unit: TimeUnit | None = None) -> None:
-        self.unit = unit
+    def __init__(self, name: str, form: TimeForm | None = None) -> None:
+        self._form = form or TimeForm()
+        self.unit = self._form.unit
         self.note: str | None = None
         self._name = name
 
     def read(self, value: Any) -> int:
         """The time in microseconds since 1970; ValueError says what is wrong with the value."""
-        if isinstance(value, str) and value[4:5] == "-" and value[:4].isdecimal():  # a date, as most times are
-            return self._of_text(value.strip())
+        form = self._form.format
+        if form is None and isinstance(value, str) and value[4:5] == "-" and value[:4].isdecimal():
+            return self._of_text(value.strip())  # a date, as most times are
         if isinstance(value, datetime):
             return self._of_datetime(value, value.isoformat())
         text = "" if value is None else str(value).strip()
         if not text:
             raise BadValueError(self._name, "is missing")
+        if form is not None:
+            return self._of_form(text, form)
         try:
             number = Decimal(text)
         except InvalidOperation:
@@ -87,18 +87,52 @@ class TimeReader:
 
     def _of_text(self, text: str) -> int:
         try:
-            time = datetime.fromisoformat(text)
+            time = from_iso(text)
         except ValueError:
-            raise BadValueError(self._name, "neither ISO 8601 with a time zone nor a number", text) from None
+            zone = " with a time zone" if self._form.zone is None else ""
+            other = self._form.advice("; {} reads other forms", "time_format")
+            raise BadValueError(self._name, f"neither ISO 8601{zone} nor a number{other}", text) from None
+        return self._of_datetime(time, text)
+
+    def _of_form(self, text: str, form: str) -> int:
+        try:
+            time = from_format(text, form)
+        except ValueError:
+            raise BadValueError(self._name, f"not of the form {form}", text) from None
         return self._of_datetime(time, text)
 
     def _of_datetime(self, value: datetime, text: str) -> int:
-        if value.tzinfo is None:
-            raise BadValueError(self._name, "without a time zone: add Z for UTC, or an offset", text)
+        return self._of_zone(value, text) if value.tzinfo is None else self._checked(value, text)
+
+    def _of_zone(self, value: datetime, text: str) -> int:
+        """The time that the clocks of the zone say."""
+        form, zone = self._form, self._form.zone
+        if zone is None:
+            named = form.advice(", or name it with {}", "time_zone")
+            raise BadValueError(self._name, f"without a time zone: add Z for UTC, or an offset{named}", text)
+        moments = sorted({self._checked(value.replace(tzinfo=zone, fold=fold), text) for fold in (0, 1)})
+        if len(moments) == 1:
+            return moments[0]
+        if form.ambiguous is Ambiguous.REFUSE:
+            read = (EPOCH + timedelta(microseconds=moments[0])).astimezone(zone)
+            twice = read.replace(tzinfo=None, fold=0) == value
+            what = (
+                "exists twice in {}: clocks were put back" if twice else "does not exist in {}: clocks were put forward"
+            )
+            which = form.advice("; {} says which moment it is: earlier or later", "ambiguous")
+            raise BadValueError(self._name, what.format(zone.key) + which, text)
+        return moments[0 if form.ambiguous is Ambiguous.EARLIER else -1]
+
+    def _checked(self, value: datetime, text: str) -> int:
         micros = (value - EPOCH) // MICROSECOND
         if abs(micros) > LARGEST_TIME:
             raise BadValueError(self._name, NOT_OF_THESE_YEARS, text)
         return micros
+
+
+def as_times(micros: Sequence[int | None]) -> npt.NDArray[np.datetime64]:
+    """Times as the SDK takes them, of microseconds since 1970."""
+    return np.array(micros, "datetime64[us]")
 
 
 def shown_time(micros: int) -> str:

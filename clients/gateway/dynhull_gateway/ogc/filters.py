@@ -3,13 +3,15 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Annotated, Any, Self
 
 import numpy as np
 import numpy.typing as npt
 import shapely
-from pydantic import AfterValidator, AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from dynhull_surface.iso_times import from_iso
 
 from ..schemas import PLACE
 
@@ -18,7 +20,6 @@ FEW = 100
 NUMBER = r"-?[0-9]{1,20}(\.[0-9]{1,20})?([eE]-?[0-9]{1,2})?"
 BBOX = rf"^{NUMBER}(,{NUMBER}){{3}}((,{NUMBER}){{2}})?$"
 OPEN = ("", "..")
-INSTANT: TypeAdapter[datetime] = TypeAdapter(AwareDatetime)
 RFC3339 = re.compile(r"\d{4}-\d\d-\d\d[Tt]\d\d:\d\d:\d\d(\.\d+)?([Zz]|[+-]\d\d:\d\d)")
 
 
@@ -179,10 +180,8 @@ def _instant(text: str) -> datetime | None:
         return None
     try:
         if RFC3339.fullmatch(text):
-            leap = text[17:19] == "60"  # the second after 59, before the next minute begins
-            time = INSTANT.validate_python(f"{text[:17]}59{text[19:]}" if leap else text)
-            return time + timedelta(seconds=1) if leap else time
-    except (ValidationError, OverflowError):
+            return from_iso(text)
+    except ValueError:
         pass
     raise ValueError(f"{text!r} is not a time such as 2026-01-31T12:00:00Z")
 
