@@ -286,6 +286,13 @@ class Hull(Live):
         """
         return self._measure(measure.min_circle)
 
+    def label_point(self) -> tuple[float, float]:
+        """A point strictly inside, for a label: the centroid. O(h log n).
+
+        A vertex where rounding leads outside, and for fewer than three vertices; NaN without points.
+        """
+        return self._measure(measure.label_point)
+
     # Shapes that a few bad points cannot spoil
 
     def layers(self, k: int) -> list[Points]:

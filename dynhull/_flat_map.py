@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MOST_POSITIONS = 10_000_000
 
 
-class _Position(NamedTuple):
+class Position(NamedTuple):
     """Longitude from -180 to below 180, latitude, and the sheet of the map."""
 
     lon: float
@@ -75,7 +75,7 @@ def geojson(vertices: Points, max_segment: float | None = None) -> dict[str, Any
         case 1:
             ((lon, lat),) = corners
             return {"type": "Point", "coordinates": (lon if abs(lon) <= 180 else _wrapped(lon), lat)}
-    positions = _crossing(_on_sheets(corners, closed=closed))
+    positions = _crossing(on_sheets(corners, closed=closed))
     if not closed:
         return _geometry("LineString", _lines(positions))
     turns = positions.pop().sheet - positions[0].sheet
@@ -89,7 +89,7 @@ def _geometry(kind: str, parts: list[Any]) -> dict[str, Any]:
     return {"type": f"Multi{kind}", "coordinates": tuple(parts)}
 
 
-def _on_sheets(corners: list[Point], *, closed: bool) -> list[_Position]:
+def on_sheets(corners: list[Point], *, closed: bool) -> list[Position]:
     """The positions of the corners; if closed, the first again at the end, on the sheet where the way round arrives.
 
     A pole is a line on the map, its upper or lower border, and so the way over a pole follows the border.
@@ -98,7 +98,7 @@ def _on_sheets(corners: list[Point], *, closed: bool) -> list[_Position]:
         corners = [*corners[1:], corners[0]]
     path = iter([*corners, corners[0]] if closed else corners)
     lon, lat = next(path)
-    positions = [_Position(_wrapped(lon), lat, 0)]
+    positions = [Position(_wrapped(lon), lat, 0)]
     for lon, lat in path:
         last = positions[-1]
         if abs(lat) == 90:
@@ -112,32 +112,32 @@ def _on_sheets(corners: list[Point], *, closed: bool) -> list[_Position]:
             over = last._replace(lat=copysign(90, last.lat + lat))
             positions += [over, _along_border(over, lon)]
         else:
-            positions.append(_Position(lon, lat, last.sheet - (east > 180) + (east < -180)))
+            positions.append(Position(lon, lat, last.sheet - (east > 180) + (east < -180)))
             continue
         positions.append(positions[-1]._replace(lat=lat))
     return positions
 
 
-def _along_border(last: _Position, lon: float) -> _Position:
+def _along_border(last: Position, lon: float) -> Position:
     """The end of a way along the border of the map, the hull on its left: to the west at the north pole."""
     if last.lat > 0:
-        return _Position(lon, last.lat, last.sheet - (lon > last.lon))
-    return _Position(lon, last.lat, last.sheet + (lon < last.lon))
+        return Position(lon, last.lat, last.sheet - (lon > last.lon))
+    return Position(lon, last.lat, last.sheet + (lon < last.lon))
 
 
-def _crossing(positions: list[_Position]) -> list[_Position]:
+def _crossing(positions: list[Position]) -> list[Position]:
     """The positions, with those between them where the way crosses the antimeridian."""
     result = positions[:1]
     for last, after in pairwise(positions):
         if after.sheet > last.sheet and after.lon != -180:
-            result.append(_Position(-180.0, _latitude_at_antimeridian(last, after), after.sheet))
+            result.append(Position(-180.0, _latitude_at_antimeridian(last, after), after.sheet))
         elif after.sheet < last.sheet and last.lon != -180:
-            result.append(_Position(-180.0, _latitude_at_antimeridian(last, after), last.sheet))
+            result.append(Position(-180.0, _latitude_at_antimeridian(last, after), last.sheet))
         result.append(after)
     return result
 
 
-def _latitude_at_antimeridian(a: _Position, b: _Position) -> float:
+def _latitude_at_antimeridian(a: Position, b: Position) -> float:
     """Where the great circle through a and b crosses it."""
     if abs(a.lat) == 90:  # along the border
         return a.lat
@@ -145,14 +145,14 @@ def _latitude_at_antimeridian(a: _Position, b: _Position) -> float:
     return degrees(atan(x / z))
 
 
-def _rings(positions: list[_Position]) -> list[list[Point]]:
+def _rings(positions: list[Position]) -> list[list[Point]]:
     """The part of a ring on each sheet; not of a sheet that the ring touches at its border only."""
     sheets = {position.sheet for position in positions}
     parts = [_on_sheet(positions, sheet) for sheet in range(min(sheets) - 1, max(sheets) + 1)]
     return [part for part in parts if len({lon for lon, _ in part}) > 1]
 
 
-def _on_sheet(positions: list[_Position], sheet: int) -> list[Point]:
+def _on_sheet(positions: list[Position], sheet: int) -> list[Point]:
     """The positions on a sheet, with those of the next that are on the common border."""
     return [
         (lon if at == sheet else 180.0, lat)
@@ -161,7 +161,7 @@ def _on_sheet(positions: list[_Position], sheet: int) -> list[Point]:
     ]
 
 
-def _around_pole(positions: list[_Position], turns: int) -> list[Point]:
+def _around_pole(positions: list[Position], turns: int) -> list[Point]:
     """A ring with a pole inside: once around, then along the border of the map."""
     start = next(i for i, position in enumerate(positions) if position.lon == -180)
     lat = positions[start].lat
@@ -171,7 +171,7 @@ def _around_pole(positions: list[_Position], turns: int) -> list[Point]:
     return [(west, lat), *between, (east, lat), (east, pole), (west, pole)]
 
 
-def _lines(positions: list[_Position]) -> list[tuple[Point, ...]]:
+def _lines(positions: list[Position]) -> list[tuple[Point, ...]]:
     """The parts of a way between two points, cut at the antimeridian."""
     lines: list[tuple[int, list[Point]]] = []
     for a, b in pairwise(positions):

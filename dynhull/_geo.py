@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
-from . import _ellipsoid, _flat_map, _globe_layers, _globe_sketch
+from . import _ellipsoid, _flat_map, _globe_extent, _globe_layers, _globe_sketch
 from ._base import UNMEASURED, Live, as_percent
 from ._globe import Gnomonic, as_center, as_lonlat, as_place
 from ._globe_tree import GlobeEntities, GlobeTree, GlobeWindowTree
@@ -201,6 +202,23 @@ class Globe(Live):
         may be farther from each other.
         """
         return self._measure(_ellipsoid.diameter)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """West, south, east and north in degrees, as the `bbox` of GeoJSON (RFC 7946). O(h log n).
+
+        West is greater than east across the antimeridian. With a pole inside, from -180 to 180, and to the pole. An
+        edge that reaches beyond its ends is within 1e-12 degrees; all else is exact. NaN without points.
+        """
+        return self._measure(_globe_extent.bounds)
+
+    def label_point(self) -> tuple[float, float]:
+        """A place strictly inside, for a label: about the middle. O(h log n).
+
+        A vertex where rounding leads outside, and for fewer than three vertices; NaN without points.
+        """
+        center = self.center
+        return (nan, nan) if center is None else _globe_extent.label_point(self.vertices(), center)
 
     # For maps
 

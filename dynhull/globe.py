@@ -15,6 +15,7 @@ a hull: counter-clockwise, in degrees, longitude first, as `GeoHull.vertices` re
 from ._ellipsoid import Boundary, area, diameter, distance, perimeter
 from ._flat_map import boundary, geojson
 from ._globe import REACH, Gnomonic, as_center, as_lonlat
+from ._globe_extent import bounds, label_point
 from ._globe_sketch import sketch
 
 __all__ = [
@@ -25,9 +26,11 @@ __all__ = [
     "as_center",
     "as_lonlat",
     "boundary",
+    "bounds",
     "diameter",
     "distance",
     "geojson",
+    "label_point",
     "perimeter",
     "sketch",
 ]

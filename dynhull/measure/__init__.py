@@ -8,6 +8,7 @@ from ._area import area, centroid, perimeter
 from ._box import min_box, min_perimeter_box
 from ._circle import min_circle
 from ._extent import bounds, diameter, width
+from ._label import label_point
 from ._lines import distance, intersect_lines
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "diameter",
     "distance",
     "intersect_lines",
+    "label_point",
     "min_box",
     "min_circle",
     "min_perimeter_box",

@@ -148,8 +148,23 @@ def test_measure(hull):
     assert (lines["area"], lines["width"], lines["bounds"]) == ("16.0", "4.0", "0.0\t0.0\t4.0\t4.0")
     assert lines["min_circle"].startswith("2.0\t2.0\t2.828")
     told = json.loads(dynhull("measure", hull, "--json").stdout)
-    assert told["min_circle"] == [[2, 2], 8**0.5]
+    assert (told["min_circle"], told["label_point"]) == ([[2, 2], 8**0.5], [2, 2])
     assert told.keys() == lines.keys()
+
+
+def test_measure_on_the_globe(name, served):
+    with HullClient(served) as client:
+        client.create_hull(name, geographic=True)
+        client.apply(name, insert=[(179, 0), (-179, 0), (180, 2)])
+    lines = dynhull("measure", name).stdout.splitlines()
+    assert lines[2:4] == ["bounds\t179.0\t0.0\t-179.0\t2.0\tdeg", lines[3]]
+    assert [line.split("\t")[0] for line in lines] == [
+        *("area", "perimeter", "bounds", "diameter", "revision", "label_point", "geographic")
+    ]
+    assert [lines[number].split("\t")[-1] for number in (0, 1, 3, 5)] == ["m2", "m", "m", "deg"]
+    code, shown = on_a_terminal("measure", name, "--address", served)
+    assert (code, "globe" in shown, " km2 " in shown, "│ 179 0 -179 2 deg" in shown) == (0, True, True, True)
+    assert "nan" not in shown
 
 
 def test_separate(hull, served):

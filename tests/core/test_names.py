@@ -22,13 +22,13 @@ PACKAGES = {
     },
     "dynhull.envelope": {"Decomposition", "Frontier", "PhaseDiagram", "energy_above_hull_nd"},
     "dynhull.globe": {
-        *("REACH", "Boundary", "Gnomonic", "area", "as_center", "as_lonlat", "boundary"),
-        *("diameter", "distance", "geojson", "perimeter", "sketch"),
+        *("REACH", "Boundary", "Gnomonic", "area", "as_center", "as_lonlat", "boundary", "bounds"),
+        *("diameter", "distance", "geojson", "label_point", "perimeter", "sketch"),
     },
     "dynhull.gjk": {"Contact", "contact", "distance_many", "intersect", "intersect_many"},
     "dynhull.measure": {
         *("area", "bounds", "centroid", "diameter", "distance", "intersect_lines"),
-        *("min_box", "min_circle", "min_perimeter_box", "perimeter", "width"),
+        *("label_point", "min_box", "min_circle", "min_perimeter_box", "perimeter", "width"),
     },
     "dynhull.robust": {"depth", "nearest_points"},
     "dynhull.static": {

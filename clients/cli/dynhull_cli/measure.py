@@ -1,5 +1,7 @@
 """`dynhull measure` and `dynhull separate`: the measures of a hull, and the distance between two."""
 
+import math
+import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,19 +12,60 @@ if TYPE_CHECKING:
 
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line
-from .tab_lines import tab_line
+from .tab_lines import flat, tab_line
+
+UNITS = {"area": "m2", "perimeter": "m", "diameter": "m", "bounds": "deg", "label_point": "deg"}
+LARGE = {"m": (1e3, "km"), "m2": (1e6, "km2")}
+OF_A_PLANE = {"centroid", "width", "min_box", "min_perimeter_box", "min_circle"}
 
 
 @connected
 def measure(client: "HullClient", name: HullName, as_json: AsJson = False) -> None:
-    """Measure a hull: one line per measure, its name and its numbers between tabs.
+    """Measure a hull: one line per measure, its name, its numbers and its unit between tabs; a table on a terminal.
 
         dynhull measure fleet/north --json | jq .diameter
 
-    The measures are lengths and areas; bounds are least x, least y, greatest x, greatest y; boxes, the smallest ones in
-    any direction, are four corners; circles are a centre and a radius.
+    Lengths, areas and places are in the units of the coordinates; on the globe in metres (m), square metres (m2) and
+    degrees (deg). Bounds are least x, least y, greatest x, greatest y; on the globe west, south, east, north, west
+    greater than east across the antimeridian. Boxes, the smallest ones in any direction, are four corners; circles are
+    a centre and a radius. The label point is inside. On the globe there are no centroid, width, boxes and circle.
     """
-    _print(as_json, asdict(client.get_measures(name)))
+    found = client.get_measures(name)
+    members = asdict(found)
+    if found.geographic:
+        members = {member: value for member, value in members.items() if member not in OF_A_PLANE}
+    if as_json:
+        typer.echo(json_line(**members))
+        return
+    units = UNITS if found.geographic else {}
+    if sys.stdout.isatty():
+        _show(name, members, units)
+        return
+    for member, value in members.items():
+        typer.echo(tab_line(member, value, *filter(None, [units.get(member)])))
+
+
+def _show(name: str, members: dict[str, Any], units: dict[str, str]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    where = "on the globe" if units else "in the units of the coordinates"
+    table = Table("measure", "", title=f"{name} at revision {members.pop('revision'):,}, {where}")
+    del members["geographic"]
+    for member, value in members.items():
+        table.add_row(member.replace("_", " "), _shown(value, units.get(member, "")))
+    Console().print(table)
+
+
+def _shown(value: Any, unit: str) -> str:
+    """A measure for people: large lengths and areas of the globe in kilometres, NaN as nothing."""
+    numbers = list(flat(value))
+    if any(math.isnan(number) for number in numbers):
+        return "none"
+    size, large = LARGE.get(unit, (math.inf, ""))
+    if numbers and abs(numbers[0]) >= size:
+        numbers, unit = [number / size for number in numbers], large
+    return " ".join([*(f"{number:,.10g}" for number in numbers), unit]).strip()
 
 
 @connected
@@ -42,10 +85,7 @@ def separate(
     * normal, offset: the line halfway between them holds the points with normal * (x, y) = offset
     * closest: the closest point of each hull; if they overlap, the deepest
     """
-    _print(as_json, asdict(client.separate(name, other)))
-
-
-def _print(as_json: bool, members: dict[str, Any]) -> None:
+    members = asdict(client.separate(name, other))
     if as_json:
         typer.echo(json_line(**members))
         return

@@ -6,7 +6,7 @@ from typing import Any
 
 def tab_line(*values: Any) -> str:
     """The values, with nested arrays and tuples flattened, between tabs."""
-    return "\t".join(printable(str(value)) for value in _flat(values))
+    return "\t".join(printable(str(value)) for value in flat(values))
 
 
 def printable(text: str) -> str:
@@ -14,11 +14,12 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
-def _flat(value: Any) -> Iterator[Any]:
+def flat(value: Any) -> Iterator[Any]:
+    """The values in nested arrays and tuples."""
     if hasattr(value, "tolist"):  # of numpy, which a command may not have imported
         value = value.tolist()
     if isinstance(value, list | tuple):
         for each in value:
-            yield from _flat(each)
+            yield from flat(each)
     else:
         yield value

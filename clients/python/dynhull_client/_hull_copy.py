@@ -155,8 +155,12 @@ class HullCopy(Shown):
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x, least y, greatest x, greatest y; NaN without points."""
-        return self._flat().bounds
+        """Least x, least y, greatest x, greatest y; on the globe west, south, east, north. NaN without points."""
+        return self._held().bounds
+
+    def label_point(self) -> tuple[float, float]:
+        """A point strictly inside, for a label; a vertex where there is none."""
+        return self._held().label_point()
 
     def diameter(self) -> float:
         """The greatest distance of two points."""
@@ -220,8 +224,8 @@ class HullCopy(Shown):
         if isinstance(hull, DynamicHull):
             return hull
         message = (
-            "a copy of a geographic hull answers locate, contains, tangents, distance, area, perimeter and diameter; "
-            "ask the server for the rest"
+            "a copy of a geographic hull answers locate, contains, tangents, distance, area, perimeter, bounds, "
+            "label_point and diameter; ask the server for the rest"
         )
         raise HullUnsuitableError(message, grpc.StatusCode.FAILED_PRECONDITION, "", {})
 

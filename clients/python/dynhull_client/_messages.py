@@ -107,10 +107,12 @@ class HullInfo:
 class Measures(Value):
     """Measures of a hull in the unit of its coordinates; `centroid` and `bounds` are NaN without points.
 
-    Of a geographic hull, square metres and metres on WGS 84 between the geodesics; `centroid` and `bounds` are NaN.
+    Of a geographic hull, square metres and metres on WGS 84 between the geodesics; `centroid` is NaN.
 
-    `bounds` are the least x, least y, greatest x and greatest y. `diameter` is the greatest distance of two points, and
-    `width` the least one of parallel lines with all points between: NaN on the globe, and both from servers before 1.1.
+    `bounds` are the least x, least y, greatest x and greatest y; of a geographic hull west, south, east and north in
+    degrees, west greater than east across the antimeridian, NaN from servers before 1.1. `diameter` is the greatest
+    distance of two points, and `width` the least one of parallel lines with all points between: NaN on the globe, and
+    both from servers before 1.1.
     """
 
     area: float

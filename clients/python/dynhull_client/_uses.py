@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from math import nan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,8 +26,9 @@ Doubles = npt.NDArray[np.float64]
 class Measured(Measures):
     """All measures of a hull at one revision, as in `dynhull.DynamicHull`. Without points: lengths 0, coordinates NaN.
 
-    `min_box` and `min_perimeter_box` are (4, 2) corners, counter-clockwise; `min_circle` is a centre and a radius. A
-    geographic hull has lengths in metres, but no width, boxes and circle: NaN, and no corners.
+    `min_box` and `min_perimeter_box` are (4, 2) corners, counter-clockwise; `min_circle` is a centre and a radius;
+    `label_point` is inside, for a label. A geographic hull has lengths in metres and areas in square metres, but no
+    centroid, width, boxes and circle: NaN, and no corners. From a server of an earlier version, `label_point` is NaN.
     """
 
     diameter: float
@@ -35,6 +37,8 @@ class Measured(Measures):
     min_perimeter_box: Points
     min_circle: tuple[tuple[float, float], float]
     revision: int
+    label_point: tuple[float, float] = (nan, nan)
+    geographic: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -124,6 +128,8 @@ def get_measures(name: str, *, layer: int = 1, min_revision: int = 0, timeout: f
             min_perimeter_box=decode_points(response.min_perimeter_box),
             min_circle=((response.min_circle_x, response.min_circle_y), response.min_circle_radius),
             revision=response.revision,
+            label_point=(response.label_x, response.label_y) if response.HasField("label_x") else (nan, nan),
+            geographic=response.geographic,
         )
 
     return Call("GetMeasures", request, decode, timeout)

@@ -702,7 +702,7 @@ class GetMeasuresRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ...) -> None: ...
 
 class GetMeasuresResponse(_message.Message):
-    __slots__ = ("revision", "measures", "diameter", "width", "min_box", "min_perimeter_box", "min_circle_x", "min_circle_y", "min_circle_radius")
+    __slots__ = ("revision", "measures", "diameter", "width", "min_box", "min_perimeter_box", "min_circle_x", "min_circle_y", "min_circle_radius", "label_x", "label_y", "geographic")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     MEASURES_FIELD_NUMBER: _ClassVar[int]
     DIAMETER_FIELD_NUMBER: _ClassVar[int]
@@ -712,6 +712,9 @@ class GetMeasuresResponse(_message.Message):
     MIN_CIRCLE_X_FIELD_NUMBER: _ClassVar[int]
     MIN_CIRCLE_Y_FIELD_NUMBER: _ClassVar[int]
     MIN_CIRCLE_RADIUS_FIELD_NUMBER: _ClassVar[int]
+    LABEL_X_FIELD_NUMBER: _ClassVar[int]
+    LABEL_Y_FIELD_NUMBER: _ClassVar[int]
+    GEOGRAPHIC_FIELD_NUMBER: _ClassVar[int]
     revision: int
     measures: _hull_pb2.Measures
     diameter: float
@@ -721,7 +724,10 @@ class GetMeasuresResponse(_message.Message):
     min_circle_x: float
     min_circle_y: float
     min_circle_radius: float
-    def __init__(self, revision: _Optional[int] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., diameter: _Optional[float] = ..., width: _Optional[float] = ..., min_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_perimeter_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_circle_x: _Optional[float] = ..., min_circle_y: _Optional[float] = ..., min_circle_radius: _Optional[float] = ...) -> None: ...
+    label_x: float
+    label_y: float
+    geographic: bool
+    def __init__(self, revision: _Optional[int] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., diameter: _Optional[float] = ..., width: _Optional[float] = ..., min_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_perimeter_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_circle_x: _Optional[float] = ..., min_circle_y: _Optional[float] = ..., min_circle_radius: _Optional[float] = ..., label_x: _Optional[float] = ..., label_y: _Optional[float] = ..., geographic: bool = ...) -> None: ...
 
 class SeparateRequest(_message.Message):
     __slots__ = ("name", "min_revision", "other_name", "other_min_revision", "encoding")

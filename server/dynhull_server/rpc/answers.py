@@ -29,6 +29,9 @@ async def measures(
 ) -> pb.GetMeasuresResponse:
     """All measures of a hull."""
     if geographic:
+        x = y = math.nan
+        if counts.center is not None:
+            x, y = await run(partial(globe.label_point, vertices, counts.center))
         return pb.GetMeasuresResponse(
             revision=counts.revision,
             measures=await encode_measures(vertices, run, geographic=True),
@@ -37,8 +40,12 @@ async def measures(
             min_circle_x=math.nan,
             min_circle_y=math.nan,
             min_circle_radius=math.nan,
+            label_x=x,
+            label_y=y,
+            geographic=True,
         )
     (x, y), radius = await run(partial(measure.min_circle, vertices))
+    label_x, label_y = await run(partial(measure.label_point, vertices))
     return pb.GetMeasuresResponse(
         revision=counts.revision,
         measures=await encode_measures(vertices, run, geographic=False),
@@ -49,6 +56,8 @@ async def measures(
         min_circle_x=x,
         min_circle_y=y,
         min_circle_radius=radius,
+        label_x=label_x,
+        label_y=label_y,
     )
 
 

@@ -228,13 +228,13 @@ def encode_held(
 
 async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
     """The measures of the hull with these vertices, one step per measure."""
-    area, perimeter, diameter = measure.area, measure.perimeter, measure.diameter
+    area, perimeter, diameter, bounds = measure.area, measure.perimeter, measure.diameter, measure.bounds
     if geographic:
-        area, perimeter, diameter = globe.area, globe.perimeter, globe.diameter
-    x = y = min_x = min_y = max_x = max_y = math.nan
+        area, perimeter, diameter, bounds = globe.area, globe.perimeter, globe.diameter, globe.bounds
+    x = y = math.nan
     if not geographic:
         x, y = await run(partial(measure.centroid, vertices))
-        min_x, min_y, max_x, max_y = await run(partial(measure.bounds, vertices))
+    min_x, min_y, max_x, max_y = await run(partial(bounds, vertices))
     return hull_pb2.Measures(
         area=await run(partial(area, vertices)),
         perimeter=await run(partial(perimeter, vertices)),
