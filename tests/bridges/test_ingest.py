@@ -78,6 +78,16 @@ def test_each_message_is_a_position_of_a_key(client: HullClient, address: str, n
     assert said[-1]["points"] == 1
 
 
+def test_sentences_of_receivers_are_positions(client: HullClient, address: str, name: str, nats_port: int) -> None:
+    fix, other = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47", b"$GPGSV,1,1,00*79"
+    publish(nats_port, name, [("a", fix + b"\r\n" + other), ("b", other), ("c", fix[:-1] + b"8"), ("d", b"{}")])
+    options = (f"nats://127.0.0.1:{nats_port}/{name}/{name}.*", "--hull", name, "--key", "{1}", "--format", "nmea")
+    said = ingested(address, *options)
+    assert (said[-1]["points"], said[-1]["bad"]) == (1, 2)
+    assert positions(client, name, ["a"]) == {"a": (11 + 31 / 60, 48 + 7.038 / 60)}
+    assert client.get_hull(name).info.geographic
+
+
 def test_the_log_says_what_became_of_each_position(client: HullClient, address: str, name: str, nats_port: int) -> None:
     """The time of 2099 is refused and kept aside; the others are new, stale and too old for the window."""
     client.create_hull(name, keyed="str", ordering="event_time", max_age=5400, clock="data", max_skew=60)

@@ -22,6 +22,13 @@ class Tombstones(StrEnum):
     DELETE = "delete"
 
 
+class Contents(StrEnum):
+    """What messages are made of."""
+
+    JSON = "json"
+    NMEA = "nmea"
+
+
 def _mapping(text: str, *names: str) -> Any:
     return _reading(text, *names, metavar="EXPRESSION")
 
@@ -52,6 +59,9 @@ def ingest(
     time_zone: Annotated[str | None, _reading(ZONE)] = None,
     ambiguous: Annotated[Ambiguous, _reading(AMBIGUOUS)] = Ambiguous.REFUSE,
     time_format: Annotated[str | None, _reading(FORMAT)] = None,
+    format: Annotated[  # noqa: A002
+        Contents, _reading("What messages are: JSON, or lines of NMEA sentences, whose positions are $.lon and $.lat.")
+    ] = Contents.JSON,
     each: Annotated[
         str | None, _mapping("Path to an array with a point in each element. Default: a message is one point.")
     ] = None,
@@ -111,9 +121,9 @@ def ingest(
         dynhull ingest nats://broker/POSITIONS/fleet.*.position --hull 'fleet/{1}' --key '$.id' --time '$.ts'
         dynhull ingest kafka://broker:9092/positions --hull fleet --key '$.vehicle.id' --x '$.pos[0]' --y '$.pos[1]'
 
-    Messages are JSON. An expression is a path into it, as $.position.lon, or a text in which {1}, {2}, ... are what the
-    wildcards of the topic stand for, {topic} is the topic, {key} the key of a Kafka record, {$.path} is taken from the
-    message, and {{ is a brace.
+    Messages are JSON, or sentences of NMEA (--format). An expression is a path into JSON, as $.position.lon, or a text
+    in which {1}, {2}, ... are what the wildcards of the topic stand for, {topic} is the topic, {key} the key of a Kafka
+    record, {$.path} is taken from the message, and {{ is a brace.
 
     NATS JetStream and Kafka number their messages: each is applied exactly once, whatever is killed; the hull counts
     the numbers (dynhull_client: last_sequence). MQTT does not: a message may be applied twice, which changes nothing
@@ -138,7 +148,8 @@ def ingest(
 
     deletes = tombstones is Tombstones.DELETE
     form = time_form(option_of, time_unit, time_zone, ambiguous, time_format)
-    mapping = Mapping(hull, x, y, key, time, form, each, deletes=deletes)
+    nmea = format is Contents.NMEA
+    mapping = Mapping(hull, x, y, key, time, form, each, deletes=deletes, nmea=nmea)
     on_globe = mapping.degrees if geographic is None else geographic
     given = (("--grace", grace), ("--report", report), ("--patience", patience))
     seconds = {option: duration(text, option) for option, text in given}

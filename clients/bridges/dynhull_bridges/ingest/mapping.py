@@ -10,6 +10,7 @@ import orjson
 
 from dynhull_cli.reading.columns import are_degrees
 from dynhull_cli.reading.labels import key_of
+from dynhull_cli.reading.nmea import position
 from dynhull_cli.reading.time_forms import TimeForm
 from dynhull_cli.reading.times import EPOCH, NAMES, TimeReader
 from dynhull_cli.reading.values import BadValueError, coordinate, is_number
@@ -17,6 +18,7 @@ from dynhull_cli.reading.values import BadValueError, coordinate, is_number
 from .expressions import MISSING, Value, is_fixed, is_in_document, last_name, value_of
 from .feed import Message
 
+NMEA_MEMBERS = "lon", "lat"  # as the defaults of --x and --y have them
 EARLIEST, LATEST = 1990, 2100  # years in which positions are taken
 
 
@@ -42,6 +44,7 @@ class Mapping:
         form: how times are written.
         each: a path to an array with a row in each element; None if a message is one row.
         deletes: whether a message without contents deletes its key.
+        nmea: whether messages are sentences of NMEA, each with a position as good as an object with `lon` and `lat`.
 
     Attributes:
         hull: the hull of all messages; None if it depends on the message.
@@ -66,10 +69,11 @@ class Mapping:
         each: str | None,
         *,
         deletes: bool = False,
+        nmea: bool = False,
     ) -> None:
         self.hull = hull if is_fixed(hull) else None
         self.keyed = key is not None
-        more = [*_written(form), *(["delete"] if deletes else [])]
+        more = [*_written(form), *(["delete"] if deletes else []), *(["nmea"] if nmea else [])]
         self.digest = sha256(repr((hull, x, y, key, time, str(form.unit), each, *more)).encode()).hexdigest()[:12]
         self.degrees = are_degrees(last_name(x), last_name(y))
         self.swapped = are_degrees(last_name(y), last_name(x))
@@ -86,7 +90,9 @@ class Mapping:
         if each is not None and not each.startswith("$"):
             raise ValueError(f"--each {each!r} is no path: it begins with $")
         self._each = None if each is None else value_of(each, "--each")
-        self._deletes = deletes
+        self._deletes, self._nmea = deletes, nmea
+        if nmea and each is not None:
+            raise ValueError("--each is for JSON: each sentence of NMEA is a point by itself")
         if deletes:
             if key is None:
                 raise ValueError("--tombstones delete is for points with keys: give --key")
@@ -106,6 +112,9 @@ class Mapping:
     def _documents(self, message: Message) -> Iterator[Any]:
         if message.payload is None:
             raise ValueError("the message is empty")
+        if self._nmea:
+            yield from _places(message.payload)
+            return
         try:
             document = orjson.loads(message.payload)
         except orjson.JSONDecodeError as error:
@@ -148,6 +157,14 @@ class Mapping:
         unit, when = self.times.unit, EPOCH + timedelta(microseconds=time)
         if unit is not None and is_number(str(found)) and not EARLIEST <= when.year < LATEST:
             self.warning = f"time: {found} {NAMES[unit]} since 1970 are {when.isoformat()}: is --time-unit right?"
+
+
+def _places(payload: bytes) -> Iterator[dict[str, float]]:
+    """The positions of sentences, one a line; sentences without one are left out."""
+    for line in payload.decode("latin-1").splitlines():
+        found = position(line) if line.strip() else None
+        if found is not None:
+            yield dict(zip(NMEA_MEMBERS, found, strict=True))
 
 
 def _written(form: TimeForm) -> list[str]:

@@ -30,8 +30,8 @@ def load(
         str | None,
         typer.Argument(
             metavar="FILE",
-            help="A .csv, .tsv, .txt, .parquet, .json, .geojson, .ndjson, .gpkg, .shp, .zip, .fgb, .gpx, .kml or .xlsx "
-            "file. Default, or -: standard input.",
+            help="A .csv, .tsv, .txt, .parquet, .json, .geojson, .ndjson, .gpkg, .shp, .zip, .fgb, .gpx, .kml, .xlsx "
+            "or .nmea file. Default, or -: standard input.",
         ),
     ] = None,
     format: Annotated[  # noqa: A002

@@ -25,6 +25,7 @@ class Format(StrEnum):
     GPX = "gpx"
     KML = "kml"
     XLSX = "xlsx"
+    NMEA = "nmea"
 
 
 @dataclass(frozen=True, slots=True)

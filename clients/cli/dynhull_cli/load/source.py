@@ -36,23 +36,24 @@ TABLES = {Format.CSV, Format.TSV}
 JSON = {Format.JSON, Format.GEOJSON, Format.NDJSON}
 LAYERS = {Format.GPKG, Format.SHP, Format.FGB, Format.GPX, Format.KML, Format.XLSX}
 BESIDE = {Format.SHP: (".dbf", ".DBF")}  # the files with the fields of a Shapefile
+ROWS = set(Format) - {Format.NMEA}  # formats with columns, members or fields
 APPLIES_TO = {
-    "x": set(Format) - {Format.GEOJSON},
-    "y": set(Format) - {Format.GEOJSON},
+    "x": ROWS - {Format.GEOJSON},
+    "y": ROWS - {Format.GEOJSON},
     "delimiter": {Format.CSV},
     "decimal": TABLES,
     "header": TABLES,
     "encoding": TABLES | JSON,
-    "vertices": set(Format) - TABLES,
-    "key": set(Format),
-    "time": set(Format),
-    "time_unit": set(Format),
-    "expires": set(Format),
+    "vertices": ROWS - TABLES,
+    "key": ROWS,
+    "time": ROWS,
+    "time_unit": ROWS,
+    "expires": ROWS,
     "layer": LAYERS,
     "geometry": {Format.PARQUET} | LAYERS,
-    "time_zone": set(Format),
-    "ambiguous": set(Format),
-    "time_format": set(Format),
+    "time_zone": ROWS,
+    "ambiguous": ROWS,
+    "time_format": ROWS,
 }
 
 
@@ -260,6 +261,10 @@ def _reader(kind: Format) -> Reader:
             from .read_json import read_ndjson
 
             return read_ndjson
+        case Format.NMEA:
+            from .read_nmea import read_nmea
+
+            return read_nmea
         case _:
             from .read_layer import read_layer
 

@@ -23,6 +23,7 @@ GEOMETRY_NAMES = (
 )
 DEGREES = [pair for pair in COLUMN_NAMES if pair[1] in ("lat", "latitude")]
 GREATEST_LONGITUDE, GREATEST_LATITUDE = 360.0, 90.0
+UNKNOWN_LATITUDE = 91.0  # of AIS, with the longitude 181 (ITU-R M.1371)
 
 
 def has_pair(columns: Sequence[str]) -> bool:
@@ -37,6 +38,8 @@ def are_degrees(x: str, y: str) -> bool:
 
 def why_no_place(lon: float, lat: float) -> str | None:
     """Why two numbers are no longitude and latitude; None if they are."""
+    if lat == UNKNOWN_LATITUDE:
+        return f"the latitude is {lat}, which AIS writes where it is not available"
     if abs(lat) > GREATEST_LATITUDE:
         hint = "; the longitude comes first" if abs(lon) <= GREATEST_LATITUDE else ""
         return f"the latitude is {lat}, not from -90 to 90 degrees{hint}"
