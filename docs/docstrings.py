@@ -1,5 +1,7 @@
-"""An extension of mkdocstrings, for two things that it would show wrong or not at all."""
+"""An extension of mkdocstrings, for three things that it would show wrong or not at all."""
 
+import inspect
+import pkgutil
 import re
 from textwrap import indent
 from typing import Any
@@ -16,6 +18,8 @@ class Docstrings(griffe.Extension):
     def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
         mark_examples(pkg)
         expose_namesakes(pkg)
+        if pkg.analysis == "dynamic":
+            annotate(pkg)
 
 
 def mark_examples(documented: griffe.Object) -> None:
@@ -26,6 +30,23 @@ def mark_examples(documented: griffe.Object) -> None:
     for member in documented.members.values():
         if isinstance(member, griffe.Object):
             mark_examples(member)
+
+
+def annotate(documented: griffe.Object) -> None:
+    """Give the attributes of classes that were inspected their types, which the tables of attributes show."""
+    for member in documented.members.values():
+        if isinstance(member, griffe.Module):
+            annotate(member)
+        elif isinstance(member, griffe.Class):
+            for name, kind in kinds(pkgutil.resolve_name(member.path)).items():
+                known = member.members.setdefault(name, griffe.Attribute(name, parent=member))
+                if isinstance(known, griffe.Attribute):
+                    known.annotation = inspect.formatannotation(kind).replace("typing.", "")
+
+
+def kinds(described: type) -> dict[str, Any]:
+    """The types of the attributes of a class, those of its bases among them."""
+    return {name: kind for each in reversed(described.__mro__) for name, kind in inspect.get_annotations(each).items()}
 
 
 def expose_namesakes(package: griffe.Module) -> set[str]:

@@ -1,51 +1,17 @@
-"""Makes the reference pages that are not docstrings, when mkdocs builds the site: commands and protocol."""
+"""Makes the pages of errors and of settings when mkdocs builds the site, from their descriptions."""
 
-import os
-import re
-import tempfile
 from collections.abc import Iterator
-from importlib.metadata import entry_points
-from pathlib import Path
-from typing import Any
+from datetime import timedelta
+from typing import get_args
 
-import grpc_tools
 import mkdocs_gen_files
-from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto, FileDescriptorSet
-from grpc_tools import protoc
+from pydantic_core import PydanticUndefined
 
 import dynhull_client
+from dynhull_server.settings import PREFIX, Settings
+from dynhull_surface.described import LARGEST, Setting, described, option_of
 from dynhull_surface.reasons import REASONS, Code, Exit, exit_of, http_of, repeat_of
-
-PROTO = Path(__file__).parent.parent / "proto"
-LABELS = {
-    "TYPE_" + name: name.lower() for name in ("BOOL", "BYTES", "DOUBLE", "INT32", "INT64", "STRING", "UINT32", "UINT64")
-}
-
-Comments = dict[tuple[int, ...], str]
-
-
-def commands() -> Iterator[str]:
-    os.environ.update(COLUMNS="110", TERM="dumb", NO_COLOR="1")
-    from typer.testing import CliRunner
-
-    from dynhull_cli.commands import app
-
-    yield "# Commands\n"
-    names = [""]
-    for entry in sorted(entry_points(group="dynhull.commands")):
-        names += named(entry.name, entry.load())
-    for name in names:
-        title = f"dynhull {name}".strip()
-        help_text = CliRunner().invoke(app, [*name.split(), "--help"], prog_name="dynhull").output
-        yield f"## {title}\n\n```text\n{help_text.strip()}\n```\n"
-
-
-def named(name: str, command: Any) -> Iterator[str]:
-    """The name of a command, then those of the commands of a group, and of the commands beside it."""
-    yield name
-    for parts in (getattr(command, "commands", {}), getattr(command, "beside", {})):
-        for part, inner in parts.items():
-            yield from named(f"{name} {part}", inner)
+from dynhull_surface.settings import FenceSettings, HullSettings
 
 
 def errors() -> Iterator[str]:
@@ -72,82 +38,61 @@ def errors() -> Iterator[str]:
     yield ""
 
 
-def described() -> FileDescriptorSet:
-    """The contract with its comments."""
-    files = sorted(str(path.relative_to(PROTO)) for path in PROTO.glob("dynhull/v1/*.proto"))
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "contract.binpb"
-        include = Path(grpc_tools.__file__).parent / "_proto"
-        code = protoc.main(
-            ["", f"-I{PROTO}", f"-I{include}", "--include_source_info", f"--descriptor_set_out={out}", *files]
-        )
-        if code:
-            raise RuntimeError("protoc cannot read the contract")
-        return FileDescriptorSet.FromString(out.read_bytes())
+def settings() -> Iterator[str]:
+    yield "# Settings\n"
+    yield "## Of hulls\n"
+    yield "`dynhull create`, `create_hull` and `POST /hulls` take them; they are fixed from then on. The rules of a"
+    yield "quarantine have [a page of their own](../outliers.md#hold-out-positions-that-are-wrong).\n"
+    yield from described_settings(HullSettings)
+    yield "\n## Of fences\n"
+    yield "`dynhull fences create` and `replace`, `create_fence` and `replace_fence`, `POST /fences` and"
+    yield "`PUT /fences/{name}` take them. What they mean, with areas and subjects, is on [the page about"
+    yield "fences](../fences.md).\n"
+    yield from described_settings(FenceSettings)
+    yield "\n## Of the server\n"
+    yield "Each is an option of `dynhull serve`, a variable of the environment, and a line of the file that `--config`"
+    yield "names: `--max-points 1000`, `DYNHULL_MAX_POINTS=1000`, `max_points = 1000`. Options come before variables, these"
+    yield "before the file. `dynhull config` prints the values and where each is from.\n"
+    yield "| option | variable | usual | meaning |\n| --- | --- | --- | --- |"
+    for name, field in Settings.model_fields.items():
+        usual = "" if field.default in (None, False, PydanticUndefined) else f"`{field.default}`"
+        yield f"| `{option_of(name)}` | `{PREFIX}{name.upper()}` | {usual} | {in_cell(field.description or '')} |"
+    yield ""
 
 
-def protocol() -> Iterator[str]:
-    yield "# Protocol\n"
-    yield "Package `dynhull.v1`, from the `.proto` files. Fields without a label are single and optional.\n"
-    files = described().file
-    comments = {
-        file.name: {tuple(at.path): at.leading_comments for at in file.source_code_info.location} for file in files
-    }
-    for file in files:
-        for i, service in enumerate(file.service):
-            yield f"## {service.name}\n\n{text(comments[file.name], 6, i)}\n"
-            for j, method in enumerate(service.method):
-                takes, gives = link(method.input_type), link(method.output_type)
-                takes, gives = (
-                    "stream of " * method.client_streaming + takes,
-                    "stream of " * method.server_streaming + gives,
-                )
-                yield f"### {method.name}\n\n{takes} → {gives}\n\n{text(comments[file.name], 6, i, 2, j)}\n"
-    yield "## Messages\n"
-    for file in files:
-        for i, message in enumerate(file.message_type):
-            yield from described_message(message, comments[file.name], (4, i), "")
-        for i, enum in enumerate(file.enum_type):
-            yield f"### {enum.name}\n\n{text(comments[file.name], 5, i)}\n"
-            yield "| value | number | meaning |\n| --- | --- | --- |"
-            for j, value in enumerate(enum.value):
-                yield f"| {value.name} | {value.number} | {cell(comments[file.name], 5, i, 2, j)} |"
-            yield ""
+def described_settings(kind: type) -> Iterator[str]:
+    yield "| SDK and HTTP | command line | values | meaning |\n| --- | --- | --- | --- |"
+    for setting in described(kind):
+        yield f"| `{setting.name}` | `{setting.option}` | {values(setting)} | {in_cell(meaning(setting))} |"
 
 
-def described_message(message: DescriptorProto, comments: Comments, path: tuple[int, ...], outer: str) -> Iterator[str]:
-    name = f"{outer}{message.name}"
-    yield f"### {name}\n\n{text(comments, *path)}\n"
-    if message.field:
-        yield "| field | number | type | meaning |\n| --- | --- | --- | --- |"
-        for j, field in enumerate(message.field):
-            yield f"| {field.name} | {field.number} | {kind(field)} | {cell(comments, *path, 2, j)} |"
-        yield ""
-    for j, nested in enumerate(message.nested_type):
-        yield from described_message(nested, comments, (*path, 3, j), f"{name}.")
+def values(setting: Setting) -> str:
+    """What a setting takes, the usual value first."""
+    if setting.choices:
+        others = [each for each in setting.choices if each != setting.usual]
+        return ", ".join(f"`{each}`" for each in [setting.usual, *others] if each is not None)
+    if setting.kind is bool:
+        return "`false`, `true`"
+    if setting.kind is timedelta:
+        return "a time: `90s`, `30m`; seconds or a `timedelta` in the SDK"
+    if get_args(setting.kind):
+        return "longitude, latitude"
+    greatest = f" to {setting.greatest}" if setting.greatest < LARGEST else ""
+    least = f" from {setting.least}" if setting.least is not None else ""
+    usual = f"`{setting.usual}`; " if setting.usual is not None else ""
+    return f"{usual}{'an integer' if setting.kind is int else 'a number'}{least}{greatest}"
 
 
-def kind(field: FieldDescriptorProto) -> str:
-    scalar = FieldDescriptorProto.Type.Name(field.type)
-    repeated = "repeated " * (field.label == FieldDescriptorProto.LABEL_REPEATED)
-    return repeated + (LABELS.get(scalar) or link(field.type_name))
+def meaning(setting: Setting) -> str:
+    needed = " or ".join(f"`{each}`" for each in setting.needs)
+    at_creation = " Said at creation only." if setting.at_creation else ""
+    return setting.meaning + (f" Only with {needed}." if needed else "") + at_creation
 
 
-def link(type_name: str) -> str:
-    name = type_name.removeprefix(".dynhull.v1.")
-    if name == type_name:
-        return name.lstrip(".")
-    return f"[{name}](#{re.sub('[^a-z0-9_-]', '', name.lower())})"
+def in_cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
 
 
-def text(comments: Comments, *path: int) -> str:
-    return comments.get(path, "").strip()
-
-
-def cell(comments: Comments, *path: int) -> str:
-    return " ".join(text(comments, *path).split()).replace("|", "\\|")
-
-
-for page, lines in (("commands", commands()), ("protocol", protocol()), ("errors", errors())):
+for page, lines in (("errors", errors()), ("settings", settings())):
     with mkdocs_gen_files.open(f"reference/{page}.md", "w") as file:
         file.write("\n".join(lines))

@@ -43,6 +43,9 @@ class DuplicateKeyError(ValueError):
         rows: the two rows of the batch.
     """
 
+    key: Key
+    rows: tuple[int, int]
+
     def __init__(self, key: Key, rows: tuple[int, int]) -> None:
         super().__init__(key, rows)
         self.key = key
@@ -60,6 +63,9 @@ class MissingKeyError(KeyError):
         key: the key.
         row: the row of the batch; None for a single key.
     """
+
+    key: Key
+    row: int | None
 
     def __init__(self, key: Key, row: int | None = None) -> None:
         super().__init__(key, row)

@@ -25,6 +25,9 @@ class MissingPointError(KeyError):
         row: the row of the batch; None for a single delete.
     """
 
+    point: tuple[float, float]
+    row: int | None
+
     def __init__(self, point: tuple[float, float], row: int | None = None) -> None:
         super().__init__(point, row)
         self.point = point

@@ -56,6 +56,8 @@ class CheckedPolygons:
 
     __slots__ = ("rings",)
 
+    rings: list[list[Points]]
+
     def __init__(self, polygons: Any) -> None:
         self.rings = [[ring.copy() for ring in polygon] for polygon in as_polygons(polygons)]
         for polygon in self.rings:

@@ -61,6 +61,16 @@ class DynhullError(Exception):
         batch: for an ingest, the number of batches applied before the error; None for other calls.
     """
 
+    code: grpc.StatusCode
+    reason: str
+    metadata: Mapping[str, str]
+    field: str | None
+    row: int | None
+    value: str | None
+    expected: int | None
+    oldest: int | None
+    batch: int | None
+
     def __init__(self, message: str, code: grpc.StatusCode, reason: str, metadata: Mapping[str, str]) -> None:
         super().__init__(message)
         self.code = code

@@ -40,8 +40,10 @@ class Ingest:
         summary: the effect of all batches; None until the context was left without an error.
     """
 
+    summary: Ingested | None
+
     def __init__(self, connection: BlockingConnection, ingesting: Ingesting) -> None:
-        self.summary: Ingested | None = None
+        self.summary = None
         self._connection = connection
         self._home = Home("ingest")
         self._ingesting = ingesting
