@@ -51,8 +51,8 @@ def settings() -> Iterator[str]:
     yield from described_settings(FenceSettings)
     yield "\n## Of the server\n"
     yield "Each is an option of `dynhull serve`, a variable of the environment, and a line of the file that `--config`"
-    yield "names: `--max-points 1000`, `DYNHULL_MAX_POINTS=1000`, `max_points = 1000`. Options come before variables, these"
-    yield "before the file. `dynhull config` prints the values and where each is from.\n"
+    yield "names: `--max-points 1000`, `DYNHULL_MAX_POINTS=1000`, `max_points = 1000`. Options come before variables,"
+    yield "these before the file. `dynhull config` prints the values and where each is from.\n"
     yield "| option | variable | usual | meaning |\n| --- | --- | --- | --- |"
     for name, field in Settings.model_fields.items():
         usual = "" if field.default in (None, False, PydanticUndefined) else f"`{field.default}`"
