@@ -27,8 +27,8 @@ from pathlib import Path
 import numpy as np
 
 import dynhull
-from dynhull_server.state.fences.event_block import EventBlock, block_of
-from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
+from dynhull_server.state.fences.events.block import EventBlock, block_of
+from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME
 from dynhull_server.storage.rows.event_blocks import encode_block
 

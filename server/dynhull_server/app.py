@@ -41,7 +41,7 @@ from .rpc.metrics import Metrics, StateCollector
 from .rpc.metrics_page import MetricsPage
 from .rpc.places import Places, Unread
 from .settings import Settings, is_loopback
-from .state.fences.faults import FenceFault
+from .state.fences.model.faults import FenceFault
 from .state.limits import FenceLimits, Limits
 from .storage.durability import Durability
 from .storage.memory import MemoryStorage

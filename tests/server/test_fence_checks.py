@@ -13,7 +13,7 @@ from dynhull import _rings
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.fences import MOST_CHECKS
 from dynhull_server.state.errors import InvalidFenceError
-from dynhull_server.state.fences.config import FenceConfig, PolygonArea
+from dynhull_server.state.fences.model.config import FenceConfig, PolygonArea
 from dynhull_server.state.records import HullSettings
 
 SQUARE, HOLE, BESIDE = [[0, 0], [6, 0], [6, 6], [0, 6]], [[2, 2], [4, 2], [4, 4]], [[8, 8], [9, 8], [9, 9]]

@@ -24,9 +24,9 @@ from dynhull_server.state.events import (
     Tick,
     WriteBatch,
 )
-from dynhull_server.state.fences.config import CircleArea, FenceConfig
-from dynhull_server.state.fences.requests import CreateFence, DeleteFence
-from dynhull_server.state.fences.subjects import keyed
+from dynhull_server.state.fences.index.subjects import keyed
+from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
+from dynhull_server.state.fences.model.requests import CreateFence, DeleteFence
 from dynhull_server.state.records import HullSettings
 
 KEYS = PackedKeys.pack(f"k{row:02}" for row in range(64))

@@ -21,10 +21,11 @@ from dynhull_server.state.events import (
     Tick,
     WriteBatch,
 )
-from dynhull_server.state.fences import event_log, tallies
-from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea
-from dynhull_server.state.fences.records import AppendEvents, Cause
-from dynhull_server.state.fences.requests import CreateFence
+from dynhull_server.state.fences.events import log
+from dynhull_server.state.fences.model import tallies
+from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea
+from dynhull_server.state.fences.model.records import AppendEvents, Cause
+from dynhull_server.state.fences.model.requests import CreateFence
 from dynhull_server.state.records import HullSettings
 
 KEYS = 30
@@ -89,7 +90,7 @@ def life(seed: str) -> tuple[list[Any], list[list[int]]]:
 @pytest.mark.skipif(native is None, reason="the server runs on pure Python")
 def test_crossings_become_the_same_events_in_both_implementations(seed: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found, counted = life(seed)
-    monkeypatch.setattr(event_log, "native", None)
+    monkeypatch.setattr(log, "native", None)
     monkeypatch.setattr(tallies, "native", None)
     again = life(seed)
     assert len(found) > 10

@@ -40,9 +40,9 @@ from dynhull_server.state.errors import (
     StoppingError,
 )
 from dynhull_server.state.events import WriteBatch, WriteTogether
-from dynhull_server.state.fences.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
-from dynhull_server.state.fences.fence import Fence
-from dynhull_server.state.fences.records import Consumer, Inside
+from dynhull_server.state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
+from dynhull_server.state.fences.model.fence import Fence
+from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.records import Center, HullSettings, Identity, QuarantineRules, Times, Window
 

@@ -55,10 +55,10 @@ from dynhull_server.state.events import (
     WriteBatch,
     WriteTogether,
 )
-from dynhull_server.state.fences.config import FenceConfig
-from dynhull_server.state.fences.fence import Fence
-from dynhull_server.state.fences.records import Consumer, FenceEvent, Inside
-from dynhull_server.state.fences.requests import (
+from dynhull_server.state.fences.model.config import FenceConfig
+from dynhull_server.state.fences.model.fence import Fence
+from dynhull_server.state.fences.model.records import Consumer, FenceEvent, Inside
+from dynhull_server.state.fences.model.requests import (
     CreateFence,
     DeleteFence,
     DropConsumer,

@@ -6,7 +6,7 @@ A point without a key is named by its x: no two have the same.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dynhull_server.state.fences.records import Cause
+from dynhull_server.state.fences.model.records import Cause
 from dynhull_server.state.records import FOREVER, NO_TIME, Contents, Expiry, HullSettings, KeyRows, PointRows
 
 from .globe import points

@@ -14,8 +14,8 @@ from support.sides import Disk, Point, Rings, Shape, apart, shape_of_hull
 
 from dynhull.keys import as_keys, key_list
 from dynhull_server.engine.watch_fence import Sent
-from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea, PolygonArea
-from dynhull_server.state.fences.records import (
+from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
+from dynhull_server.state.fences.model.records import (
     AddFence,
     AppendEvents,
     Cause,

@@ -9,7 +9,7 @@ import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dynhull_server.state.fences.records import Cause, Consumer, EventType, KeptFence
+from dynhull_server.state.fences.model.records import Cause, Consumer, EventType, KeptFence
 from dynhull_server.storage.port import Contents
 
 from .fence_model import FenceTruth, same

@@ -25,7 +25,7 @@ from support.sides import Rings, hull
 
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import RestoredError
-from dynhull_server.state.fences.records import Cause
+from dynhull_server.state.fences.model.records import Cause
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import (

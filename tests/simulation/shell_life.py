@@ -18,9 +18,9 @@ from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import HullNotFoundError
 from dynhull_server.state.events import WriteBatch, WriteTogether
-from dynhull_server.state.fences.config import FenceConfig
-from dynhull_server.state.fences.fence import Fence
-from dynhull_server.state.fences.records import Consumer, Inside
+from dynhull_server.state.fences.model.config import FenceConfig
+from dynhull_server.state.fences.model.fence import Fence
+from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import Center, HullSettings

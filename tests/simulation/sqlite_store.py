@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
-from dynhull_server.state.fences.records import KeptFence
+from dynhull_server.state.fences.model.records import KeptFence
 from dynhull_server.state.records import Committed
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from dynhull_server.state.fences.records import FenceEvent, Inside, KeptFence
+from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
 from dynhull_server.state.records import Committed, HullRow, Kept
 from dynhull_server.storage.port import NEWEST, Contents, NotCommittedError, Progress, Step, Storage
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.fences.config import FenceConfig, PolygonArea
-from dynhull_server.state.fences.event_block import block_of
-from dynhull_server.state.fences.records import (
+from dynhull_server.state.fences.events.block import block_of
+from dynhull_server.state.fences.model.config import FenceConfig, PolygonArea
+from dynhull_server.state.fences.model.records import (
     AddFence,
     AppendEvents,
     Cause,

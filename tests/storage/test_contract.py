@@ -14,8 +14,8 @@ from folders import appended, event, events, fence_row, fill_fence, read_fence, 
 from dynhull.keys import PackedKeys
 from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
-from dynhull_server.state.fences.event_block import block_of
-from dynhull_server.state.fences.records import (
+from dynhull_server.state.fences.events.block import block_of
+from dynhull_server.state.fences.model.records import (
     NO_WAITS,
     AddFence,
     AppendEvents,

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynhull_server.state.fences.event_block import block_of
-from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
+from dynhull_server.state.fences.events.block import block_of
+from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME
 from dynhull_server.storage.rows.event_blocks import decode_block, decode_runs, encode_block
 

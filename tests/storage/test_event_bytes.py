@@ -6,9 +6,9 @@ import random
 import pytest
 
 from dynhull_server.compiled import native, numbers
-from dynhull_server.state.fences.config import CircleArea, FenceConfig
-from dynhull_server.state.fences.event_block import EventBlock, block_of, joined
-from dynhull_server.state.fences.records import EventType, FenceEvent, FenceRow, Origin
+from dynhull_server.state.fences.events.block import EventBlock, block_of, joined
+from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
+from dynhull_server.state.fences.model.records import EventType, FenceEvent, FenceRow, Origin
 from dynhull_server.state.records import NO_TIME
 from dynhull_server.storage.rows import event_blocks, fence_runs
 from dynhull_server.storage.rows.event_blocks import decode_block, encode_block

@@ -14,7 +14,7 @@ from dynhull_cluster.postgres.storage import PostgresStorage
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
-from dynhull_server.state.fences.records import AddFence, DropFence, Inside
+from dynhull_server.state.fences.model.records import AddFence, DropFence, Inside
 from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept
 from dynhull_server.storage.port import DamagedError, StorageError
 

@@ -7,7 +7,7 @@ import pytest
 from faulty_disk import FaultyDisk, failure
 from folders import fill, fill_fence, no_progress, opened
 
-from dynhull_server.state.fences.records import EventType
+from dynhull_server.state.fences.model.records import EventType
 from dynhull_server.storage import worker_folders
 from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.sqlite.origin import NOTE

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from dynhull_server.state.fences.config import FenceConfig
+from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.records import HullRow
 from dynhull_server.storage.port import DamagedError, StorageError
 from dynhull_server.storage.rows.fence_rows import found_fences

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..state.errors import FenceNotFoundError
-from ..state.fences.fence import Fence
-from ..state.fences.tallies import Column
+from ..state.fences.model.fence import Fence
+from ..state.fences.model.tallies import Column
 from ..state.limits import FenceLimits
 from ..storage.port import Storage
 from .fences import LiveFence

@@ -9,12 +9,12 @@ from functools import partial
 from itertools import islice
 
 from ..state.errors import FenceNotFoundError
-from ..state.fences.event_order import EventOrder, subjects_of
-from ..state.fences.faults import FenceFault
-from ..state.fences.fence import Fence
-from ..state.fences.fence_leg import members
-from ..state.fences.recomputing import Sides, wrong_sides
-from ..state.fences.records import Consumer, FenceEvent, Inside
+from ..state.fences.events.order import EventOrder, subjects_of
+from ..state.fences.model.faults import FenceFault
+from ..state.fences.model.fence import Fence
+from ..state.fences.model.records import Consumer, FenceEvent, Inside
+from ..state.fences.recovery.sides import Sides, wrong_sides
+from ..state.fences.trip.leg import members
 from .fences import LiveFence
 from .steps import Run
 

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError, words_for_callers
-from ..state.fences.checked import CheckedArea, check_polygons
-from ..state.fences.config import FenceConfig, PolygonArea
-from ..state.fences.event_block import EventBlock
-from ..state.fences.fence import Fence
-from ..state.fences.fence_leg import members
-from ..state.fences.records import Consumer, FenceEvent, Inside
-from ..state.fences.requests import (
+from ..state.fences.events.block import EventBlock
+from ..state.fences.index.checked import CheckedArea, check_polygons
+from ..state.fences.model.config import FenceConfig, PolygonArea
+from ..state.fences.model.fence import Fence
+from ..state.fences.model.records import Consumer, FenceEvent, Inside
+from ..state.fences.model.requests import (
     CreateFence,
     DeleteFence,
     DropConsumer,
@@ -25,6 +24,7 @@ from ..state.fences.requests import (
     ReadFence,
     ReplaceFence,
 )
+from ..state.fences.trip.leg import members
 from ..storage.port import Storage, StorageError
 from .waiter import Waiter
 

@@ -27,8 +27,8 @@ from ..state.errors import (
     RevisionForgottenError,
 )
 from ..state.events import ReadHull, ReadTogether, Recenter, WriteBatch
-from ..state.fences.fence import Fence
-from ..state.fences.recomputing import Sides, sides_of
+from ..state.fences.model.fence import Fence
+from ..state.fences.recovery.sides import Sides, sides_of
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.outline import GlobeOutline, Outline

@@ -16,7 +16,7 @@ from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
 from ..state.contents.keyed import keys_match
-from ..state.fences.faults import FenceFault
+from ..state.fences.model.faults import FenceFault
 from ..state.numbers import as_numbers
 from ..state.records import Center, Contents
 from . import chan_process

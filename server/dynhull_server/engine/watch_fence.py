@@ -8,7 +8,7 @@ import asyncio
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass, field
 
-from ..state.fences.records import EventType, FenceEvent
+from ..state.fences.model.records import EventType, FenceEvent
 from .fences import LiveFence
 
 # The number of events that are sent together, at most: a gateway holds them for a reader that does not read. Of more of

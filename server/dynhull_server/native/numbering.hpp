@@ -1,4 +1,4 @@
-// Crossings become events: `numbered` of state/fences/numbering.py, with the same results.
+// Crossings become events: `numbered` of state/fences/events/sequences.py, with the same results.
 #pragma once
 
 #include <algorithm>

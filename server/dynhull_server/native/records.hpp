@@ -1,4 +1,4 @@
-// Events as they lie in the arrays of numpy: the types RUN and EVENT of state/fences/event_block.py.
+// Events as they lie in the arrays of numpy: the types RUN and EVENT of state/fences/events/block.py.
 #pragma once
 
 #include <cmath>

@@ -7,7 +7,7 @@ import numpy as np
 
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
-from ..state.fences.config import Area, CircleArea, FenceConfig, HullArea, Initial, PolygonArea, Ring, SubjectKind
+from ..state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, Initial, PolygonArea, Ring, SubjectKind
 from .decode import (
     LARGEST_INTEGER,
     NAME,

@@ -21,7 +21,7 @@ from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Snapshot
 from ..state.batch import NO_POINTS, Applied
 from ..state.contents.keyed import Found
-from ..state.fences.faults import FenceFault
+from ..state.fences.model.faults import FenceFault
 from ..state.hull_state import Counts, VertexKeys
 from ..state.records import (
     FOREVER,

@@ -6,9 +6,9 @@ from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
 from ..engine.fences import LiveFence
 from ..engine.watch_fence import Sent
-from ..state.fences.config import CircleArea, FenceConfig, HullArea, Initial
-from ..state.fences.fence import Fence
-from ..state.fences.records import Consumer, EventType, FenceEvent, Members
+from ..state.fences.model.config import CircleArea, FenceConfig, HullArea, Initial
+from ..state.fences.model.fence import Fence
+from ..state.fences.model.records import Consumer, EventType, FenceEvent, Members
 from ..state.records import NO_TIME
 from .encode import encode_keys
 

@@ -8,7 +8,7 @@ from prometheus_client.metrics_core import Metric
 
 from ..engine.fences import Fences, LiveFence
 from ..engine.server_time import MICROSECONDS
-from ..state.fences.records import EventType
+from ..state.fences.model.records import EventType
 
 # The number of fences with the largest backlogs that have metrics of their own.
 NAMED_FENCES = 100

@@ -8,8 +8,8 @@ from ..engine.engine import Engine
 from ..engine.fences import LiveFence
 from ..engine.watch_fence import watch_fence
 from ..state.errors import FenceReplacedError, SequenceAheadError
-from ..state.fences.config import FenceConfig
-from ..state.fences.records import Consumer, Members
+from ..state.fences.model.config import FenceConfig
+from ..state.fences.model.records import Consumer, Members
 from . import decode
 from .calls import Call
 from .decode_fence import decode_consumer, decode_fence, decode_fence_name, decode_start

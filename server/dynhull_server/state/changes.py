@@ -1,6 +1,6 @@
 """What is committed."""
 
-from .fences.records import (
+from .fences.model.records import (
     AddFence,
     AppendEvents,
     ChangeFence,

@@ -54,12 +54,12 @@ from .events import (
     WriteBatch,
     WriteTogether,
 )
-from .fences.components import SPANNING
 from .fences.core import FenceCore
-from .fences.fence import Fence
-from .fences.line import Line
-from .fences.requests import FENCE_REQUESTS, CreateFence, FenceRequest, PassTime, ReadFence
-from .fences.tallies import Tallies
+from .fences.index.components import SPANNING
+from .fences.index.line import Line
+from .fences.model.fence import Fence
+from .fences.model.requests import FENCE_REQUESTS, CreateFence, FenceRequest, PassTime, ReadFence
+from .fences.model.tallies import Tallies
 from .hull import Hull
 from .hull_state import HullState
 from .limits import Limits
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
 
     from sortedcontainers import SortedDict
 
-    from .fences.records import KeptFence
+    from .fences.model.records import KeptFence
 
 # A request for at most this many points runs at once: a tenth of a millisecond. It holds the GIL anyway.
 SMALL = 128

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .batch import Batch, KeyedBatch
-    from .fences.event_block import EventBlock
-    from .fences.fence import Fence
-    from .fences.records import KeptFence
-    from .fences.restoring import Restored
+    from .fences.events.block import EventBlock
+    from .fences.model.fence import Fence
+    from .fences.model.records import KeptFence
+    from .fences.recovery.restored import Restored
     from .hull import Hull
     from .hull_state import HullState
     from .trip import Trip

@@ -12,11 +12,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from .events import ReadHull, ReadTogether, Request, WriteTogether
-from .fences.components import SPANNING, components, depends_on, merged
-from .fences.fence import Fence
-from .fences.line import Line
-from .fences.part import FencePart
-from .fences.requests import PREFIX, CreateFence, FenceRequest, ReplaceFence
+from .fences.index.components import SPANNING, components, depends_on, merged
+from .fences.index.line import Line
+from .fences.model.fence import Fence
+from .fences.model.requests import PREFIX, CreateFence, FenceRequest, ReplaceFence
+from .fences.trip.part import FencePart
 from .hull import Hull
 from .registry import Registry
 from .trip import Trip

@@ -7,16 +7,16 @@ import numpy as np
 from sortedcontainers import SortedDict
 
 from .errors import FenceNotFoundError, HullNotFoundError, LimitExceededError
-from .fences.fence import Fence
-from .fences.recent import RecentEvents
-from .fences.tallies import Tallies
+from .fences.events.recent import RecentEvents
+from .fences.model.fence import Fence
+from .fences.model.tallies import Tallies
 from .hull import Hull
 from .limits import Limits
 from .records import NO_TIME
 from .trip import Place
 
 if TYPE_CHECKING:
-    from .fences.config import FenceConfig
+    from .fences.model.config import FenceConfig
 
 
 class Registry:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from heapq import heappop, heappush
 
-from .fences.fence import Fence
-from .fences.requests import PREFIX
+from .fences.model.fence import Fence
+from .fences.model.requests import PREFIX
 from .hull import Hull
 from .registry import Registry
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from .events import DeleteHull, Request, Together, WriteBatch
-from .fences.components import SPANNING
-from .fences.requests import STRUCTURAL, CreateFence, DeleteFence, FenceRequest
+from .fences.index.components import SPANNING
+from .fences.model.requests import STRUCTURAL, CreateFence, DeleteFence, FenceRequest
 from .queues import Queue, Queues, names_of
 
 # The most points that the requests of one trip read or write together, unless a single request exceeds it.

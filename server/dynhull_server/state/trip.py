@@ -20,7 +20,7 @@ from .events import (
     WriteBatch,
     WriteTogether,
 )
-from .fences.requests import FenceRequest
+from .fences.model.requests import FenceRequest
 from .hull import Hull
 from .hull_state import Counts, HullState
 from .limits import Limits
@@ -29,8 +29,8 @@ from .root_state import RootState, state_of
 from .together import apply_together
 
 if TYPE_CHECKING:
-    from .fences.part import FencePart
-    from .fences.records import KeptFence
+    from .fences.model.records import KeptFence
+    from .fences.trip.part import FencePart
 
 
 @dataclass(slots=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from threading import Lock
 
 from ..state.changes import Change
-from ..state.fences.records import (
+from ..state.fences.model.records import (
     AddFence,
     AppendEvents,
     ChangeFence,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from ..state.fences.records import FenceEvent, FenceRow, Inside, KeptFence
+from ..state.fences.model.records import FenceEvent, FenceRow, Inside, KeptFence
 from ..state.records import Committed, HullRow, Kept, Record
 from .refusals import Meaning
 

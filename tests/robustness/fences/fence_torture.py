@@ -37,13 +37,13 @@ from dynhull_server.state.events import (
     Retry,
     Tick,
 )
-from dynhull_server.state.fences import definition
-from dynhull_server.state.fences.event_order import EventOrder, subjects_of
-from dynhull_server.state.fences.fence import Fence
-from dynhull_server.state.fences.fence_leg import members
-from dynhull_server.state.fences.recomputing import sides_of, wrong_sides
-from dynhull_server.state.fences.records import Cause, EventType, FenceEvent
-from dynhull_server.state.fences.subjects import Subjects
+from dynhull_server.state.fences.events.order import EventOrder, subjects_of
+from dynhull_server.state.fences.index.subjects import Subjects
+from dynhull_server.state.fences.model.fence import Fence
+from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent
+from dynhull_server.state.fences.recovery.sides import sides_of, wrong_sides
+from dynhull_server.state.fences.trip import definition
+from dynhull_server.state.fences.trip.leg import members
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import NO_TIME, HullSettings

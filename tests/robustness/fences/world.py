@@ -12,9 +12,9 @@ from sides import Disk, Point, Rings, Shape, apart, hull, shape_of_hull
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import Batch, KeyedBatch
 from dynhull_server.state.events import Birth, CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
-from dynhull_server.state.fences.config import CircleArea, FenceConfig, HullArea, PolygonArea
-from dynhull_server.state.fences.records import Cause, EventType, FenceEvent, Origin
-from dynhull_server.state.fences.requests import CreateFence, DeleteFence, PassTime, PutConsumer, ReplaceFence
+from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
+from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent, Origin
+from dynhull_server.state.fences.model.requests import CreateFence, DeleteFence, PassTime, PutConsumer, ReplaceFence
 from dynhull_server.state.records import NO_TIME, HullSettings
 
 KEYED, ZONE = ("k/a", "k/b", "k/c"), "zone"

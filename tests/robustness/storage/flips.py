@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.fences.config import CircleArea, FenceConfig
-from dynhull_server.state.fences.event_block import block_of
-from dynhull_server.state.fences.records import (
+from dynhull_server.state.fences.events.block import block_of
+from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
+from dynhull_server.state.fences.model.records import (
     AddFence,
     AppendEvents,
     Consumer,

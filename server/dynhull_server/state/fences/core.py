@@ -7,14 +7,14 @@ from ..queues import Queue, Queues, names_of
 from ..registry import Registry
 from ..schedule import Schedule
 from ..trip import Leg, Trip
-from . import recovery
-from .comparison import Ground
-from .deadlines import MOST_DUE
-from .fence import Fence
-from .part import FencePart
-from .records import KeptFence
-from .requests import CreateFence, FenceRequest, PassTime
-from .restoring import Restored
+from .model.fence import Fence
+from .model.records import KeptFence
+from .model.requests import CreateFence, FenceRequest, PassTime
+from .recovery.restored import Restored, bring_back
+from .recovery.rollback import give_back, reading
+from .trip.comparison import Ground
+from .trip.deadlines import MOST_DUE
+from .trip.part import FencePart
 
 
 class FenceCore:
@@ -35,7 +35,7 @@ class FenceCore:
 
     def restore(self, kept: Sequence[KeptFence]) -> None:
         """Add the fences that the storage has kept."""
-        self._queues.add_fences(recovery.bring_back(kept, self._registry))
+        self._queues.add_fences(bring_back(kept, self._registry))
         for fence in self._registry.fences.values():
             self._schedule.plan_fence(fence)
 
@@ -124,13 +124,13 @@ class FenceCore:
 
     def examine(self, trip: Trip, part: FencePart, effect: Examine) -> None:
         """Let the storage be examined for the fences that a trip concerns, too."""
-        part.examined, effect.restore = recovery.reading(trip, part)
+        part.examined, effect.restore = reading(trip, part)
         effect.fences = part.examined
 
     def give_back(self, trip: Trip, part: FencePart, restored: Restored | None) -> None:
         """Return fences to what the storage has of them: the changes of the trip were not committed."""
         assert restored is not None  # so it says, too
-        recovery.give_back(part, restored, self._registry)
+        give_back(part, restored, self._registry)
         self._queues.renew(trip, part)
 
     # Time

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...compiled import native
-from ...state.fences.event_block import EVENT, RUN, EventBlock, Integers, block_of
-from ...state.fences.records import Origin
+from ...state.fences.events.block import EVENT, RUN, EventBlock, Integers, block_of
+from ...state.fences.model.records import Origin
 from ...state.records import NO_TIME
 from .columns import Cursor
 from .event_columns import columns_of, put_integers

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...state.fences.event_block import RUN, EventBlock
+from ...state.fences.events.block import RUN, EventBlock
 from ...state.records import NO_TIME
 from .columns import point_bytes
 from .event_positions import WORD, decimals_of, put_decimals, put_previous

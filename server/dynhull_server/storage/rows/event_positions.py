@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from dynhull.arrays import Points
 
-from ...state.fences.event_block import Bytes, Integers
+from ...state.fences.events.block import Bytes, Integers
 from .columns import Cursor
 
 WORD = 8

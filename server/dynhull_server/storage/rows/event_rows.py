@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 
 from dynhull.keys import PackedKeys
 
-from ...state.fences.records import Delay, EventType, FenceEvent, Inside, Key, Members, Position, Subject
+from ...state.fences.model.records import Delay, EventType, FenceEvent, Inside, Key, Members, Position, Subject
 from ...state.records import NO_TIME, Keys
 from .columns import Cursor, key_bytes, time_bytes
 from .varints import put_signed, put_text, put_unsigned, take_signed, take_text, take_unsigned

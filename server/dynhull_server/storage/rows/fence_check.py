@@ -11,11 +11,11 @@ from dynhull.keys import Keys, PackedKeys
 
 from ...state.contents import replayed
 from ...state.contents.live import layer_of
-from ...state.fences.config import FenceConfig
-from ...state.fences.event_order import EventOrder
-from ...state.fences.faults import FenceFault
-from ...state.fences.recomputing import Nearness, Side, Sides, wrong_sides
-from ...state.fences.records import KeptFence, Key
+from ...state.fences.events.order import EventOrder
+from ...state.fences.model.config import FenceConfig
+from ...state.fences.model.faults import FenceFault
+from ...state.fences.model.records import KeptFence, Key
+from ...state.fences.recovery.sides import Nearness, Side, Sides, wrong_sides
 from ...state.records import Center, Contents
 from ..port import NEWEST
 from .fence_reading import read_runs, read_settled

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...state.fences.records import Consumer
+from ...state.fences.model.records import Consumer
 from .encoding import checksum, weight
 from .event_blocks import Runs, decode_runs
 from .event_rows import decode_delay

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from ...compiled import numbers
 from ...state.changes import FenceChange
-from ...state.fences.event_block import EventBlock, joined
-from ...state.fences.records import (
+from ...state.fences.events.block import EventBlock, joined
+from ...state.fences.model.records import (
     AddFence,
     AppendEvents,
     ChangeFence,

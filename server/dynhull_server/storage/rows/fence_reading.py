@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ...state.fences.records import Delay, FenceEvent, Inside, KeptFence, Members, Subject
+from ...state.fences.model.records import Delay, FenceEvent, Inside, KeptFence, Members, Subject
 from ...state.records import NO_TIME
 from ..port import NEWEST, DamagedError
 from .encoding import checksum

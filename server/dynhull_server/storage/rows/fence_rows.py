@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ...state.fences.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
-from ...state.fences.records import NO_WAITS, Consumer, FenceRow, Waits
+from ...state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
+from ...state.fences.model.records import NO_WAITS, Consumer, FenceRow, Waits
 from .encoding import checksum
 from .tables import COLUMNS, Reader
 

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ...compiled import Numbers, native
-from ...state.fences.event_block import EventBlock
-from ...state.fences.records import Consumer, FenceRow, Subject
-from ...state.fences.tallies import Integers, Table
+from ...state.fences.events.block import EventBlock
+from ...state.fences.model.records import Consumer, FenceRow, Subject
+from ...state.fences.model.tallies import Integers, Table
 from ..port import NEWEST
 from .encoding import checksum, weight
 from .event_blocks import Runs

@@ -14,9 +14,9 @@ import numpy as np
 from dynhull.keys import Keys, PackedKeys
 
 from ...state.changes import Change
-from ...state.fences.dwelling import Dwelling
-from ...state.fences.event_block import block_of
-from ...state.fences.records import (
+from ...state.fences.events.block import block_of
+from ...state.fences.model.dwell import Dwelling
+from ...state.fences.model.records import (
     AddFence,
     AppendEvents,
     Cause,
@@ -33,7 +33,7 @@ from ...state.fences.records import (
     PutConsumer,
     PutDelays,
 )
-from ...state.fences.restoring import members_after
+from ...state.fences.recovery.restored import members_after
 from ...state.records import INCARNATION, NO_TIME
 from .fence_ledger import DropInside, inside_steps
 from .fence_reading import read_fences

@@ -5,7 +5,7 @@ Before that, a row with one event had the form of those with many: `event_blocks
 
 from collections.abc import Callable
 
-from ...state.fences.records import Cause, EventType, FenceEvent, Key, Origin, Position
+from ...state.fences.model.records import Cause, EventType, FenceEvent, Key, Origin, Position
 from ...state.records import NO_TIME
 from .columns import Cursor
 from .event_positions import PLACES, as_decimal

@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 
 from ...state.changes import Change
 from ...state.errors import words
-from ...state.fences.records import FenceEvent, Inside, KeptFence
+from ...state.fences.model.records import FenceEvent, Inside, KeptFence
 from ...state.records import Committed, HullRow, Kept, Record
 from ..port import NEWEST, Contents, DamagedError, NotCommittedError, Step, StorageError
 from . import chunks

@@ -1,0 +1,1 @@
+"""Events of fences: made, numbered, kept and checked."""

@@ -1,0 +1,215 @@
+"""Crossings become events: they get their numbers and times, those of each fence after its last one."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dynhull import Crossings
+
+from ....compiled import Native
+from ...records import NO_TIME, Times
+from ..index.subjects import Subjects
+from ..model.records import Cause, EventType
+from ..model.tallies import Column, Tallies
+from .block import EVENT, RUN, Bytes, EventBlock, Integers, key_columns
+
+# A cause as the index knows it, and what it is here.
+Swap = tuple[Cause, Cause]
+# The type of an event by its change of side, -1 for the last one.
+TYPES = bytes((EventType.CROSS, EventType.ENTER, EventType.EXIT))
+TYPE_COLUMN = np.frombuffer(TYPES, np.uint8)
+NO_SWAP = 0, 0
+
+
+class Told(NamedTuple):
+    """What a trip has said so far of k fences, by ascending numbers.
+
+    Attributes:
+        fences: (k,) their numbers.
+        places: (k,) where they are counted.
+        lasts: (k,) the sequence of the last event of each.
+        times: (k,) its time.
+        made: (k,) the number of events.
+        changes: (k,) by how many more subjects are inside.
+    """
+
+    fences: Integers
+    places: Integers
+    lasts: Integers
+    times: Integers
+    made: Integers
+    changes: Integers
+
+    def of(self, number: int) -> tuple[int, int] | None:
+        """The last sequence of a fence, and the time of that event; None if nothing was said."""
+        row = int(self.fences.searchsorted(number))
+        if row == len(self.fences) or self.fences[row] != number:
+            return None
+        return int(self.lasts[row]), int(self.times[row])
+
+
+class Crossed(NamedTuple):
+    """Crossings of one revision, by fence, whose events have no numbers yet.
+
+    Attributes:
+        subjects: the hull of the subjects.
+        crossings: the crossings, at least one.
+        revision: the revision of that hull.
+        area_revisions: those of the hulls that are areas of its fences, by name.
+        event_times: the times of the positions, or None.
+        swap: a cause, and the one that it stands for.
+        now: the time.
+    """
+
+    subjects: Subjects
+    crossings: Crossings
+    revision: int
+    area_revisions: Mapping[str, int]
+    event_times: Times | None
+    swap: Swap | None
+    now: int
+
+    def area_revision(self, number: int) -> int:
+        """The revision of the area of a fence, 0 where that is no hull."""
+        area = self.subjects.fences[number].area if self.area_revisions else None
+        return 0 if area is None else self.area_revisions.get(area.name, 0)
+
+
+def numbered(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> tuple[EventBlock, Told]:
+    """The events of crossings whose times never go back, and what they say of their fences. O(n log n) for n events.
+
+    Args:
+        waiting: the crossings, in the order in which they came.
+        before: what was known of some fences, by ascending numbers.
+    """
+    counts = [len(each.crossings) for each in waiting]
+    fences, changes = _column(waiting, "fences"), _column(waiting, "changes")
+    points, previous = _column(waiting, "points"), _column(waiting, "previous")
+    n = len(fences)
+    # Of each fence the events follow each other.
+    order = fences.argsort(kind="stable")
+    ascending = fences[order]
+    groups = first_rows(ascending)
+    made = sizes(groups, n)
+    numbers = ascending[groups]
+    known = before(numbers)
+    sequences = np.empty(n, np.int64)
+    sequences[order] = np.arange(1, n + 1) + (known.lasts - groups).repeat(made)
+    times = np.empty(n, np.int64)
+    times[order] = known.times.repeat(made)
+    np.maximum(times, np.array([each.now for each in waiting]).repeat(counts), out=times)  # they never go back
+    told = Told(
+        numbers,
+        known.places,
+        known.lasts + made,
+        times[order[groups + made - 1]],
+        known.made + made,
+        known.changes + np.add.reduceat(changes[order], groups, dtype=np.int64),
+    )
+    ends = np.cumsum(counts)
+    first = first_rows(fences, ends[:-1])
+    moments = ends.searchsorted(first, "right")  # of each run, which crossings it is part of
+    names = tuple({each.subjects.hull.name: None for each in waiting})
+    keys = [key_columns(each.crossings.keys) for each in waiting]
+    runs = np.empty(len(first), RUN)
+    runs["fence"] = fences[first]
+    runs["first"] = sequences[first]
+    runs["count"] = sizes(first, n)
+    runs["hull"] = np.array([names.index(each.subjects.hull.name) for each in waiting])[moments]
+    runs["kind"] = np.array([kind for kind, _, _ in keys])[moments]
+    runs["subject_revision"] = np.array([each.revision for each in waiting])[moments]
+    runs["area_revision"] = 0
+    if any(each.area_revisions for each in waiting):
+        pairs = zip(fences[first].tolist(), moments.tolist(), strict=True)
+        runs["area_revision"] = [waiting[moment].area_revision(number) for number, moment in pairs]
+    runs["time"] = times[first]
+    rows = np.empty(n, EVENT)
+    rows["type"] = TYPE_COLUMN[changes]
+    rows["causes"] = _joined([_caused(each.crossings.causes, each.swap) for each in waiting])
+    rows["length"] = np.frombuffer(b"".join([lengths for _, lengths, _ in keys]), np.uint8)
+    rows["x"], rows["y"] = points.T
+    rows["before_x"], rows["before_y"] = previous.T
+    rows["distance"] = np.where(np.isnan(points[:, 0]), np.nan, _column(waiting, "distances"))
+    rows["event_time"] = rows["first_time"] = NO_TIME
+    if any(each.event_times is not None for each in waiting):
+        columns = (each.event_times for each in waiting)
+        rows["event_time"] = _joined(
+            [np.full(count, NO_TIME) if each is None else each for count, each in zip(counts, columns, strict=True)]
+        )
+    return EventBlock(runs, rows, b"".join([data for _, _, data in keys]), names), told
+
+
+def numbered_natively(native: Native, waiting: Sequence[Crossed], tallies: Tallies) -> tuple[EventBlock, Told]:
+    """As `numbered`, after what is counted of the fences. O(n + runs log n)."""
+    names: dict[str, int] = {}
+    columns, keys = [], []
+    for each in waiting:
+        crossings, (meant, stands_for) = each.crossings, each.swap or NO_SWAP
+        kind, lengths, data = key_columns(crossings.keys)
+        keys.append(data)
+        areas = None
+        if each.area_revisions:
+            numbers = crossings.fences[first_rows(crossings.fences)].tolist()
+            areas = {number: each.area_revision(number) for number in numbers}
+        columns.append(
+            (
+                crossings.fences,
+                crossings.changes,
+                crossings.causes,
+                lengths,
+                crossings.points,
+                crossings.previous,
+                crossings.distances,
+                each.event_times,
+                int(meant),
+                int(stands_for),
+                each.now,
+                names.setdefault(each.subjects.hull.name, len(names)),
+                kind,
+                each.revision,
+                areas,
+            )
+        )
+    counted = tallies.columns
+    runs, rows, told = native.numbered(columns, TYPES, tallies.at, counted[Column.LAST], counted[Column.TIME])
+    block = EventBlock(np.frombuffer(runs, RUN), np.frombuffer(rows, EVENT), b"".join(keys), tuple(names))
+    return block, Told(*np.frombuffer(told, np.int64).reshape(len(Told._fields), -1))
+
+
+def _column(waiting: Sequence[Crossed], name: str) -> Any:
+    return _joined([getattr(each.crossings, name) for each in waiting])
+
+
+def _joined(columns: list[Any]) -> Any:
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+
+
+def first_rows(numbers: Integers, more: Integers | None = None) -> Integers:
+    """The rows at which the number of another fence begins, and some more."""
+    begins = np.empty(len(numbers), np.bool_)
+    begins[0] = True
+    np.not_equal(numbers[1:], numbers[:-1], out=begins[1:])
+    if more is not None:
+        begins[more] = True
+    return begins.nonzero()[0]
+
+
+def sizes(starts: Integers, end: int) -> Integers:
+    """How many rows there are from each of some rows to the next, or to the end."""
+    found = np.empty(len(starts), np.int64)
+    np.subtract(starts[1:], starts[:-1], out=found[:-1])
+    found[-1] = end - starts[-1]
+    return found
+
+
+def caused(causes: int, swap: Swap | None) -> int:
+    """A set of causes with one cause in the place of another one."""
+    return causes & ~swap[0] | swap[1] if swap is not None and causes & swap[0] else causes
+
+
+def _caused(causes: Bytes, swap: Swap | None) -> Bytes:
+    if swap is None:
+        return causes
+    meant, stands_for = np.uint8(swap[0]), np.uint8(swap[1])
+    return np.where(causes & meant, causes & ~meant | stands_for, causes)

@@ -1,0 +1,1 @@
+"""Who is inside of fences, and what a change of hulls moves."""

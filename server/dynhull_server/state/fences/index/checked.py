@@ -1,0 +1,41 @@
+"""Polygons of areas that are checked before a fence is laid, so that other changes do not wait meanwhile."""
+
+from dataclasses import dataclass
+
+from dynhull.globe import Gnomonic
+from dynhull.polygons import CheckedPolygons
+
+from ...records import Center
+from ..model.config import PolygonArea
+from .globe import projected, rings_of
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedArea:
+    """What a check of polygons has found.
+
+    Attributes:
+        center: that of the projection in which they were checked; None for a plane.
+        found: the polygons there, or why they are invalid.
+    """
+
+    center: Center | None
+    found: CheckedPolygons | str
+
+    def polygons(self) -> CheckedPolygons:
+        """The polygons; ValueError if they are invalid."""
+        if isinstance(self.found, str):
+            raise ValueError(self.found)
+        return self.found
+
+
+def check_polygons(area: PolygonArea, center: Center | None) -> CheckedArea:
+    """Check the polygons of an area, in the projection about a centre or in the plane."""
+    frame = None if center is None else Gnomonic(center)
+    found: CheckedPolygons | str
+    try:
+        rings = rings_of(area, None)
+        found = CheckedPolygons(rings if frame is None else projected(frame, rings))
+    except ValueError as error:
+        found = str(error)
+    return CheckedArea(None if frame is None else frame.center, found)

@@ -1,0 +1,146 @@
+"""Fences about geographic hulls: their areas in the plane of the projection, in which great circles are straight."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from dynhull.arrays import Points
+from dynhull.convex import Cloud
+from dynhull.gjk import intersect
+from dynhull.globe import Gnomonic, distance
+
+from ...errors import HullUnsuitableError, InvalidFenceError
+from ...frames import off_globe, out_of_reach
+from ...hull import Hull
+from ...records import Center
+from ..model.config import Area, CircleArea, FenceConfig, PolygonArea, Ring
+
+# A circle is a polygon with this many corners, every half degree of azimuth, each at the radius on WGS 84: its edges
+# are at most 1e-5 of the radius inside of the circle.
+CIRCLE_CORNERS = 720
+# Metres between places that are as far from each other as possible.
+HALF_ROUND = 20_003_931.5
+
+POLE, ROUND = 90, 360  # degrees
+
+Rings = Sequence[Sequence[Points]]
+
+
+def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull | None) -> None:
+    """Raise the error that refuses a fence because of the frames of its hulls.
+
+    Args:
+        config: its settings.
+        area: the hull that is its area, None for other areas.
+        subjects: the hull that it compares; None for those with a prefix.
+    """
+    hulls = [hull for hull in (area, subjects) if hull is not None]
+    geographic = [hull for hull in hulls if hull.row.settings.geographic]
+    if not geographic:
+        return
+    if subjects is None:
+        raise HullUnsuitableError(geographic[0].name, "is geographic, and fences over a prefix are in the plane")
+    for hull in hulls:
+        if hull.state.center is None:
+            if hull in geographic:
+                reason = "has no centre so far: put its first points, or recenter it, before its fences are created"
+            else:
+                reason = "is a plane, and the other hull is geographic"
+            raise HullUnsuitableError(hull.name, f"{reason}; hulls of a fence on the globe have the same centre")
+    centers = {hull.name: hull.state.center for hull in hulls}
+    if len(set(centers.values())) > 1:
+        raise HullUnsuitableError(
+            subjects.name, f"has another centre: hulls of a fence on the globe have the same one, not {centers}"
+        )
+    if config.margin:
+        raise InvalidFenceError("margin", config.margin, "a fence on the globe has no margin")  # nor without_self
+
+
+def require_circle(frame: Gnomonic, area: CircleArea) -> None:
+    """Raise ValueError unless the inside of a circle is that of the polygon that stands for it."""
+    center = np.array([[area.x, area.y]])
+    misplaced = off_globe(center) or out_of_reach(frame, center)
+    if misplaced is not None:
+        raise ValueError(f"the centre is {misplaced.place}: {misplaced.problem}")
+    if area.radius >= HALF_ROUND:
+        raise ValueError(f"the radius is {area.radius} m: no two places are {HALF_ROUND} m apart")
+
+
+def rings_of(area: Area, vertices: Points | None) -> Rings:
+    """The rings of an area in degrees, for each of its polygons; `vertices` are those of the hull that is the area."""
+    if isinstance(area, PolygonArea):
+        return [[corners_of(ring) for ring in polygon] for polygon in area.polygons]
+    if isinstance(area, CircleArea):
+        return [[_circle(area)]]
+    assert vertices is not None  # those of the area
+    return [[vertices]]
+
+
+def projected(frame: Gnomonic, rings: Rings) -> list[list[Points]]:
+    """The rings in the plane; ValueError names a ring with a corner that is no place or out of reach."""
+    return [
+        [_projected(frame, without_border(ring), f"polygon {i} ring {j}") for j, ring in enumerate(p)]
+        for i, p in enumerate(rings)
+    ]
+
+
+def without_border(ring: Points) -> Points:
+    """The ring without its way along the border of a map, to a pole and back: on the globe that way has no inside.
+
+    A map needs it where a pole is inside, as in `GeoHull.geojson()`: a corner on one border, the pole on both, and the
+    corner on the other border.
+    """
+    at_pole = np.abs(ring[:, 1]) == POLE
+    if not at_pole.any() or at_pole.all():
+        return ring
+    start = int(np.argmin(at_pole))
+    ring, at_pole = np.roll(ring, -start, axis=0), np.roll(at_pole, -start)
+    if (ring[0] == ring[-1]).all():  # the closing corner
+        ring, at_pole = ring[:-1], at_pole[:-1]
+    keep = np.ones(len(ring), np.bool_)
+    ends = np.flatnonzero(np.diff(at_pole, append=False)) + 1  # of runs of corners, those at a pole are every second
+    for first, end in zip(ends[::2], ends[1::2], strict=True):
+        (west, south), (east, north) = ring[first - 1], ring[end % len(ring)]
+        if abs(east - west) == ROUND and len(set(ring[first:end, 1])) == 1:
+            keep[first:end] = False
+            keep[end % len(ring)] = south != north  # otherwise one place
+    return ring[keep]
+
+
+def outline(frame: Gnomonic, vertices: Points) -> Points:
+    """The vertices of a geographic hull in the plane, from the lexicographically smallest there."""
+    places = frame.project_all(vertices)
+    return np.roll(places, -int(np.lexsort(places.T[::-1])[0]), axis=0) if len(places) else places
+
+
+def compared(a: Points, b: Points, limit: float, center: Center) -> tuple[bool, float]:
+    """Whether two hulls about one centre intersect or are at most `limit` metres apart, and their distance."""
+    frame = Gnomonic(center)
+    if intersect(Cloud(outline(frame, a)), Cloud(outline(frame, b))):
+        return True, 0.0
+    apart = min(float(distance(a, b).min()), float(distance(b, a).min()))
+    return apart <= limit, apart
+
+
+def corners_of(ring: Ring) -> Points:
+    """The corners of a ring."""
+    return np.frombuffer(ring, "<f8").astype(np.float64).reshape(-1, 2)
+
+
+def _projected(frame: Gnomonic, ring: Points, name: str) -> Points:
+    misplaced = off_globe(ring) or out_of_reach(frame, ring)
+    if misplaced is not None:
+        raise ValueError(f"{name} has the corner {misplaced.place}: {misplaced.problem}")
+    return frame.project(ring)[0]
+
+
+@lru_cache(maxsize=1024)  # 11 kB each; more are computed again
+def _circle(area: CircleArea) -> Points:
+    """The corners of a circle, counter-clockwise."""
+    from pyproj import Geod  # takes a while to load, and only circles on the globe need it
+
+    azimuths = -np.linspace(0, 360, CIRCLE_CORNERS, endpoint=False)
+    same = np.ones(CIRCLE_CORNERS)
+    lon, lat, _ = Geod(ellps="WGS84").fwd(area.x * same, area.y * same, azimuths, area.radius * same)
+    return np.column_stack([lon, lat])

@@ -1,0 +1,177 @@
+"""The fences of hulls that share a queue: what a change of one of these hulls means for them."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from dynhull import Crossings
+from dynhull.arrays import Points
+
+from ...hull import Hull
+from ..model.fence import Fence
+from ..model.records import Cause
+from .globe import require_frames
+from .pair import Pair
+from .subjects import Subjects, area_vertices
+
+# Finding an inner layer takes about as long as so many rows of a batch.
+PEELED = 2048
+
+
+@dataclass(slots=True)
+class AreaHull:
+    """A hull that is the area of fences.
+
+    Attributes:
+        hull: the hull.
+        fences: the fences by number.
+        as_of: the hull's count of changes when the fences last got its vertices.
+        layers: the vertices of its inner layers that fences got last, by number.
+    """
+
+    hull: Hull
+    fences: dict[int, Fence] = field(default_factory=dict)
+    as_of: int = -1
+    layers: dict[int, Points] = field(default_factory=dict)
+
+    @property
+    def layered(self) -> bool:
+        """Whether an inner layer is the area of a fence, so that any point may change it."""
+        return any(fence.row.config.area_layer > 1 for fence in self.fences.values())
+
+    def moved(self) -> Iterator[tuple[Fence, Points]]:
+        """The fences whose area has perhaps changed since this was last called, with its vertices."""
+        state = self.hull.state
+        outline_changed, self.as_of = self.as_of != state.hull.changes, state.hull.changes
+        held, self.layers = self.layers, {}
+        for fence in self.fences.values():
+            number = fence.row.config.area_layer
+            if number > 1:
+                vertices = self.layers[number] = state.layer(number)
+                if vertices is not held.get(number):
+                    yield fence, vertices
+            elif outline_changed:
+                yield fence, state.vertices()
+
+
+class Line:
+    """The fences of the hulls of one queue.
+
+    Args:
+        fences: all fences that depend on one of these hulls.
+        names: the names of the hulls, and of the queues of the fences.
+
+    Attributes:
+        names: the names that share the queue.
+        fences: the fences by name.
+        subjects: the hulls whose keys are compared, by name.
+        areas: the hulls that are areas of keys, by name.
+        pairs: the fences that compare a hull as a whole with another one, by the names of both.
+    """
+
+    def __init__(self, fences: Iterable[Fence], names: Iterable[str]) -> None:
+        self.names = dict.fromkeys(names)
+        self.fences: dict[str, Fence] = {}
+        self.subjects: dict[str, Subjects] = {}
+        self.areas: dict[str, AreaHull] = {}
+        self.pairs: dict[str, list[Fence]] = {}
+        for fence in fences:
+            self.add(fence)
+
+    def add(self, fence: Fence) -> None:
+        """Add a fence that has compared the hulls as they are now."""
+        self.fences[fence.name] = fence
+        self.subjects.update(fence.subjects)
+        if fence.pair is not None:
+            for hull in (fence.pair.area, fence.pair.other):
+                self.pairs.setdefault(hull.name, []).append(fence)
+        elif fence.area is not None:
+            area = self.areas.get(fence.area.name)
+            if area is None:
+                area = self.areas[fence.area.name] = AreaHull(fence.area, as_of=fence.area.state.hull.changes)
+            area.fences[fence.number] = fence
+
+    def remove(self, fence: Fence) -> None:
+        """Remove a fence, after its subjects have dropped it."""
+        del self.fences[fence.name]
+        for name, subjects in fence.subjects.items():
+            if not subjects.fences:
+                self.subjects.pop(name, None)  # or another of the fences that are removed has done it
+        if fence.pair is not None:
+            for hull in (fence.pair.area, fence.pair.other):
+                self.pairs[hull.name].remove(fence)
+        elif fence.area is not None:
+            area = self.areas[fence.area.name]
+            del area.fences[fence.number]
+            if not area.fences:
+                del self.areas[fence.area.name]
+
+    def paired(self, hulls: Iterable[Hull]) -> Iterator[tuple[Fence, Pair, int]]:
+        """The fences around pairs of hulls that begin or cease to be near, now that these have changed, and why."""
+        for fence in {fence.number: fence for hull in hulls for fence in self.pairs.get(hull.name, ())}.values():
+            pair = fence.pair
+            assert pair is not None  # that of a fence in `pairs`
+            area, other = pair.moved()
+            if area or other:
+                before = pair.near
+                pair.look()
+                if pair.near != before:
+                    yield fence, pair, (Cause.AREA if area else 0) | (Cause.MOVED if other else 0)
+
+    def admit(self, hull: Hull) -> None:
+        """Compare the keys of a new hull with the areas of the fences whose prefix its name has."""
+        fences = [fence for fence in self.fences.values() if fence.row.config.kind == "prefix"]
+        fences = [fence for fence in fences if fence.row.config.compares(hull.name)]
+        if not fences or hull.row.settings.identity == "multiset":
+            return
+        require_frames(fences[0].row.config, hull, None)
+        subjects = self.subjects[hull.name] = Subjects(hull)
+        for fence in fences:
+            subjects.lay(fence.number, fence.row.config, area_vertices(fence.row.config, fence.area))
+            subjects.fences[fence.number] = fence
+            fence.subjects = fence.subjects | {hull.name: subjects}
+
+    def dismiss(self, name: str) -> None:
+        """Forget the keys of a hull that is deleted, or was not created after all."""
+        subjects = self.subjects.pop(name, None)
+        if subjects is not None:
+            for fence in subjects.fences.values():
+                fence.subjects = {each: value for each, value in fence.subjects.items() if each != name}
+
+    def weight(self, name: str) -> int:
+        """The number of subjects that a change of a hull may concern beside its own rows."""
+        area = self.areas.get(name)
+        if area is None:
+            return 0
+        return sum(fence.subject_count for fence in area.fences.values()) + (PEELED if area.layered else 0)
+
+    def comparing(self, name: str) -> list[Fence]:
+        """The fences that compare the keys of a hull, and those that compare it as a whole with their areas."""
+        subjects = self.subjects.get(name)
+        pairs = [fence for fence in self.pairs.get(name, ()) if fence.row.config.subjects == name]
+        return pairs if subjects is None else [*subjects.fences.values(), *pairs]
+
+    def alone(self, name: str) -> Subjects | None:
+        """The keys of a hull, if fences compare them and nothing else of the line depends on it."""
+        return None if name in self.areas or name in self.pairs else self.subjects.get(name)
+
+    def area_revisions(self) -> dict[str, int]:
+        """The revisions of the hulls that are areas of keys, by name."""
+        return {name: area.hull.state.counts.revision for name, area in self.areas.items()}
+
+    def changed(self, hulls: Iterable[Hull]) -> Iterator[tuple[Subjects, Crossings]]:
+        """The subjects whose side has changed, now that these hulls have; who has nothing to say costs nothing."""
+        touched: dict[str, Subjects] = {}
+        for hull in hulls:
+            name = hull.name
+            subjects = self.subjects.get(name)
+            if subjects is not None:
+                touched[name] = subjects
+            area = self.areas.get(name)
+            for fence, vertices in () if area is None else area.moved():
+                for each in fence.subjects.values():
+                    each.lay(fence.number, fence.row.config, vertices)
+                touched |= fence.subjects
+        for _, subjects in sorted(touched.items()):
+            crossings = subjects.take()
+            if len(crossings):
+                yield subjects, crossings

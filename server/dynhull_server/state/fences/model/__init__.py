@@ -1,0 +1,1 @@
+"""A fence as it is and as it is stored."""

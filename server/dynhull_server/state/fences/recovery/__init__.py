@@ -1,0 +1,1 @@
+"""Fences as the storage has them, and as they should be."""

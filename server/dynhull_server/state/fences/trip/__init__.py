@@ -1,0 +1,1 @@
+"""What a trip does to fences."""

@@ -1,0 +1,194 @@
+"""Fences are created, replaced and deleted: their areas are laid over subjects, and the first events are made."""
+
+from dataclasses import replace
+
+from ...errors import FenceExistsError, HullNotFoundError, HullUnsuitableError, InvalidFenceError, LimitExceededError
+from ...hull import Hull
+from ..events.sequences import Swap
+from ..index.areas import check, lay_area
+from ..index.checked import CheckedArea
+from ..index.globe import require_frames
+from ..index.pair import Pair
+from ..index.subjects import Subjects
+from ..model.config import FenceConfig
+from ..model.delays import Delays
+from ..model.fence import Fence
+from ..model.records import NO_WAITS, Cause, EventType, FenceRow, Inside, Waits
+from ..model.requests import CreateFence, DeleteFence, ReplaceFence
+from .comparison import Comparison, Ground
+from .delayed import end_all
+from .leg import FenceLeg, members
+
+# The area of a fence that is replaced does not move.
+REPLACEMENT: Swap = Cause.AREA, Cause.CHANGED
+# The number of subjects inside of the fences that a trip has created after which it creates no more.
+MOST_INSIDE = 2**18
+SUBJECT_FIELDS = {"hull": "subject_hull", "prefix": "subject_prefix", "other": "other_hull"}
+
+
+class Definition:
+    """Creates, replaces and deletes the fences of a trip.
+
+    Args:
+        ground: what the trip begins with.
+        comparison: makes its events.
+
+    Attributes:
+        left: the requests that are left for a later trip, because the fences before them have many subjects inside.
+    """
+
+    __slots__ = ("_comparison", "_ground", "_inside", "left")
+
+    def __init__(self, ground: Ground, comparison: Comparison) -> None:
+        self.left: list[CreateFence] = []
+        self._ground = ground
+        self._comparison = comparison
+        self._inside = 0
+
+    def create(self, request: CreateFence) -> Fence | None:
+        """Create a fence; None if that is left for a later trip."""
+        if self._inside > MOST_INSIDE:
+            self.left.append(request)
+            return None
+        ground, config = self._ground, request.config
+        if ground.fences[request.name] is not None:
+            raise FenceExistsError(request.name)
+        number = ground.numbers.get(request.name)
+        if number is None:
+            raise LimitExceededError("max_fences", ground.limits.max_fences)
+        waits = _waits(config, 0, request.time)
+        fence = Fence(FenceRow(number, request.name, request.birth.uid, request.birth.created, config, waits))
+        fence.area = self._area(config)
+        require_frames(config, fence.area, None if config.kind == "prefix" else self._hull(config.subjects))
+        if config.kind == "other":
+            assert fence.area is not None  # checked by the caller
+            fence.pair = Pair(fence.area, self._hull(config.subjects), config.near)
+            fence.pair.look()
+        leg = FenceLeg(fence, created=True)
+        fence.subjects = {each.hull.name: each for each in self._subjects(config, request.checked)}
+        try:
+            for subjects in fence.subjects.values():
+                lay_area(subjects, number, config, fence.area, request.checked)
+                self._inside += subjects.index.count(number)
+        except BaseException:
+            self._drop(fence)
+            raise
+        self._comparison.legs[number] = leg
+        if config.initial == "snapshot":
+            leg.summed_up(EventType.SNAPSHOT, Cause.CREATED, request.time)
+        elif config.initial == "events":
+            if fence.pair is not None and fence.pair.near:
+                leg.paired(fence.pair, Cause.CREATED, request.time)
+            for subjects in fence.subjects.values():
+                leg.entered(subjects, request.time)
+        else:
+            leg.inside = Inside(0, tuple(members(fence)))
+        return fence
+
+    def replace(self, request: ReplaceFence, fence: Fence) -> Fence:
+        """Replace the area and the settings of a fence."""
+        comparison = self._comparison
+        leg, config = comparison.leg(fence), request.config
+        if config == leg.row.config:
+            return fence
+        if (config.kind, config.subjects) != (leg.row.config.kind, leg.row.config.subjects):
+            field = SUBJECT_FIELDS[config.kind]
+            raise InvalidFenceError(field, config.subjects, "the subjects of a fence stay the same")
+        area = self._area(config)
+        require_frames(config, area, None if config.kind == "prefix" else self._hull(config.subjects))
+        if not fence.subjects and config.kind == "prefix":  # nobody is there to refuse an invalid area
+            check(config, area, request.checked)
+        for subjects in fence.subjects.values():
+            lay_area(subjects, fence.number, config, area, request.checked)
+            comparison.applied = True
+        if fence.pair is not None and area is not None:
+            self._replace_pair(fence.pair, Pair(area, fence.pair.other, config.near), leg, request.time)
+        waits = leg.row.waits
+        if config.delays or fence.delays is not None:
+            fence.delays = Delays(config, None if fence.delays is None else dict(fence.delays.all()))
+            comparison.applied = True
+        if config.dwell != leg.row.config.dwell:
+            waits = _waits(config, leg.last, leg.time(request.time))
+        leg.row = replace(leg.row, config=config, waits=waits)
+        leg.area = area
+        try:
+            for subjects in fence.subjects.values():
+                comparison.cross(subjects, subjects.take(config, area), {}, REPLACEMENT, request.time)
+            end_all(leg, request.time)
+        except BaseException:
+            comparison.tear()
+            raise
+        return fence
+
+    def delete(self, request: DeleteFence, fence: Fence) -> None:
+        """Delete a fence."""
+        leg = self._comparison.leg(fence)
+        leg.summed_up(EventType.CLOSED, 0, request.time)
+        leg.deleted = True
+        for subjects in fence.subjects.values():  # here, since it takes long with many inside
+            subjects.index.drop(fence.number)
+            self._comparison.applied = True
+
+    def undo(self) -> None:
+        """Forget fences that were not created after all."""
+        legs = self._comparison.legs
+        for number in [number for number, leg in legs.items() if leg.created]:
+            self._drop(legs.pop(number).fence)
+
+    def _drop(self, fence: Fence) -> None:
+        """Let its subjects forget a fence that is not created after all; without any, nothing is compared any more."""
+        others = [leg.fence for leg in self._comparison.legs.values() if leg.created]
+        for name, subjects in fence.subjects.items():
+            if fence.number in subjects.index:
+                subjects.index.drop(fence.number)
+            if not subjects.fences and all(other.subjects.get(name) is not subjects for other in others):
+                subjects.detach()
+
+    def _replace_pair(self, before: Pair, pair: Pair, leg: FenceLeg, now: int) -> None:
+        self._comparison.applied = True
+        pair.look()
+        leg.pair = pair
+        if pair.near != before.near:
+            leg.paired(pair, Cause.CHANGED, now)
+
+    def _area(self, config: FenceConfig) -> Hull | None:
+        """The hull that is the area; raises HullNotFoundError."""
+        name = config.area_hull
+        return None if name is None else self._hull(name)
+
+    def _hull(self, name: str) -> Hull:
+        hull = self._ground.hulls[name].after
+        if hull is None:
+            raise HullNotFoundError(name)
+        _require_whole(hull)
+        return hull
+
+    def _subjects(self, config: FenceConfig, checked: CheckedArea | None) -> list[Subjects]:
+        """The hulls whose keys a new fence compares, by name."""
+        known = {name: subjects for line in self._ground.lines for name, subjects in line.subjects.items()}
+        for leg in self._comparison.legs.values():
+            known |= leg.fence.subjects
+        if config.kind == "hull":
+            hull = self._hull(config.subjects)
+            if hull.row.settings.identity == "multiset":
+                raise HullUnsuitableError(hull.name, "has points without keys", field="config.subject_hull")
+            return [known.get(hull.name) or Subjects(hull)]
+        hulls = [leg.after for _, leg in sorted(self._ground.hulls.items()) if config.compares(leg.name)]
+        keyed = [hull for hull in hulls if hull is not None and hull.row.settings.identity != "multiset"]
+        for each in hulls:
+            if each is not None:
+                _require_whole(each)
+        for hull in keyed:
+            require_frames(config, hull, None)
+        if not keyed and config.kind == "prefix":
+            check(config, self._area(config), checked)
+        return [known.get(hull.name) or Subjects(hull) for hull in keyed]
+
+
+def _waits(config: FenceConfig, sequence: int, time: int) -> Waits:
+    return Waits(sequence, time) if config.dwell else NO_WAITS
+
+
+def _require_whole(hull: Hull) -> None:
+    if hull.divided:
+        raise HullUnsuitableError(hull.name, "is divided among shards, which no fence compares")
