@@ -44,17 +44,39 @@ def generate(out: Path) -> None:
             source.parent.mkdir(parents=True, exist_ok=True)
             source.write_text(proto.read_text().replace('import "dynhull/', f'import "{PACKAGE.name}/'))
             sources.append(str(source))
-        arguments = [f"--{kind}_out={out}" for kind in ("python", "pyi", "grpc_python")]
+        arguments = [f"--{kind}_out={out}" for kind in ("python", "pyi")]
         arguments.append(f"--mypy_grpc_out=quiet:{out}")
         # Found beside the interpreter, so that an environment need not be activated.
         arguments.append(f"--plugin={Path(sys.executable).with_name('protoc-gen-mypy_grpc')}")
         well_known = resources.files("grpc_tools") / "_proto"
         if protoc.main(["protoc", f"-I{include}", f"-I{well_known}", *arguments, *sources]) != 0:
             raise SystemExit("protoc failed")
-    for package in (out / PACKAGE.name).rglob("*_pb2.py"):
-        (package.parent / "__init__.py").touch()
+    for types in (out / PACKAGE.name).rglob("*_pb2_grpc.pyi"):
+        (types.parent / "__init__.py").touch()
+        if services := re.findall(r"^class (\w+)Stub:", types.read_text(), re.MULTILINE):
+            types.with_suffix(".py").write_text(services_of(types.name.removesuffix("_grpc.pyi"), services))
+        else:
+            types.unlink()
     (out / PACKAGE.name / "__init__.py").touch()
     (out / PACKAGE.name / "py.typed").touch()
+
+
+SERVICE = """
+
+class {0}Stub(Stub):
+    service = {1}.DESCRIPTOR.services_by_name["{0}"]
+
+
+{0}Servicer = servicer_of({0}Stub.service, grpc)
+add_{0}Servicer_to_server = adder_of({0}Stub.service, grpc)
+"""
+
+
+def services_of(module: str, services: list[str]) -> str:
+    """The module with the classes of services."""
+    imports = f"import grpc\n\nfrom dynhull_proto.v1 import {module}\n"
+    surface = "from dynhull_surface.services import Stub, adder_of, servicer_of\n"
+    return imports + surface + "".join(SERVICE.format(service, module) for service in services)
 
 
 def contents(package: Path) -> dict[str, str]:
