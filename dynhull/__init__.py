@@ -37,7 +37,7 @@ __all__ = [
 
 _MODULES = {
     *("arrays", "convex", "decompose", "defects", "envelope", "gjk", "globe", "keys", "margin", "measure", "polygons"),
-    *("range_search", "ray", "robust", "trace"),
+    *("crs", "range_search", "ray", "robust", "trace"),
 }
 
 __version__: str

@@ -209,7 +209,7 @@ def as_lonlat(lonlat: npt.ArrayLike, name: str = "points") -> Points:
         ValueError, TypeError: as `as_points`, and for longitudes beyond 360 and latitudes beyond 90 degrees. The
             message names the first bad row.
     """
-    places = as_points(lonlat, name)
+    places = as_points(lonlat, name, on_globe=True)
     beyond = np.abs(places) > (360.0, 90.0)
     if beyond.any():
         row = int(np.argmax(beyond.any(axis=1)))

@@ -20,7 +20,7 @@ LARGEST_EXACT_INTEGER = 2**53
 SHAPELY_POINT = 0
 
 
-def coordinates_of(source: Any, name: str) -> Any:
+def coordinates_of(source: Any, name: str, *, on_globe: bool | None = False) -> Any:
     """The (n, 2) coordinates in a source of points; any other object unchanged.
 
     * an object with `__geo_interface__`, such as shapely's geometries, or GeoJSON as a dictionary: every vertex once
@@ -28,14 +28,22 @@ def coordinates_of(source: Any, name: str) -> Any:
     * a frame (pandas, polars, pyarrow; polars' lazy frames and series of structs): its two columns with names such as
       x and y, or lon and lat, in any order; the two columns of a frame that has no others
 
+    Where a source names its coordinate reference system, and `on_globe` says what the points are for: a warning for
+    degrees that are for a plane.
+
     Raises:
-        ValueError: a geometry is missing or empty, or a frame has no or several such pairs of columns.
+        ValueError: a geometry is missing or empty, or a frame has no or several such pairs of columns; or coordinates
+            for the globe are no degrees.
     """
     source = _polars_frame(source)
     if isinstance(source, list | tuple) or (isinstance(source, np.ndarray) and source.ndim):
         return _of_geometries(source, name) if len(source) and is_geometry(source[0]) else source
     series: Any = getattr(source, "geometry", None) if is_geometry(source) else None
     if hasattr(series, "to_numpy"):  # of a GeoSeries or a GeoDataFrame
+        if on_globe is not None:
+            from .crs import require_frame
+
+            require_frame(getattr(series, "crs", None), name, on_globe=on_globe)
         return _of_geometries(series.to_numpy(), name)
     if hasattr(source, "columns"):
         return _of_frame(source, name)

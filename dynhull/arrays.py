@@ -50,7 +50,7 @@ class Checked:
 PLAIN_TYPES = frozenset((np.ndarray, list))
 
 
-def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
+def as_points(xy: npt.ArrayLike, name: str = "points", *, on_globe: bool | None = False) -> Points:
     """Return `xy` as a C-contiguous float64 array of shape (n, 2) with finite entries and no negative zeros.
 
     Raises:
@@ -58,13 +58,15 @@ def as_points(xy: npt.ArrayLike, name: str = "points") -> Points:
             2**53, say).
         TypeError: an entry is not a real number.
 
-    The message names the first bad row. O(n); `Checked` points are not copied.
+    The message names the first bad row. A frame of geopandas in degrees gets a warning, as it is for a plane; with
+    `on_globe`, one in other coordinates is refused; None if it is not known what the points are for. O(n); `Checked`
+    points are not copied.
     """
     if type(xy) is Checked:
         return xy.points
     if type(xy) in PLAIN_TYPES and (points := plain_points(xy)) is not None:
         return points
-    return _finite(_as_pairs(xy, name), name)
+    return _finite(_as_pairs(xy, name, on_globe), name)
 
 
 def as_pairs(xy: npt.ArrayLike, name: str = "points") -> Points:
@@ -72,7 +74,7 @@ def as_pairs(xy: npt.ArrayLike, name: str = "points") -> Points:
 
     A contiguous float64 array is not copied.
     """
-    pairs = _as_pairs(xy, name)
+    pairs = _as_pairs(xy, name, False)
     return pairs if pairs.flags.c_contiguous and pairs.flags.aligned else pairs.copy(order="C")
 
 
@@ -235,8 +237,8 @@ def _converts_exactly(array: npt.NDArray[Any]) -> bool:
     return array.dtype in (np.float64, np.float32, np.float16)
 
 
-def _as_pairs(xy: npt.ArrayLike, name: str) -> Points:
-    array = _as_array(coordinates_of(xy, name), name)
+def _as_pairs(xy: npt.ArrayLike, name: str, on_globe: bool | None) -> Points:
+    array = _as_array(coordinates_of(xy, name, on_globe=on_globe), name)
     if array.ndim == 1 and array.size == 0:
         return np.empty((0, 2))
     if array.ndim != 2 or array.shape[1] != 2:

@@ -161,7 +161,7 @@ def _of_rings(rings: Any, name: str) -> Polygon:
 
 
 def _ring(corners: Any, name: str) -> Points:
-    points = as_points(corners, name)
+    points = as_points(corners, name, on_globe=None)
     if len(points) > 1 and (points[0] == points[-1]).all():
         points = points[:-1]
     if len(points) < 3:

@@ -87,18 +87,21 @@ class Batch:
         ):
             raise ValueError("a batch either puts and removes keys, or inserts, deletes and moves points")
         if insert is not None:
-            inserted = as_points(insert, "insert")
+            inserted = as_points(insert, "insert", on_globe=None)
             self._fill(self._message.inserts, inserted)
             if times is not None:
                 self._message.insert_times.CopyFrom(encode_times(times, len(inserted), "times"))
         elif points is not None:
-            self._put(keys, as_points(points, "points"), times)
+            self._put(keys, as_points(points, "points", on_globe=None), times)
         elif times is not None:
             raise ValueError("times are given with the points to put or to insert")
         if delete is not None:
-            self._fill(self._message.deletes, as_points(delete, "delete"))
+            self._fill(self._message.deletes, as_points(delete, "delete", on_globe=None))
         if move is not None:
-            self._move(as_points(move[0], "move[0]"), as_points(move[1], "move[1]"))
+            self._move(
+                as_points(move[0], "move[0]", on_globe=None),
+                as_points(move[1], "move[1]", on_globe=None),
+            )
         for argument, named in (("remove", remove), ("release", release), ("drop", drop)):
             if named is not None:
                 checked = checked_keys(named, argument)

@@ -967,4 +967,4 @@ def resumable(request: pb.WatchRequest) -> bool:
 
 def encoded(xy: npt.ArrayLike, name: str) -> points_pb2.Points:
     """Points in the form of a message; ValueError or TypeError names the argument and the first bad row."""
-    return messages.encode_points(as_points(xy, name))
+    return messages.encode_points(as_points(xy, name, on_globe=None))

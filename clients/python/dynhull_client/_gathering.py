@@ -81,7 +81,7 @@ def put_parts(
         )
         return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
     options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move, "only": only, "ttl": ttl}
-    checked, xy = checked_keys(keys), as_points(points, "points")
+    checked, xy = checked_keys(keys), as_points(points, "points", on_globe=None)
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")
     columns: dict[str, Any] = {"keys": checked, "points": xy, "times": as_times(micros), "expire_times": as_times(ends)}

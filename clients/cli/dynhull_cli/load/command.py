@@ -192,7 +192,7 @@ def load(
     ):
         bad = BadRows(bad_file, max_bad)
         known = (lambda: None) if replace else there
-        source = dataclasses.replace(opened, geographic=lambda: _frame(known(), geographic))
+        source = dataclasses.replace(opened, asked=geographic, geographic=lambda: _frame(known(), geographic))
 
         def expected() -> Expected:
             on_globe = source.geographic()

@@ -1,10 +1,11 @@
 """Points of JSON: GeoJSON, an array of rows, or one row per line."""
 
+import io
 import json
 import re
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import IO, Any
+from typing import IO, Any, Protocol
 
 import ijson
 
@@ -12,17 +13,17 @@ from ..peek import peek
 from ..plural import plural
 from ..reading.columns import coordinate_columns
 from ..reading.labels import Labels
-from ..reading.text import KEPT_BYTES, require_decoded
+from ..reading.text import KEPT_BYTES, PART, require_decoded
 from ..reading.values import coordinate, json_text
 from .chunks import CHUNK_ROWS, LINE, Chunks, Position, cut, picked
 from .geometry import position, positions
+from .reference_system import note_reference_system
 from .source import Source
 
 PREFIX = 4096  # bytes, which show the kind of JSON
 RECORD_SEPARATOR = b"\x1e"  # before each line of a GeoJSON text sequence (RFC 8142)
-# The coordinate reference system that GeoJSON could name before RFC 7946; null for an unknown one.
-CRS = re.compile(rb'"crs"\s*:\s*(?:(null)|\{[^{}]*\{\s*"name"\s*:\s*"([^"]*)")')
-IN_DEGREES = ("CRS84", ":4326")
+CRS = b'"crs"'  # the member that named a coordinate reference system before RFC 7946; null for an unknown one
+DEGREES = {"properties": {"name": "OGC:CRS84"}}  # without such a member
 ALONE = re.compile(rb'"type"\s*:\s*"(Feature|(Multi)?(Point|LineString|Polygon)|GeometryCollection)"')
 
 
@@ -36,22 +37,83 @@ def read_json(source: Source) -> Chunks:
         yield from _read_lines(source, text)
     elif b'"features"' not in start and ALONE.search(start):
         yield from _read_items(source, text, "", "feature", _row_reader(source))
+    elif source.size is None:
+        yield from _read_pipe(source, text, start)
     else:
-        _note_reference_system(source, start)
-        yield from _read_collection(source, text)
+        _note(source, _member_of(source))
+        yield from _read_collection(source, source.utf8())
 
 
-def _note_reference_system(source: Source, start: bytes) -> None:
-    """The coordinates are longitudes and latitudes (RFC 7946, section 4) unless an older file names another system."""
-    found = CRS.search(start)
-    name = (found[1] or found[2]).decode(errors="replace") if found else ""
-    if not found or name.endswith(IN_DEGREES):
-        source.in_degrees()
-    else:
-        source.notes.append(f"{source.name}: its coordinates are not degrees: its crs is {name}")
+def _note(source: Source, crs: Any) -> None:
+    """Note what the member `crs` of GeoJSON says."""
+    name = crs.get("properties", {}).get("name") if isinstance(crs, dict) else crs
+    note_reference_system(source, name, "its crs")
 
 
-def _read_collection(source: Source, text: IO[bytes]) -> Chunks:
+def _member_of(source: Source) -> Any:
+    """The member `crs` of a whole file, at whose end it may be; the file is at its beginning again."""
+    source.file.seek(0)
+    text, seen = source.utf8(), b""
+    while CRS not in seen and (part := text.read(PART)):
+        seen = seen[-len(CRS) :] + part
+    source.file.seek(0)
+    if CRS not in seen:
+        return DEGREES
+    found = _first(source.utf8())  # looks which of the members called crs is that of the document
+    source.file.seek(0)
+    return found
+
+
+def _first(text: IO[bytes]) -> Any:
+    """The first member `crs` of a document, as far as that is there."""
+    try:
+        return next(ijson.items(text, "crs"), DEGREES)
+    except ijson.JSONError:  # is reported with its place when the features are read
+        return DEGREES
+
+
+class Readable(Protocol):
+    """What ijson reads from."""
+
+    def read(self, size: int = -1, /) -> bytes:
+        """At most that many bytes; none at the end."""
+
+
+class _Tail:
+    """Input whose end is kept."""
+
+    def __init__(self, text: Readable) -> None:
+        self._text = text
+        self.end = b""
+
+    def read(self, size: int = -1, /) -> bytes:
+        """As of the input."""
+        part = self._text.read(size)
+        self.end = (self.end + part)[-PREFIX:]
+        return part
+
+
+def _read_pipe(source: Source, text: IO[bytes], start: bytes) -> Chunks:
+    """Chunks of points of a FeatureCollection that is read once; ValueError if the member `crs` at its end is news."""
+    _note(source, _first(io.BytesIO(start)))
+    tail = _Tail(text)
+    yield from _read_collection(source, tail)
+    before, _, end = tail.end.rpartition(CRS)
+    try:
+        found = json.loads(b"{" + CRS + end)["crs"] if before else DEGREES
+    except ValueError:  # it is a member of something else
+        return
+    known = source.geographic()
+    on_globe = source.degrees if known is None else known
+    _note(source, found)
+    if on_globe and source.elsewhere:
+        raise ValueError(
+            f"{source.name} says at its end that its crs is {source.elsewhere[0]}, and its coordinates were taken for "
+            "degrees: write it to a file first, or give --plane"
+        )
+
+
+def _read_collection(source: Source, text: Readable) -> Chunks:
     """Chunks of points of the features of a FeatureCollection, which is never in memory as a whole."""
     empty = True
     for chunk in _read_items(
@@ -83,13 +145,13 @@ def _read_lines(source: Source, text: IO[bytes]) -> Chunks:
         )
 
 
-def _read_items(source: Source, text: IO[bytes], path: str, unit: str, read: Callable[[Any], list[Position]]) -> Chunks:
+def _read_items(source: Source, text: Readable, path: str, unit: str, read: Callable[[Any], list[Position]]) -> Chunks:
     labels = _labels(source)
     for rows in cut(_numbered_items(source.name, text, path, unit), CHUNK_ROWS):
         yield picked(unit, rows, read, json_text, labels)
 
 
-def _numbered_items(name: str, text: IO[bytes], path: str, unit: str) -> Iterator[tuple[int, Any]]:
+def _numbered_items(name: str, text: Readable, path: str, unit: str) -> Iterator[tuple[int, Any]]:
     """The items with their numbers from 1; ValueError on one line where the file is not JSON.
 
     Integers of any size are exact, other numbers are Decimals.
@@ -156,6 +218,7 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
     x, y = source.options.x, source.options.y
     members = None if x is None or y is None else (x, y)
     source.axes.extend(members or ())
+    noted: list[Any] = []
 
     def read(value: Any) -> list[Position]:
         nonlocal members
@@ -165,8 +228,11 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
             raise ValueError("neither an object nor an array")
         feature = value.get("type") == "Feature"
         if feature or "coordinates" in value or "geometries" in value:
-            if not source.axes:
-                source.in_degrees()
+            if members is None and (crs := value.get("crs", DEGREES)) not in noted:
+                if noted:
+                    raise ValueError("its crs is another one than that of the first row")
+                _note(source, crs)
+                noted.append(crs)
             return positions(value.get("geometry") if feature else value, source.options.vertices)
         if members is None:
             names = list(value)

@@ -72,6 +72,8 @@ class Source:
         keep_bytes: whether rows with bytes that are none of the encoding are bad rows; otherwise the first one is an
             error. Documents of JSON have no such rows.
         notes: lines about what was detected while reading and may surprise.
+        asked: whether the options say that the points are places on the globe; None if they do not say.
+        elsewhere: the coordinate reference systems that it names and that are no degrees.
         axes: the names of the columns of x and y, once they are known; empty for geometries that are not in degrees.
         geographic: returns whether the points are places on the globe, None if the names of the columns say so. Called
             once there are points.
@@ -86,6 +88,8 @@ class Source:
     integer_keys: bool = False
     keep_bytes: bool = False
     notes: list[str] = field(default_factory=list)
+    asked: bool | None = None
+    elsewhere: list[str] = field(default_factory=list)
     axes: list[str] = field(default_factory=list)
     geographic: Callable[[], bool | None] = lambda: None
 
@@ -98,6 +102,12 @@ class Source:
         """Note that its geometries are longitudes and latitudes."""
         self.axes[:] = LONGITUDE_LATITUDE
 
+    def not_in_degrees(self, system: str) -> None:
+        """Note that its geometries are in a coordinate reference system with other units."""
+        if system not in self.elsewhere:
+            self.elsewhere.append(system)
+            self.notes.append(f"{self.name}: its coordinates are not degrees: its crs is {system}")
+
     def chunks(self) -> Chunks:
         """The points; those that are no places are bad rows. ValueError where the input is not of this format."""
         try:
@@ -105,6 +115,11 @@ class Source:
                 for chunk in chunks:
                     known = self.geographic()
                     on_globe = self.degrees if known is None else known
+                    if on_globe and self.elsewhere:
+                        raise ValueError(
+                            f"{self.name} is in {self.elsewhere[0]}, and the hull is on the globe, in degrees: "
+                            "convert it, for example with ogr2ogr -t_srs EPSG:4326"
+                        )
                     yield places_only(chunk) if on_globe else chunk
         except UndecodableError as error:
             has_rows = self.format in {*TABLES, Format.NDJSON} and not self.keep_bytes
@@ -132,6 +147,7 @@ class Source:
         self.file.seek(0)
         self.notes.clear()
         self.axes.clear()
+        self.elsewhere.clear()
 
     def is_file(self, path: Path) -> bool:
         """Whether that is the file that is read, perhaps by another name."""
