@@ -144,7 +144,7 @@ def test_what_may_surprise_is_said(tmp_path, name, content, options, points, sai
         ("a.csv", COMMA, ["--delimiter", "ab"], "--delimiter 'ab' is not one character"),
         ("a.csv", COMMA, ["--decimal", ";"], "--decimal ';' is neither"),
         ("a.csv", COMMA, ["--encoding", "klingon"], "there is no encoding 'klingon'"),
-        ("a.csv", COMMA, ["--vertices"], "--vertices is for parquet, json, geojson, ndjson, gpkg,"),
+        ("a.nmea", COMMA, ["--vertices"], "--vertices is for csv, tsv, parquet, json, geojson, ndjson, gpkg,"),
         ("a.geojson", "{}", ["--x", "a"], "--x is for csv, tsv, parquet, json, ndjson, gpkg,"),
         ("a.csv.gz", gzip.compress(COMMA.encode())[:-9], [], "the compressed data is damaged"),
         ("a.csv.gz", gzip.compress(b"x,y\n" + bytes(99))[:20] + bytes(99), [], "the compressed data is damaged"),

@@ -29,6 +29,10 @@ def ewkb(points, srid):
     return list(shapely.to_wkb(shapely.set_srid(shapely.points(points), srid), include_srid=True))
 
 
+def ewkb_hex(points):
+    return [each.hex().upper() for each in ewkb(points, 4326)]
+
+
 def wkb(points):
     return list(shapely.to_wkb(shapely.points(points)))
 
@@ -108,6 +112,43 @@ def test_which_world_the_geometries_are_in(tmp_path, served, name, column, value
     points, on_globe, said = loaded(served, name, file)
     assert (points, on_globe) == (sorted(PLACES.tolist()), geographic)
     assert f"points from the geometry column {column}" in said
+
+
+LINES = [f'"{text}",a' for text in wkt(PLACES)]
+
+
+@pytest.mark.parametrize(
+    ("text", "geographic"),
+    [
+        ("\n".join(["geometry,id", *LINES]), False),
+        ("\r\n".join([" WKT ;id", *(f"SRID=4326;{text}".join('""') + ";b" for text in wkt(PLACES))]), True),
+        ("\n".join(["the_geom", *ewkb_hex(PLACES)]), True),
+        ("\n".join(["wkt", *wkt(PLACES)]), False),
+        ("\n".join(["id\tGEOM", *(f"a\t{text}" for text in wkt(PLACES))]), False),
+    ],
+    ids=["geopandas", "ewkt", "postgis", "alone", "tabs"],
+)
+def test_geometries_of_csv(tmp_path, served, name, text, geographic):
+    file = tmp_path / "places.csv"
+    file.write_text(text, newline="")
+    points, on_globe, said = loaded(served, name, file)
+    assert (points, on_globe) == (sorted(PLACES.tolist()), geographic)
+    assert "bad row" not in said
+    assert ("--geographic reads degrees" in said) != geographic
+
+
+def test_lines_and_columns_of_csv(tmp_path, name):
+    file = tmp_path / "places.csv"
+    file.write_text('id,lon,lat,way\n1,8,9,"LINESTRING (0 0, 1 1, 2 3)"\n2,8,9,"POINT (4\n5)"\n3,8,9\n4,8,9,POINT,,7\n')
+    assert "from 8.0 to 8.0" in dynhull("load", name, file, "--dry-run").stdout  # longitude and latitude are there
+    done = dynhull("load", name, file, "--geometry", "way", "--key", "id", "--dry-run")
+    assert "x from 4.0 to 4.0, y from 5.0 to 5.0" in done.stdout
+    for words in "line 2: its geometry is LineString, not a", "line 5: its geometry is missing", "line 6: 6 fields":
+        assert f"  {words}" in done.stderr
+    assert (
+        "4 points would be loaded" in dynhull("load", name, file, "--geometry", "way", "--vertices", "--dry-run").stdout
+    )
+    assert "has no column 'wey' (--geometry)" in dynhull("load", name, file, "--geometry", "wey", "--dry-run").stderr
 
 
 def test_rows_without_a_point(tmp_path, name):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import chain, islice
 from typing import IO, Any
 
-from .reading.columns import coordinate_columns, has_pair
+from .reading.columns import coordinate_columns, geometry_column, has_pair
 from .reading.text import UTF8, UndecodableError, Utf8, lines_of, require_decoded
 from .reading.values import is_number
 
@@ -37,6 +37,8 @@ class CsvFormat:
         header: whether the first row names the columns.
         encoding: a name that Python knows, such as latin-1.
         keep_bytes: whether rows with bytes that are none of the encoding are bad rows, and not an error.
+        geometries: whether a column of geometries is read, if there are no columns of x and y.
+        geometry: its name or its number.
     """
 
     x: str | None = None
@@ -45,6 +47,8 @@ class CsvFormat:
     header: bool | None = None
     encoding: str | None = None
     keep_bytes: bool = False
+    geometries: bool = False
+    geometry: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +65,7 @@ class CsvTable:
         next_line: returns the line of the row that `rows` gives next, once it has given one.
         text: what decodes the file.
         notes: lines about what was detected and may surprise.
+        geometry: the index of the column of geometries, which is read in place of x and y; None for no such column.
     """
 
     names: list[str]
@@ -72,6 +77,7 @@ class CsvTable:
     next_line: Callable[[], int]
     text: Utf8
     notes: list[str]
+    geometry: int | None = None
 
     def require_whole(self, row: list[str]) -> None:
         """Raise ValueError if the row has more fields than columns, but for empty ones, or bytes that are no text."""
@@ -130,7 +136,7 @@ def _table(
 ) -> CsvTable:
     rows = _closed(name, reader, skipped)
     first = [field.strip() for field in next(rows)]
-    if len(first) == 1:
+    if len(first) == 1 and not (given.geometries and _geometry(name, first, given)):
         raise UnclearTableError(
             f"{name} has a single column, {first[0]!r}", "give the character between its columns with --delimiter"
         )
@@ -143,6 +149,10 @@ def _table(
             require_decoded(",".join(first))
         except ValueError as error:
             raise UndecodableError(f"{name}, line {skipped + 1}: {error}") from None
+        column = _geometry(name, first, given) if given.geometries else None
+        if column is not None:
+            at = first.index(column)
+            return CsvTable(first, at, at, delimiter, next_line(), rows, next_line, text, notes, at)
         x, y = coordinate_columns(name, first, given.x, given.y)
         return CsvTable(first, x, y, delimiter, next_line(), rows, next_line, text, notes)
     numbers = [f"column {number}" for number in range(1, len(first) + 1)]
@@ -158,6 +168,10 @@ def _table(
         )
     notes.append(f"{name} has no header: x is column {x + 1}, y is column {y + 1}")
     return CsvTable(numbers, x, y, delimiter, skipped + 1, chain([first], rows), next_line, text, notes)
+
+
+def _geometry(name: str, columns: list[str], given: CsvFormat) -> str | None:
+    return geometry_column(name, columns, given.x, given.y, given.geometry)
 
 
 def _first_line(name: str, text: io.TextIOWrapper) -> tuple[int, str]:

@@ -8,27 +8,35 @@ from ..csv_table import CsvFormat, CsvTable, UnclearTableError, csv_table, numbe
 from ..reading.columns import column_index, decimal_mark
 from ..reading.labels import Labels
 from ..reading.values import coordinate, plain
-from .chunks import CHUNK_ROWS, LINE, Chunk, Chunks, Points, Position, Rows, cut, picked
+from .chunks import CHUNK_ROWS, LINE, Chunk, Chunks, Numbers, Points, Position, Rows, cut, picked
+from .geometry_column import GeometryColumn
 from .options import Format
 from .source import Source
 
+OfRow = Callable[[list[str]], Labels]
+"""Reads the labels of a row."""
+
 
 def read_csv(source: Source) -> Chunks:
-    """Chunks of points from the columns of x and y."""
+    """Chunks of points from the columns of x and y, or from a column of geometries."""
     options = source.options
     delimiter = "tab" if source.format is Format.TSV else options.delimiter
-    given = CsvFormat(options.x, options.y, delimiter, options.header, options.encoding, source.keep_bytes)
+    encoding = options.encoding, source.keep_bytes
+    given = CsvFormat(options.x, options.y, delimiter, options.header, *encoding, True, options.geometry)
     try:
         with csv_table(source.name, source.file, given) as table:
             source.notes.extend(table.notes)
-            source.axes.extend((table.names[table.x], table.names[table.y]))
             labels = _labels(source, table)
+            if table.geometry is not None:
+                yield from _of_geometries(source, table, table.geometry, labels)
+                return
+            source.axes.extend((table.names[table.x], table.names[table.y]))
             yield from _chunks(table, options.decimal, labels)
     except UnclearTableError as error:
         raise ValueError(f"{error}; {error.advice}") from None
 
 
-def _labels(source: Source, table: CsvTable) -> Callable[[list[str]], Labels] | None:
+def _labels(source: Source, table: CsvTable) -> OfRow | None:
     """Reads the labels of a row; None if there are no columns of them."""
     read = source.label_reader()
     if read is None:
@@ -44,7 +52,29 @@ def _labels(source: Source, table: CsvTable) -> Callable[[list[str]], Labels] | 
     return labels
 
 
-def _chunks(table: CsvTable, decimal: str | None, labels: Callable[[list[str]], Labels] | None) -> Chunks:
+def _of_geometries(source: Source, table: CsvTable, place: int, labels: OfRow | None) -> Chunks:
+    name = table.names[place]
+    source.notes.append(f"{source.name}: points from the geometry column {name}")
+    geometries = GeometryColumn(source, name, system_known=False)
+
+    def positions(row: list[str]) -> list[Position]:
+        table.require_whole(row)
+        return geometries.positions(row[place] if place < len(row) else None)
+
+    line = table.first_line
+    for rows in cut(table.rows, CHUNK_ROWS):
+        following = table.next_line()
+        points = None
+        if labels is None and not table.text.kept and {*map(len, rows)} == {len(table.names)}:
+            points = geometries.points([row[place] for row in rows])
+        if points is None:
+            yield picked(LINE, numbered(rows, line), positions, ",".join, labels)
+        else:
+            yield Chunk(Rows(points, _lines(rows, line, following), LINE))
+        line = following
+
+
+def _chunks(table: CsvTable, decimal: str | None, labels: OfRow | None) -> Chunks:
     line = table.first_line
     for rows in cut(table.rows, CHUNK_ROWS):
         if decimal is None:
@@ -61,15 +91,13 @@ def _chunk(
     following: int,
     table: CsvTable,
     decimal: str,
-    labels: Callable[[list[str]], Labels] | None,
+    labels: OfRow | None,
 ) -> Chunk:
     """The points of rows that begin on that line; `following` is the one after them."""
     places = table.x, table.y
     points = None if labels is not None or table.text.kept else _all_points(rows, places, decimal, len(table.names))
     if points is not None:
-        plain = following - line == len(rows)  # no row has several lines
-        lines = range(line, following) if plain else [at for at, _ in numbered(rows, line)]
-        return Chunk(Rows(points, np.array(lines, np.int64), LINE))
+        return Chunk(Rows(points, _lines(rows, line, following), LINE))
 
     def positions(row: list[str]) -> list[Position]:
         table.require_whole(row)
@@ -77,6 +105,12 @@ def _chunk(
         return [(x, y)]
 
     return picked(LINE, numbered(rows, line), positions, ",".join, labels)
+
+
+def _lines(rows: list[list[str]], line: int, following: int) -> Numbers:
+    """The lines of rows that begin on that line; `following` is the one after them."""
+    one_each = following - line == len(rows)
+    return np.array(range(line, following) if one_each else [at for at, _ in numbered(rows, line)], np.int64)
 
 
 def _all_points(rows: list[list[str]], places: tuple[int, int], decimal: str, columns: int) -> Points | None:
