@@ -18,6 +18,7 @@ COLUMN_NAMES = (
 """Names of columns that hold coordinates, x before y, in lower case."""
 LARGEST_EXACT_INTEGER = 2**53
 SHAPELY_POINT = 0
+READ_OTHERWISE = {"pandas", "polars"}
 
 
 def coordinates_of(source: Any, name: str, *, on_globe: bool | None = False) -> Any:
@@ -25,6 +26,7 @@ def coordinates_of(source: Any, name: str, *, on_globe: bool | None = False) -> 
 
     * an object with `__geo_interface__`, such as shapely's geometries, or GeoJSON as a dictionary: every vertex once
     * a list, array or GeoSeries of such objects, or a GeoDataFrame
+    * an array or a stream of Arrow (PyCapsule interface): points of GeoArrow, WKB; of a table, the column of that type
     * a frame (pandas, polars, pyarrow; polars' lazy frames and series of structs): its two columns with names such as
       x and y, or lon and lat, in any order; the two columns of a frame that has no others
 
@@ -45,6 +47,12 @@ def coordinates_of(source: Any, name: str, *, on_globe: bool | None = False) -> 
 
             require_frame(getattr(series, "crs", None), name, on_globe=on_globe)
         return _of_geometries(series.to_numpy(), name)
+    if _is_arrow(source):
+        from ._arrow import geometries_of
+
+        found = geometries_of(source, name)
+        if found is not None:
+            return found.coordinates if found.geometries is None else _of_geometries(found.geometries, name)
     if hasattr(source, "columns"):
         return _of_frame(source, name)
     return list(_positions(geojson_of(source), name)) if is_geometry(source) else source
@@ -59,6 +67,13 @@ def _polars_frame(source: Any) -> Any:
         return source.collect()
     # numpy would take the fields of a struct by their place: latitude, longitude as x, y
     return source.struct.unnest() if isinstance(source, polars.Series) and source.dtype == polars.Struct else source
+
+
+def _is_arrow(source: Any) -> bool:
+    """Whether it offers Arrow, and is of no package whose objects are read otherwise. Asks the class."""
+    kind = type(source)
+    offers = hasattr(kind, "__arrow_c_array__") or hasattr(kind, "__arrow_c_stream__")
+    return offers and kind.__module__.partition(".")[0] not in READ_OTHERWISE
 
 
 def is_geometry(value: Any) -> bool:

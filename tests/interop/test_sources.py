@@ -21,6 +21,14 @@ PAIRS = [(0.0, 0.0), (4.0, 0.0), (5.0, 5.0), (0.0, 4.0), (1.0, 1.0)]
 CORNERS = [[0, 0], [4, 0], [5, 5], [0, 4]]
 X, Y = ([pair[i] for pair in PAIRS] for i in (0, 1))
 POINTS = [shapely.Point(pair) for pair in PAIRS]
+
+
+def interleaved(points):
+    return pyarrow.FixedSizeListArray.from_arrays(np.array(points).ravel(), 2)
+
+
+SERIES = geopandas.GeoSeries(POINTS)
+FRAME = geopandas.GeoDataFrame({"x2": X, "place": SERIES}, geometry="place")
 FEATURE = {"type": "Feature", "geometry": {"type": "MultiPoint", "coordinates": PAIRS}, "properties": None}
 
 
@@ -48,6 +56,14 @@ FEATURE = {"type": "Feature", "geometry": {"type": "MultiPoint", "coordinates": 
         polars.LazyFrame({"lat": Y, "lon": X, "id": range(5)}),
         polars.DataFrame({"latitude": Y, "longitude": X}).to_struct("place"),
         pyarrow.table({"latitude": Y, "longitude": X, "id": range(5)}),
+        *(SERIES.to_arrow(geometry_encoding="geoarrow", interleaved=each) for each in (True, False)),
+        SERIES.to_arrow(geometry_encoding="WKB"),
+        FRAME.to_arrow(geometry_encoding="geoarrow"),
+        FRAME.to_arrow(geometry_encoding="WKB"),
+        pyarrow.table(FRAME.to_arrow(geometry_encoding="geoarrow", interleaved=False)),
+        pyarrow.chunked_array([interleaved(PAIRS[:1]), interleaved(PAIRS[1:])]),
+        pyarrow.StructArray.from_arrays([Y, X, X], ["y", "x", "z"]),
+        pyarrow.array(shapely.to_wkb(POINTS).tolist(), pyarrow.large_binary()),
     ],
     ids=lambda source: type(source).__name__,
 )
@@ -95,6 +111,10 @@ def test_shapes_give_every_vertex_once(source: object, expected: list[tuple[floa
         (pd.DataFrame({"x": [1.0, None], "y": [1.0, 2.0]}), r"points row 1 is \(nan, 2.0\)"),
         (pd.DataFrame({"x": [1, 2**53 + 1], "y": [0.5, 0.5]}), "points row 1 is 9007199254740993: no double"),
         (polars.DataFrame({"x": [1.0, None], "y": [1.0, 2.0]}), r"points row 1 is \(nan, 2.0\)"),
+        (geopandas.GeoSeries([*POINTS, None]).to_arrow(geometry_encoding="WKB"), "points row 5 is null: leave it out"),
+        (geopandas.GeoSeries([shapely.box(0, 0, 1, 1)]).to_arrow(geometry_encoding="geoarrow"), "geoarrow.polygon"),
+        (geopandas.GeoSeries([*POINTS, shapely.Point()]).to_arrow(geometry_encoding="geoarrow"), "points row 5 is"),
+        (pyarrow.array([b"none"]), "points are not well-known binary"),
     ],
 )
 def test_what_has_no_points_is_an_error(source: object, complaint: str) -> None:
