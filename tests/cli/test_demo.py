@@ -22,9 +22,11 @@ from patience import PATIENCE, wait_until
 from typer.testing import Result
 
 from dynhull_cli.demo import show
+from dynhull_cli.demo.live import Stop, create, play
 from dynhull_cli.demo.replay import replay
 from dynhull_cli.demo.scene import Frame
 from dynhull_cli.demo.server import server_process
+from dynhull_cli.demo.table import Table
 from dynhull_client import HullClient
 
 
@@ -113,11 +115,33 @@ def test_the_processes_end_with_a_demo_that_is_killed() -> None:
         wait_until(lambda: not Path(f"/proc/{child}").exists())
 
 
-def test_live_is_for_the_flights(tmp_path):
-    (tmp_path / "points.csv").write_text("x,y\n0,0\n")
-    for option in (["--points", tmp_path / "points.csv"], ["--window", "30m"]):
-        done = demo("--live", *option)
-        assert (done.exit_code, "--live is for the flights" in done.stderr) == (2, True)
+def test_live_has_no_window():
+    done = demo("--live", "--window", "30m")
+    assert (done.exit_code, "leave out --window" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("identity", [None, "van"])
+def test_own_points_live(tmp_path, address, name, identity):
+    """Rows of a file stay until it begins again; rows of a known key move it."""
+    file = tmp_path / "vans.csv"
+    file.write_text("van,t,lon,lat\na,1,13,52\nb,2,14,52\na,2,13,53\nc,3,13.5,52.5\n")
+    scene = Table(file, None, None, identity, "t", 100, keyed=True)
+    scene.hull_name = name
+    stop, seen = Stop(), []
+
+    class Looking(HullClient):
+        def put(self, *arguments, **options):
+            done = super().put(*arguments, **options)
+            seen.append("".join(self.entities(name).keys))
+            if len(seen) == 6:
+                stop.note()
+            return done
+
+    with Looking(address) as client:
+        create(client, scene)
+        play(client, scene, 0, 0, stop)
+        assert client.get_hull(name).info.geographic
+    assert seen == 2 * (["a", "ab", "abc"] if identity else ["2", "234", "2345"])
 
 
 def test_the_positions_of_the_last_half_hour(tmp_path):

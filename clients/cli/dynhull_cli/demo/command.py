@@ -39,7 +39,8 @@ def demo(
     ] = None,
     y: Annotated[str | None, typer.Option(help="Column of y. Default: y, lat, latitude or northing.")] = None,
     identity: Annotated[
-        str | None, typer.Option("--id", help="Column that identifies a point: a row with a known id moves its point.")
+        str | None,
+        typer.Option("--id", "--key", help="Column that identifies a point: a row with a known id moves its point."),
     ] = None,
     time: Annotated[str | None, typer.Option(help="Column to order by: one batch for each value.")] = None,
     batches: Annotated[int, typer.Option(min=1, help="Without --time: number of batches to cut the file into.")] = 100,
@@ -65,7 +66,8 @@ def demo(
     live: Annotated[
         bool,
         typer.Option(
-            "--live", help="Show the flights on a dashboard until Ctrl-C, over and over, with a gateway beside it."
+            "--live",
+            help="Show the flights, or --points, on a dashboard until Ctrl-C, over and over, with a gateway beside it.",
         ),
     ] = False,
     speed: Annotated[
@@ -83,7 +85,7 @@ def demo(
 
     To look at: dynhull demo --live. It prints the address of a dashboard, and of a gateway for HTTP.
 
-    Your own points: dynhull demo --points fleet.csv --x lon --y lat --id vehicle --time minute
+    Your own points: dynhull demo --points fleet.csv --x lon --y lat --key vehicle --time minute, also with --live
     """
     from rich.console import Console
     from rich.text import Text
@@ -92,26 +94,34 @@ def demo(
 
     from .show import show
 
+    def own(*, keyed: bool = False) -> "Scene":
+        from .table import Table
+
+        assert points is not None
+        return Table(points, x, y, identity, time, batches, geographic=geographic, keyed=keyed)
+
     console = Console(highlight=False, soft_wrap=True)
     try:
         if live:
-            if points is not None or window is not None:
-                raise ValueError("--live is for the flights, without --points and --window")
+            if window is not None:
+                raise ValueError("--live shows the latest positions: leave out --window")
+            from .live import FIRST_FLIGHTS, OWN_POINTS
             from .live import live as show_live
 
-            show_live(console, _flights(day, hours, None), speed)
+            if points is None:
+                _require_points(geographic)
+                show_live(console, _flights(day, hours, None), speed, FIRST_FLIGHTS)
+            else:
+                show_live(console, own(keyed=True), speed, OWN_POINTS)
             return
         check_out(out, [".png"])
         max_age = duration(window, "--window")
         if points is not None:
             if max_age is not None:
                 raise ValueError("--window is for the flights, not for --points")
-            from .table import Table
-
-            scene: Scene = Table(points, x, y, identity, time, batches, geographic=geographic)
-        elif geographic is not None:
-            raise ValueError("--geographic and --plane are for --points: the flights are on the globe")
+            scene = own()
         else:
+            _require_points(geographic)
             scene = _flights(day, hours, max_age)
         verified = show(console, scene, out)
     except (ValueError, OSError, RuntimeError, DynhullError) as error:
@@ -120,6 +130,11 @@ def demo(
         raise typer.Exit(2) from None
     if not verified:
         raise typer.Exit(1)
+
+
+def _require_points(geographic: bool | None) -> None:
+    if geographic is not None:
+        raise ValueError("--geographic and --plane are for --points: the flights are on the globe")
 
 
 def _flights(day: str, hours: int, max_age: "timedelta | None") -> "Scene":

@@ -36,6 +36,7 @@ class Table:
         time: the column of times.
         batches: the number of parts without times.
         geographic: whether the points are on the globe; None if the names of the columns say so.
+        keyed: whether points have keys also without ids: their lines.
 
     Raises:
         ValueError: the file does not have the columns, or no points, or some are too far apart for a hull on the globe.
@@ -57,6 +58,7 @@ class Table:
         batches: int,
         *,
         geographic: bool | None = None,
+        keyed: bool = False,
     ) -> None:
         self.title = path.name
         self.hull_name = "points"
@@ -67,7 +69,7 @@ class Table:
             self.length_unit, self.area_unit, self.area_scale = "km", "km²", 1 / SQUARE_KILOMETRE
         self.notes = [*file.notes, *_frame(file)]
         self._batches = _by_time(file.rows) if time else _equal_parts(file.rows, batches)
-        self.keyed = identity is not None
+        self.keyed = keyed or identity is not None
         self.length = len(self._batches)
         self.background = np.empty((0, 2))
 
