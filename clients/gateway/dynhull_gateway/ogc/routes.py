@@ -5,13 +5,13 @@ be drawn somewhere on the globe.
 """
 
 import json
+import math
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime
 from http import HTTPStatus
 from typing import Annotated, Any
 from urllib.parse import quote, urlencode
 
-import numpy as np
 from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, BeforeValidator, StringConstraints
 from starlette.responses import Response
@@ -102,9 +102,9 @@ async def describe_collection(request: Request, client: Caller, collection: Coll
         return _hulls(request)
     await _info(client, name, keyed=True)
     described = _entities(request, name)
-    bounds = _bounds(hull_feature(await client.get_hull(name))["geometry"])
-    if bounds is not None:
-        described.extent = Extent(spatial=Spatial(bbox=[bounds]))
+    bounds = (await client.get_hull(name)).measures.bounds
+    if not any(map(math.isnan, bounds)):  # those of an empty hull
+        described.extent = Extent(spatial=Spatial(bbox=[list(bounds)]))
     return described
 
 
@@ -252,23 +252,6 @@ async def _entity(client: AsyncHullClient, info: HullInfo, text: str) -> dict[st
             time = None if answer.times is None else answer.times[0]
             return feature(key, answer.positions[0].tolist(), time)
     raise _missing(f"the hull {info.name!r} has no key {text!r}", text, "KEY_MISSING")
-
-
-def _bounds(geometry: dict[str, Any] | None) -> list[float] | None:
-    """West, south, east and north of a geometry; None without one."""
-    if geometry is None:
-        return None
-    flat = np.array(list(_positions(geometry["coordinates"])))
-    (west, south), (east, north) = flat.min(axis=0).tolist(), flat.max(axis=0).tolist()
-    return [west, south, east, north]
-
-
-def _positions(coordinates: Any) -> Any:
-    if isinstance(coordinates[0], int | float):
-        yield coordinates[:2]
-    else:
-        for each in coordinates:
-            yield from _positions(each)
 
 
 def _hulls(request: Request) -> Collection:
