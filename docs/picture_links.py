@@ -1,4 +1,4 @@
-"""A hook of mkdocs: a picture of a page is a link to itself in its full size, and scrolls sideways on narrow screens."""
+"""A hook of mkdocs: a picture is a link to itself in its full size, and scrolls sideways on narrow screens."""
 
 import re
 from typing import Any

@@ -21,7 +21,7 @@ def test_the_fence_follows_the_fleet(take_program: Callable[[str, str], Path]) -
     fly, fence = (take_program("tutorial", title) for title in ("fly.py", "fence.py"))
     with measured() as (server, metrics):
         fleet = start(fly, "--address", server.address, "--minutes", "90", "--pause", "0.02")
-        assert fleet.stdout.read(3) == "\n00"  # the hull is there
+        assert fleet.stdout.read(3) == "\n06"  # the hull is there
         fleet.send_signal(signal.SIGSTOP)  # it could be over before the other program has begun
         alarm = start(fence, "--address", server.address, "--events", "20")
         wait_until(lambda: scrape(metrics)["dynhull_watchers"])
