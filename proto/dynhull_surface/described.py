@@ -42,6 +42,8 @@ class Setting(NamedTuple):
         flag: the option of the command line if it is not named after the setting.
         also: another spelling of the option.
         at_creation: whether it is said when something is created, and not when it is replaced.
+        words: what its values are called on the wire where they have other names there.
+        of: what it belongs to, if that is no setting.
     """
 
     name: str
@@ -55,6 +57,8 @@ class Setting(NamedTuple):
     flag: Flag | None = None
     also: str | None = None
     at_creation: bool = False
+    words: Mapping[Any, str] = {}
+    of: str = ""
 
     @property
     def choices(self) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ Initial = Literal["snapshot", "events", "none"]
 MOST_SHARDS = 1024
 DEEPEST_LAYER = 1000
 WINDOW = "max_age", "max_points"
+A_HULL = "an area that is a hull"
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)  # nobody makes one
@@ -27,7 +28,12 @@ class HullSettings:
     """The settings of a hull, fixed from its creation."""
 
     name: str
-    keyed: Keyed | None = setting(None, "identity", "Kind of the keys. Default: the points of the hull have none.")
+    keyed: Keyed | None = setting(
+        None,
+        "identity",
+        "Kind of the keys. Default: the points of the hull have none.",
+        words={"str": "STRING_KEYS", "int": "INTEGER_KEYS"},
+    )
     ordering: Ordering = setting(
         "arrival",
         "ordering",
@@ -70,7 +76,10 @@ class HullSettings:
         least=1,
     )
     geographic: bool = setting(
-        False, "frame", "Whether points are longitudes and latitudes in degrees, rather than points of a plane."
+        False,
+        "frame",
+        "Whether points are longitudes and latitudes in degrees, rather than points of a plane.",
+        words={True: "GEOGRAPHIC"},
     )
     center: tuple[float, float] | None = setting(
         None,
@@ -119,7 +128,10 @@ class FenceSettings:
         "event.",
     )
     dwell: timedelta | None = setting(
-        None, "dwell", "Time after which a subject that is still inside makes an event. Default: it makes none."
+        None,
+        "dwell",
+        "Time after which a subject that is still inside makes an event. Default: it makes none.",
+        least=0,
     )
     confirmations: int = setting(
         0,
@@ -131,6 +143,7 @@ class FenceSettings:
         None,
         "min_dwell",
         "How long a subject must be on the other side before it enters or leaves. Default: no time.",
+        least=0,
     )
     near: float = setting(
         0.0, "near_distance", "With `other_hull`: the hulls are near while their distance is at most this.", least=0
@@ -140,6 +153,7 @@ class FenceSettings:
         "hull_area.without_self",
         "Whether each subject that is a point of the area's hull is compared with the hull of the others. The area is "
         "then the subjects' own hull, and there is a `margin`.",
+        of=A_HULL,
     )
     layer: int = setting(
         1,
@@ -147,8 +161,9 @@ class FenceSettings:
         "Convex layer of the area's hull; 1 is the hull itself. Each batch of that hull then finds the layer anew.",
         least=1,
         greatest=DEEPEST_LAYER,
+        of=A_HULL,
     )
     max_events: int = setting(0, "max_events", "Number of events to keep; 0 for the limit of the server.", least=0)
     max_event_age: timedelta | None = setting(
-        None, "max_event_age", "How long events are kept. Default: no limit of the fence."
+        None, "max_event_age", "How long events are kept. Default: no limit of the fence.", least=0
     )

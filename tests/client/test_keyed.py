@@ -127,11 +127,11 @@ def test_settings_are_kept_and_compared(client: HullClient, name: str) -> None:
         ({"keyed": "float"}, "keyed must be one of None, 'str', 'int', got 'float'"),
         ({"max_points": 0}, "max_points must be at least 1, got 0"),
         ({"clock": "data"}, "give max_age or max_points, too"),
-        ({"ahead": "clamp"}, "give max_skew, max_age or max_points, too"),
-        ({"max_skew": 1}, 'max_age, max_points or ordering="event_time"'),
+        ({"ahead": "clamp"}, "ahead is given alone: give max_age or max_points or max_skew, too"),
+        ({"max_skew": 1}, "max_skew is given alone: give max_age or max_points or ordering, too"),
         (
             {"max_skew": 1, "keyed": "str", "ordering": "event_time", "clock": "data"},
-            "clock is a setting of a window: give max_age or max_points, too",
+            "clock is given alone: give max_age or max_points, too",
         ),
         ({"max_age": "30m"}, "max_age is '30m': must be a finite number of seconds or a timedelta"),
     ):

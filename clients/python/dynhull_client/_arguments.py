@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection
 
 
 def require_not_negative(**numbers: float | None) -> None:
@@ -19,11 +19,11 @@ def require_not_negative(**numbers: float | None) -> None:
             raise ValueError(f"{argument} must be at least 0, got {value}")
 
 
-def choice(argument: str, value: Any, choices: Mapping[Any, Any]) -> Any:
-    """The value that stands for a choice; ValueError names the argument and what it may be."""
+def choice(argument: str, value: Any, choices: Collection[Any]) -> Any:
+    """The value; ValueError names the argument and what it may be."""
     if value not in choices:
         raise ValueError(f"{argument} must be one of {', '.join(map(repr, choices))}, got {value!r}")
-    return choices[value]
+    return value
 
 
 def text(argument: str, value: Any) -> str:
@@ -33,14 +33,14 @@ def text(argument: str, value: Any) -> str:
     return value
 
 
-def whole(argument: str, value: Any, bits: int = 64) -> int:
+def whole(argument: str, value: Any, bits: int = 64, least: int = 0) -> int:
     """The value as an integer without sign; TypeError if it is no integer, ValueError if it is out of range."""
     try:
         number = operator.index(value)
     except TypeError:
         raise TypeError(f"{argument} is {value!r}: must be an integer") from None
-    if number < 0:
-        raise ValueError(f"{argument} must be at least 0, got {number}")
+    if number < least:
+        raise ValueError(f"{argument} must be at least {least}, got {number}")
     if number >= 2**bits:
         raise ValueError(f"{argument} must be less than 2**{bits}, got {number}")
     return number

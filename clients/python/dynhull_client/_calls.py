@@ -14,13 +14,12 @@ import grpc
 import numpy as np
 
 from dynhull.arrays import as_points
-from dynhull.globe import as_center
 from dynhull_proto.v1 import hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_surface.settings import HullSettings
 
 from . import _messages as messages
-from ._arguments import choice, positive, whole
+from ._arguments import positive, whole
 from ._batch import Batch
 from ._errors import DynhullError, HullExistsError, HullNotFoundError, RestoredError
 from ._keys import checked_keys, decode_names, encode_keys
@@ -41,7 +40,7 @@ from ._messages import (
     Verification,
 )
 from ._quarantine_messages import encode_quarantine
-from ._settings import SPAN, documenting_settings
+from ._settings import SPAN, documenting_settings, encode_center, encode_settings
 from ._times import encode_duration
 
 if TYPE_CHECKING:
@@ -59,16 +58,6 @@ if TYPE_CHECKING:
     from ._quarantine_messages import Quarantine
 
 Answer = TypeVar("Answer")
-
-
-IDENTITIES = {
-    None: hull_pb2.IDENTITY_MULTISET,
-    "str": hull_pb2.IDENTITY_STRING_KEYS,
-    "int": hull_pb2.IDENTITY_INTEGER_KEYS,
-}
-ORDERINGS = {"arrival": hull_pb2.ORDERING_UNSPECIFIED, "event_time": hull_pb2.ORDERING_EVENT_TIME}
-CLOCKS = {"server": hull_pb2.CLOCK_SERVER, "data": hull_pb2.CLOCK_DATA}
-AHEAD_POLICIES = {"refuse": hull_pb2.AHEAD_POLICY_REFUSE, "clamp": hull_pb2.AHEAD_POLICY_CLAMP}
 
 
 # The number of progress marks within the time after which a copy is too old to answer.
@@ -144,25 +133,11 @@ def create_hull(  # noqa: D417  # the settings have their descriptions
             other settings, or without `exist_ok`.
         timeout: seconds, instead of the client's.
     """
-    config = _config(keyed, ordering, point_limit)
-    if geographic:
-        config.frame = hull_pb2.FRAME_GEOGRAPHIC
-    if center is not None:
-        if not geographic:
-            raise ValueError("center is a setting of a geographic hull: give geographic=True, too")
-        config.center.CopyFrom(_encode_center(center))
-    limited = max_age is not None or max_points is not None
-    if limited or (max_skew is not None and ordering == "event_time"):
-        config.window.CopyFrom(_window(max_age, max_points, clock, max_skew, ahead))
-    elif max_skew is not None:
-        raise ValueError('max_skew is given with a window or an order: max_age, max_points or ordering="event_time"')
-    if not limited and clock != "server":
-        raise ValueError("clock is a setting of a window: give max_age or max_points, too")
-    if not limited and max_skew is None and ahead != "refuse":
-        raise ValueError("ahead is a setting of max_skew or of a window: give max_skew, max_age or max_points, too")
+    given = locals()
+    config = hull_pb2.HullConfig()
+    encode_settings(HullSettings, given, config)
     if quarantine is not None:
         config.quarantine.CopyFrom(encode_quarantine(quarantine))
-    config.shards = positive("shards", None if shards is None else whole("shards", shards, bits=32))
     create: Call[HullInfo] = Call(
         "CreateHull",
         pb.CreateHullRequest(name=name, config=config),
@@ -182,40 +157,9 @@ def create_hull(  # noqa: D417  # the settings have their descriptions
     return create
 
 
-def _config(keyed: KeyType | None, ordering: Ordering, point_limit: int | None) -> hull_pb2.HullConfig:
-    return hull_pb2.HullConfig(
-        identity=choice("keyed", keyed, IDENTITIES),
-        ordering=choice("ordering", ordering, ORDERINGS),
-        max_points=positive("point_limit", point_limit),
-    )
-
-
-def _encode_center(center: tuple[float, float]) -> hull_pb2.LonLat:
-    lon, lat = as_center(center)
-    return hull_pb2.LonLat(longitude=lon, latitude=lat)
-
-
-def _window(
-    max_age: float | timedelta | None,
-    max_points: int | None,
-    clock: Clock,
-    max_skew: float | timedelta | None,
-    ahead: Ahead,
-) -> hull_pb2.Window:
-    return hull_pb2.Window(
-        max_age=None if max_age is None else encode_duration(max_age, "max_age"),
-        max_points=positive("max_points", max_points),
-        clock=choice("clock", clock, CLOCKS),
-        max_skew=None if max_skew is None else encode_duration(max_skew, "max_skew"),
-        ahead=choice("ahead", ahead, AHEAD_POLICIES),
-    )
-
-
 def encode_layer(layer: int) -> int:
     """A convex layer, from 1, in the form of a message."""
-    number = whole("layer", layer, bits=32)
-    if number < 1:
-        raise ValueError(f"layer must be at least 1, got {number}")
+    number = whole("layer", layer, bits=32, least=1)
     return number if number > 1 else 0
 
 
@@ -240,7 +184,7 @@ def recenter(name: str, center: tuple[float, float] | None = None, *, timeout: f
         center: longitude and latitude; None for the mean direction of the present points.
         timeout: seconds, instead of the client's.
     """
-    request = pb.RecenterRequest(name=name, center=None if center is None else _encode_center(center))
+    request = pb.RecenterRequest(name=name, center=None if center is None else encode_center(center))
     return Call("Recenter", request, lambda response: messages.decode_info(response.hull), timeout, repeatable=False)
 
 
@@ -255,8 +199,7 @@ def reshard(name: str, shards: int, *, timeout: float | None = None) -> Call[Hul
         shards: the number of shards, 1 to 1024.
         timeout: seconds, instead of the client's.
     """
-    number = positive("shards", whole("shards", shards, bits=32))
-    request = pb.ReshardRequest(name=name, shards=number)
+    request = pb.ReshardRequest(name=name, shards=whole("shards", shards, bits=32, least=1))
     return Call("Reshard", request, lambda response: messages.decode_info(response.hull), timeout, repeatable=False)
 
 

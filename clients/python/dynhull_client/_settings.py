@@ -6,8 +6,11 @@ from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 from google.protobuf.duration_pb2 import Duration
+from google.protobuf.message import Message
 
 from dynhull.arrays import as_coordinate
+from dynhull.globe import as_center
+from dynhull_proto.v1 import hull_pb2
 from dynhull_surface.described import described, documenting
 
 from ._arguments import choice, flag, whole
@@ -16,8 +19,6 @@ from ._times import encode_duration
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from google.protobuf.message import Message
-
     from dynhull_surface.described import Documented, Setting
 
 SPAN = " Seconds or a timedelta."  # of an argument that is a time span
@@ -25,9 +26,13 @@ SPAN = " Seconds or a timedelta."  # of an argument that is a time span
 
 def encode_settings(settings: type, given: Mapping[str, Any], config: Message) -> None:
     """Add those of the described settings to a message that are given and not as usual."""
-    for each in described(settings):
-        if each.name in given:
-            _encode(each, given[each.name], config)
+    chosen = {each.name: each for each in described(settings) if each.name in given}
+    unusual = {name for name, each in chosen.items() if given[name] != each.usual}
+    for name, each in chosen.items():
+        if each.needs and name in unusual and unusual.isdisjoint(each.needs):
+            raise ValueError(f"{name} is given alone: give {' or '.join(each.needs)}, too")
+        if name in unusual:
+            _encode(each, given[name], config)
 
 
 def decode_settings(settings: type, config: Message) -> dict[str, Any]:
@@ -41,29 +46,36 @@ def _encode(setting: Setting, value: Any, config: Message) -> None:
     encoded = _encoded(setting, value, message.DESCRIPTOR.fields_by_name[name])
     if encoded is None:
         return
-    if within and not config.HasField(within):
-        raise ValueError(f"{setting.name} is for an area that is a hull")
-    if isinstance(encoded, Duration):
+    if setting.of and not config.HasField(within):
+        raise ValueError(f"{setting.name} is for {setting.of}")
+    if isinstance(encoded, Message):
         getattr(message, name).CopyFrom(encoded)
     else:
         setattr(message, name, encoded)
 
 
 def _encoded(setting: Setting, value: Any, field: Any) -> Any:
-    """The value in the form of a message; None for the usual one, and for one that means the same."""
+    """The value in the form of a message; None for one that means the same as the usual one."""
     name, least = setting.name, setting.least
     if setting.choices:
-        return choice(name, value, _numbers(setting, field))
-    if setting.kind is timedelta:
-        return None if value is None else _span(value, name)
+        choice(name, value, setting.choices if setting.usual else (None, *setting.choices))
     if setting.kind is bool:
-        return flag(name, value) or None
+        value = flag(name, value) or None
+    if field.enum_type is not None:
+        return None if value is None else _numbers(setting, field)[value]
+    if setting.kind is timedelta:
+        return _span(value, name) if least == 0 else encode_duration(value, name)
     if setting.kind is float:
         return as_coordinate(value, name) or None
-    number = whole(name, value, 32 if field.type == field.TYPE_UINT32 else 64)
-    if least is not None and number < least:
-        raise ValueError(f"{name} must be at least {least}, got {number}")
-    return None if number == setting.usual else number
+    if setting.kind is int:
+        return whole(name, value, 32 if field.type == field.TYPE_UINT32 else 64, least or 0)
+    return encode_center(value) if setting.kind == tuple[float, float] else value
+
+
+def encode_center(center: tuple[float, float]) -> hull_pb2.LonLat:
+    """A centre in the form of a message."""
+    lon, lat = as_center(center)
+    return hull_pb2.LonLat(longitude=lon, latitude=lat)
 
 
 def _decode(setting: Setting, config: Message) -> Any:
@@ -82,7 +94,8 @@ def _numbers(setting: Setting, field: Any) -> dict[str, int]:
     """The number of each choice on the wire."""
     numbers = field.enum_type.values_by_name
     prefix = field.enum_type.values[0].name.removesuffix("UNSPECIFIED")
-    return {each: numbers[f"{prefix}{each.upper()}"].number for each in setting.choices}
+    words = setting.words or {each: each.upper() for each in setting.choices}
+    return {each: numbers[f"{prefix}{word}"].number for each, word in words.items()}
 
 
 def _span(seconds: float | timedelta, name: str) -> Duration | None:
