@@ -49,9 +49,11 @@ TYPES: dict[Any, Any] = {
     tuple[float, float, float, float]: Annotated[
         list[Finite], Field(min_length=4, max_length=4), BeforeValidator(listed)
     ],
-    tuple[int, ...]: Annotated[list[int], BeforeValidator(listed)],
     npt.NDArray[np.float64]: Rows,
+    npt.NDArray[np.int8]: Annotated[list[int], BeforeValidator(rows)],
 }
+# Responses that have been made, by their answers: parts of others.
+MADE: dict[type, Any] = {}
 
 
 def answering(
@@ -81,6 +83,8 @@ def answering(
         made = create_model(
             response.__name__, __base__=response.__base__, __doc__=response.__doc__, __module__=__name__, **found | own
         )
+        if fields is None:
+            MADE[answer] = made
         return cast("type[Answer]", made)
 
     return complete
@@ -92,7 +96,9 @@ def _type(kind: Any) -> Any:
         return Union[tuple(_type(each) for each in get_args(kind))]  # noqa: UP007  # of types that are only known here
     if get_origin(kind) is frozenset:
         return Annotated[list[get_args(kind)[0]], BeforeValidator(list)]  # type: ignore[misc]  # known here only
-    return TYPES.get(kind, kind)
+    if get_origin(kind) is tuple and get_args(kind)[-1] is ...:
+        return Annotated[list[_type(get_args(kind)[0])], BeforeValidator(listed)]  # type: ignore[misc]  # known here only
+    return TYPES.get(kind) or MADE.get(kind, kind)
 
 
 def _meaning(text: str | None, kind: Any) -> str | None:

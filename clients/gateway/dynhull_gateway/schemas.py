@@ -3,7 +3,6 @@
 Numbers are read as the nearest double, as in every JSON; there is no number where a double is infinite or not a number.
 """
 
-from datetime import datetime
 from typing import Annotated, Any, Literal
 from urllib.parse import unquote
 
@@ -200,7 +199,6 @@ class Window(Response):
 class HullInfo(Response):
     """A hull, its size and its settings."""
 
-    window: Window | None
     quarantine: PresentRules | None = Field(description="Null for a hull that has never had any rules.")
     restored: bool = Field(description="Whether a backup has brought the hull back, without the batches after it.")
 
@@ -266,17 +264,12 @@ class Reshard(Request):
     shards: Annotated[int, Field(strict=True, ge=1, le=1024)]
 
 
+@answering(sdk.HeldPosition)
 class HeldPosition(Response):
-    """A position in quarantine. `speed` is null if it is not too fast, or if it moved in no time: see `breaks`."""
+    """A position in quarantine."""
 
-    key: str | int
-    position: Place
-    time: datetime | None
+    speed: Finite = Field(description="Null if it is not too fast, or if it moved in no time: see `breaks`.")
     breaks: Annotated[list[Literal["max_speed", "max_growth"]], BeforeValidator(listed)]
-    speed: Finite
-    growth: Finite
-    revision: int = Field(description="The revision that has held it.")
-    confirmations: int
 
 
 class HeldPage(Response):
@@ -389,12 +382,9 @@ class AboutPointsOrKeys(Request):
     keys_min_revision: Count = Field(0, description="A revision of that hull to wait for.")
 
 
+@answering(sdk.Located)
 class Located(Response):
     """Row by row: 1 inside, 0 on the boundary, -1 outside; -128 for a key that is not there."""
-
-    revision: int
-    sides: Integers
-    keys_revision: int | None
 
 
 class Distances(Response):
@@ -421,12 +411,9 @@ class Directions(Request):
     keys: StrictBool = Field(False, description="Whether to name the vertices, in a keyed hull.")
 
 
+@answering(sdk.Supported)
 class Supported(Response):
     """The extreme vertex in each direction, and its key if requested."""
-
-    revision: int
-    vertices: Rows
-    keys: list[str] | list[int] | None
 
 
 class Tangents(Response):
@@ -478,12 +465,9 @@ class Entities(Response):
     times: Times | None
 
 
+@answering(sdk.Sampled)
 class Sampled(Response):
     """A sample of the points, and a key of each if requested."""
-
-    revision: int
-    points: Rows
-    keys: list[str] | list[int] | None
 
 
 class Layers(Response):
@@ -546,51 +530,26 @@ class Efficient(Response):
     sharpe_ratios: Numbers
 
 
+@answering(sdk.ChanRound)
 class ChanRound(Response):
     """One round of Chan's algorithm."""
 
-    guess: int
-    groups: int
-    steps: int
-    cost: Finite
-    closed: bool
 
-
+@answering(sdk.Difference)
 class Difference(Response):
     """The first row in which two lists of vertices differ."""
 
-    row: int
-    live: Place | None
-    recomputed: Place | None
 
-
+@answering(sdk.FenceDifference)
 class FenceDifference(Response):
     """One thing about a fence that is not as it must be."""
 
-    fence: str
-    hull: str = Field(description="With `key`, the subject, if there is one.")
-    key: str | int | None
-    sequence: int = Field(description="That of the wrong event; 0 for who is inside.")
-    expected: str
-    found: str
 
-
+@answering(sdk.Verification)
 class Verification(Response):
     """The live hull compared with one computed anew, and the fences that compare it."""
 
     whole: bool = Field(description="Whether everything that was compared is as it must be.")
-
-    revision: int
-    equal: bool
-    points: int
-    vertices: int
-    rounds: list[ChanRound]
-    difference: Difference | None
-    keys_equal: bool = Field(description="Whether the points of a keyed hull are the positions of its keys.")
-    fences: int = Field(description="The fences that compare the hull or its keys.")
-    fence_differences: Annotated[list[FenceDifference], BeforeValidator(listed)] = Field(
-        description="What is wrong with who is inside of them and with their events, the first of it."
-    )
 
 
 # Fences
@@ -687,19 +646,14 @@ class Acknowledgement(Request):
     uid: StrictStr = Field("", max_length=200, description="The uid of the fence, to notice that it was replaced.")
 
 
+@answering(sdk.SubjectsInside)
 class SubjectsInside(Response):
     """Keys of one hull that are inside."""
 
-    hull: str
-    keys: list[str] | list[int]
-    revision: int
 
-
+@answering(sdk.Inside)
 class Inside(Response):
     """The subjects inside a fence at one moment."""
-
-    sequence: int
-    subjects: list[SubjectsInside]
 
 
 @answering(sdk.Fence, finite=True)
@@ -710,7 +664,6 @@ class Fence(Response):
     subjects: str | None = Field(description="The keyed hull whose keys are compared,")
     subject_prefix: str | None = Field(description="or a prefix of the names of several,")
     other_hull: str | None = Field(description="or a hull that is compared as a whole.")
-    consumers: list[Consumer]
 
 
 class FencePage(Response):

@@ -414,9 +414,15 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class FenceDifference:
-    """One thing about a fence that is not as it must be: `expected` and `found` say in words what must be, and what is.
+    """One thing about a fence that is not as it must be.
 
-    `hull` and `key` name the subject, if there is one; `sequence` is that of the wrong event, 0 for a state.
+    Attributes:
+        fence: its name.
+        hull: with `key`, the subject, if there is one.
+        key: the key of the subject; None if it has none.
+        sequence: that of the wrong event; 0 for who is inside.
+        expected: in words, what must be.
+        found: what is.
     """
 
     fence: str
@@ -429,11 +435,18 @@ class FenceDifference:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The live hull compared with a hull computed anew from the stored points; `difference` is None if `equal`.
+    """The live hull compared with a hull computed anew from the stored points.
 
-    `keys_equal` says whether the points of a keyed hull are the positions of its keys; True for a hull without keys.
-    `fences` is the number of fences that compare the hull or its keys, and `fence_differences` is what is wrong with
-    their states and events, the first of it.
+    Attributes:
+        revision: the hull's revision.
+        equal: whether its vertices are those of the stored points.
+        points: the number of points.
+        vertices: the number of vertices.
+        rounds: the rounds of Chan's algorithm.
+        difference: the first row in which the vertices differ; None if they are equal.
+        keys_equal: whether the points of a keyed hull are the positions of its keys; True for a hull without keys.
+        fences: the number of fences that compare the hull or its keys.
+        fence_differences: what is wrong with who is inside of them and with their events, the first of it.
     """
 
     revision: int

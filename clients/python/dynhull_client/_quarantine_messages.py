@@ -1,21 +1,16 @@
 """The quarantine of a keyed hull: its rules, and the positions that it holds out."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynhull_proto.v1 import hull_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ._keys import decode_names
 from ._times import decode_times
-
-if TYPE_CHECKING:
-    from dynhull_proto.v1 import hull_service_pb2 as pb
 
 
 @dataclass(frozen=True, slots=True)
