@@ -232,21 +232,20 @@ app = typer.Typer(
 )
 
 
-@app.callback(context_settings={"help_option_names": ["-h", "--help"]})
+HELP = f"""Exact convex hulls of points that are inserted, moved and deleted.
+
+Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, and a token from --token or
+DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
+
+Exit codes: {", ".join(f"{code.value} {code.meaning}" for code in Exit)}. `serve`, `gateway`, `dashboard`, `ingest` and
+`relay` end with 0 when they are interrupted, because that is how they are ended.
+"""
+
+
+@app.callback(help=HELP, context_settings={"help_option_names": ["-h", "--help"]})
 def options(
     _: Annotated[
         bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_show_version)
     ] = False,
 ) -> None:
-    """Exact convex hulls of points that are inserted, moved and deleted.
-
-    Commands that talk to a server take its address from --address or DYNHULL_ADDRESS, and a token from --token or
-    DYNHULL_TOKEN. `dynhull COMMAND --help` describes a command.
-
-    Exit codes: EXIT_CODES. `serve`, `gateway`, `dashboard`, `ingest` and `relay` end with 0 when they are interrupted,
-    because that is how they are ended.
-    """
-
-
-EXIT_CODES = ", ".join(f"{code.value} {code.meaning}" for code in Exit)
-options.__doc__ = (options.__doc__ or "").replace("EXIT_CODES", EXIT_CODES)
+    """What all commands have in common."""
