@@ -6,6 +6,7 @@ import random
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,45 @@ def test_the_log_says_what_became_of_each_position(client: HullClient, address: 
     counts = {"inserted": 2, "moved": 1, "stale": 1, "late": 1}
     ended = {each: value for each, value in said[-1].items() if each not in ("timestamp", "seconds", "level", "logger")}
     assert ended == {"event": "stopped", "points": 5, "bad": 1, **counts}
+
+
+def test_messages_say_when_keys_leave_and_the_command_which_are_put(
+    client: HullClient, address: str, name: str, nats_port: int
+) -> None:
+    """Times without a time zone are those of Berlin; one batch has a key that leaves and one that stays."""
+    client.create_hull(name, keyed="str", max_age=86400, clock="data")
+    at = {"x": 1, "y": 2, "at": "2026-03-01 13:00:00"}
+    moves = [
+        ("a", at | {"until": "2026-03-01 13:00:05"}),
+        ("b", at),
+        ("c", at | {"until": ""}),
+        ("d", at | {"until": 7}),
+        ("e", at | {"at": "2026-03-29 02:30:00"}),
+        ("f", at | {"at": "2026-03-01T12:00:10Z"}),
+    ]
+    publish(nats_port, name, moves)
+    url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*"
+    options = ("--hull", name, "--key", "{1}", "--x", "$.x", "--y", "$.y", "--time", "$.at")
+    berlin = ("--time-zone", "Europe/Berlin", "--time-format", "%Y-%m-%d %H:%M:%S")
+    said = ingested(address, url, *options, *berlin, "--expires", "$.until")
+    bad = [line["error"] for line in said if line["event"] == "bad message"]
+    assert [each.partition(",")[0] for each in bad] == [
+        "expires is '7'", "time is '2026-03-29 02:30:00'", "time is '2026-03-01T12:00:10Z'"
+    ]  # fmt: skip
+    assert said[-1] == {**said[-1], "points": 3, "bad": 3, "inserted": 3}
+    entities = client.entities(name)
+    assert entities.times is not None
+    assert {str(each) for each in entities.times} == {"2026-03-01T12:00:00.000000"}
+    client.put(name, ["z"], [[0, 0]], [datetime(2026, 3, 1, 12, 0, 10, tzinfo=UTC)])
+    assert sorted(client.entities(name).keys) == ["b", "c", "z"]
+    said = ingested(
+        address, url, *options, *berlin, "--producer", "again", "--only", "absent", "--ttl", "1h", "--max-bad", "3"
+    )
+    assert said[-1] == {**said[-1], "points": 4, "bad": 2, "inserted": 2, "skipped": 2}
+    client.put(name, ["z"], [[0, 0]], [datetime(2026, 3, 1, 13, 0, 20, tzinfo=UTC)])
+    assert sorted(client.entities(name).keys) == ["b", "c", "z"]
+    refused = dynhull("ingest", url, "--hull", name, "--ttl", "1h")
+    assert (refused.exit_code, "--ttl is given with --key" in refused.stderr) == (2, True)
 
 
 def test_messages_without_contents_delete_keys(client: HullClient, address: str, name: str, nats_port: int) -> None:

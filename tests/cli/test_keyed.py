@@ -123,6 +123,8 @@ def test_a_watch_names_who_joins_and_leaves_the_corners(served, name):
         (["query", "HULL", "vertices", "--keys-of", "b"], "--keys-of is given with --keys"),
         (["load", "HULL", "--time-unit", "s"], "--time-unit is given with --time or --expires"),
         (["load", "HULL", "--expires", "until"], "--expires is given with --key"),
+        (["load", "HULL", "--only", "absent"], "--only is given with --key"),
+        (["load", "HULL", "--time-zone", "UTC"], "--time-zone is given with --time or --expires"),
     ],
     ids=lambda value: "-".join(value[:1] + value[2:]) if isinstance(value, list) else "",
 )
@@ -149,6 +151,25 @@ def test_a_table_of_keys_is_loaded_once(served, name, tmp_path):
     assert "loaded before" in dynhull("load", name, file, "--key", "id", "--time", "seen").stderr
     done = dynhull("load", name, file, "--key", "id", "--time", "seen", "--resume")
     assert (done.exit_code, entities(served, name)[2]) == (0, 2)
+
+
+@pytest.mark.usefixtures("served")
+def test_a_load_says_which_keys_are_put_and_when_they_leave(name, tmp_path):
+    file = tmp_path / "seen.csv"
+    file.write_text("id,seen,lon,lat\na,2026-03-01T12:00:00Z,0,0\nb,2026-03-01T12:00:00Z,4,0\n")
+    dynhull("create", name, "--keyed", "str", "--max-age", "1h", "--clock", "data")
+    load = "load", name, file, "--key", "id", "--time", "seen"
+    assert dynhull("put", name, "b", "9", "9", "--time", "2026-03-01T12:00:00Z", "--only", "absent").exit_code == 0
+    done = dynhull(*load, "--only", "absent", "--ttl", "5m")
+    assert done.stdout == f"{name}: 1 point loaded (1 new, 1 skipped), 2 in the hull\n", done.stderr
+    dynhull("put", name, "c", "1", "1", "--time", "2026-03-01T12:06:00Z")
+    assert dynhull("query", name, "positions", "a", "b", "c").stdout == "a\tnan\tnan\nb\t9.0\t9.0\nc\t1.0\t1.0\n"
+    for options, words in (
+        (["--expires", "seen", "--ttl", "5m"], "--ttl and --expires both say when keys leave"),
+        (["--ttl", "0"], "--ttl '0' must be more than 0"),
+    ):
+        done = dynhull(*load, *options)
+        assert (done.exit_code, words in done.stderr) == (2, True), done.stderr
 
 
 @pytest.mark.parametrize(

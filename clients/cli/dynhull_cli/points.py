@@ -8,6 +8,7 @@ import typer
 from dynhull_surface.counts import COUNTS, OF_CHANGES, text_of
 from dynhull_surface.reasons import Exit
 
+from .conditions import ONLY, TTL, Only
 from .connected import AsJson, HullName, connected, fail
 from .durations import duration
 from .json_lines import json_line
@@ -48,12 +49,8 @@ def put(
         str | None,
         typer.Option(help="Event time of the positions: ISO 8601 with a time zone, or a number since 1970."),
     ] = None,
-    ttl: Annotated[
-        str | None,
-        typer.Option(
-            help="Time after which the points leave the hull: 500ms, 90s, 30m, 2h or 7d; a number alone is seconds."
-        ),
-    ] = None,
+    only: Annotated[Only | None, typer.Option(help=ONLY)] = None,
+    ttl: Annotated[str | None, typer.Option(help=TTL)] = None,
     as_json: AsJson = False,
 ) -> None:
     """Put keys into a keyed hull, in one batch: a new key is inserted, a known key moves.
@@ -68,7 +65,7 @@ def put(
 
     keys, points = keyed_rows(row)
     times = None if time is None else as_times([TimeReader("--time").read(time)] * len(keys))
-    applied = client.put(name, keys_for(client, name, keys), points, times, ttl=duration(ttl, "--ttl"))
+    applied = client.put(name, keys_for(client, name, keys), points, times, only=only, ttl=duration(ttl, "--ttl"))
     _report(
         name, applied, f"{plural(applied.inserted, 'key')} new, {applied.moved:,} moved{_left_out(applied)}", as_json
     )

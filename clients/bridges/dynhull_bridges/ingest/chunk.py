@@ -1,10 +1,16 @@
 """Rows of consecutive messages for one hull, which become one batch."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from dynhull_cli.reading.times import LARGEST_TIME, as_times
 
 from .feed import Message
 from .mapping import Row
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 MOST_ROWS = 8192
 
@@ -45,6 +51,7 @@ class Chunk:
         self.keys: list[Any] = []
         self.points: list[tuple[float, float]] = []
         self.times: list[int | None] = []
+        self.expires: list[int | None] = []
         self.deletes = False
         self._known: set[Any] = set()
         taken.left += 1
@@ -53,6 +60,16 @@ class Chunk:
     def number(self) -> int:
         """The number of the last message."""
         return self.messages[-1][0].number
+
+    @property
+    def ends(self) -> "npt.NDArray[np.datetime64] | None":
+        """The times at which the keys leave; None if none leaves.
+
+        In a batch all keys leave or none does, so that those that stay leave at the last time that there is, in 2255.
+        """
+        if all(each is None for each in self.expires):
+            return None
+        return as_times([LARGEST_TIME if each is None else each for each in self.expires])
 
     def admits(self, rows: Sequence[Row]) -> bool:
         """Whether the rows of another message fit."""
@@ -69,6 +86,7 @@ class Chunk:
         for row in rows:
             self.points.append((row.x, row.y))
             self.times.append(row.time)
+            self.expires.append(row.expires)
             if row.key is not None:
                 self.keys.append(row.key)
                 self._known.add(row.key)

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from dynhull_cli.conditions import ONLY, TTL, Only, conditions
 from dynhull_cli.connected import Connect, connecting, fail
 from dynhull_cli.durations import duration
 from dynhull_cli.reading.time_forms import AMBIGUOUS, FORMAT, ZONE, Ambiguous, TimeUnit, time_form
@@ -59,6 +60,11 @@ def ingest(
     time_zone: Annotated[str | None, _reading(ZONE)] = None,
     ambiguous: Annotated[Ambiguous, _reading(AMBIGUOUS)] = Ambiguous.REFUSE,
     time_format: Annotated[str | None, _reading(FORMAT)] = None,
+    expires: Annotated[
+        str | None, _mapping("Time at which the key leaves the hull, written like --time; if missing: never.")
+    ] = None,
+    only: Annotated[Only | None, _reading(ONLY)] = None,
+    ttl: Annotated[str | None, _reading(TTL)] = None,
     format: Annotated[  # noqa: A002
         Contents, _reading("What messages are: JSON, or lines of NMEA sentences, whose positions are $.lon and $.lat.")
     ] = Contents.JSON,
@@ -149,7 +155,8 @@ def ingest(
     deletes = tombstones is Tombstones.DELETE
     form = time_form(option_of, time_unit, time_zone, ambiguous, time_format)
     nmea = format is Contents.NMEA
-    mapping = Mapping(hull, x, y, key, time, form, each, deletes=deletes, nmea=nmea)
+    of_puts = conditions(only, ttl, key=key, expires=expires)
+    mapping = Mapping(hull, x, y, key, time, expires, form, each, deletes=deletes, nmea=nmea)
     on_globe = mapping.degrees if geographic is None else geographic
     given = (("--grace", grace), ("--report", report), ("--patience", patience))
     seconds = {option: duration(text, option) for option, text in given}
@@ -160,6 +167,7 @@ def ingest(
         to_end,
         None if limit is None else limit.total_seconds(),
         accept_gaps,
+        of_puts,
     )
     logs.configure(log_format.value)
     if mapping.swapped:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -66,6 +66,7 @@ class Lane:
         keyed: whether rows have keys.
         degrees: whether rows seem to be longitudes and latitudes.
         create: settings of the hull if there is none; None to create none.
+        conditions: which keys are put, and when they leave: arguments of a put.
         bad: called with each message that is refused, and why.
         settled: called when a chunk is settled, with the number of its rows that were sent, and their effect.
         away: notes that the server does not answer; all lanes share it.
@@ -82,6 +83,7 @@ class Lane:
         keyed: bool,
         degrees: bool,
         create: dict[str, Any] | None,
+        conditions: Mapping[str, Any],
         bad: Callable[[Message, Exception], None],
         settled: Callable[[int, Applied | None], None],
         away: Absence,
@@ -94,6 +96,7 @@ class Lane:
         self._keyed = keyed
         self._degrees = degrees
         self._create = create
+        self._conditions = conditions
         self._bad = bad
         self._settled = settled
         self._away = away
@@ -200,7 +203,14 @@ class Lane:
             if rest.deletes:
                 outcome = await writer.remove(self._keys(rest), sequence=sequence)
             elif self._keyed:
-                outcome = await writer.put(keys=self._keys(rest), points=rest.points, times=times, sequence=sequence)
+                outcome = await writer.put(
+                    keys=self._keys(rest),
+                    points=rest.points,
+                    times=times,
+                    expire_times=rest.ends,
+                    sequence=sequence,
+                    **self._conditions,
+                )
             else:
                 outcome = await writer.put(rest.points, times=times, sequence=sequence)
         except DynhullError as error:

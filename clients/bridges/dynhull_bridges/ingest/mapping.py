@@ -23,13 +23,14 @@ EARLIEST, LATEST = 1990, 2100  # years in which positions are taken
 
 
 class Row(NamedTuple):
-    """A position, or the end of a key; `time` is in microseconds since 1970."""
+    """A position, or the end of a key; times are in microseconds since 1970."""
 
     hull: str
     key: Any
     x: float
     y: float
     time: int | None
+    expires: int | None = None
     deletes: bool = False
 
 
@@ -41,6 +42,7 @@ class Mapping:
         x, y: expressions for the coordinates.
         key: an expression for the key; None for points without keys.
         time: an expression for the event time; None for none.
+        expires: an expression for the time at which the key leaves, if it leaves; None for none.
         form: how times are written.
         each: a path to an array with a row in each element; None if a message is one row.
         deletes: whether a message without contents deletes its key.
@@ -65,6 +67,7 @@ class Mapping:
         y: str,
         key: str | None,
         time: str | None,
+        expires: str | None,
         form: TimeForm,
         each: str | None,
         *,
@@ -73,7 +76,8 @@ class Mapping:
     ) -> None:
         self.hull = hull if is_fixed(hull) else None
         self.keyed = key is not None
-        more = [*_written(form), *(["delete"] if deletes else []), *(["nmea"] if nmea else [])]
+        leaving = [] if expires is None else ["expires", expires]
+        more = [*leaving, *_written(form), *(["delete"] if deletes else []), *(["nmea"] if nmea else [])]
         self.digest = sha256(repr((hull, x, y, key, time, str(form.unit), each, *more)).encode()).hexdigest()[:12]
         self.degrees = are_degrees(last_name(x), last_name(y))
         self.swapped = are_degrees(last_name(y), last_name(x))
@@ -86,7 +90,8 @@ class Mapping:
                 raise ValueError(f"--{name} {text!r} is the same for all messages: give a path, such as '$.{name}'")
         self._key = None if key is None else value_of(key, "--key")
         self._time = None if time is None else value_of(time, "--time")
-        self.times = TimeReader("time", form)
+        self._expires = None if expires is None else value_of(expires, "--expires")
+        self.times, self.ends = TimeReader("time", form), TimeReader("expires", form)
         if each is not None and not each.startswith("$"):
             raise ValueError(f"--each {each!r} is no path: it begins with $")
         self._each = None if each is None else value_of(each, "--each")
@@ -137,7 +142,11 @@ class Mapping:
                 self._look_at(found, time)
         x = coordinate(_found(self._x, message, document), "x")
         y = coordinate(_found(self._y, message, document), "y")
-        return Row(self._name(message, document), key, x, y, time)
+        return Row(self._name(message, document), key, x, y, time, self._end_of(message, document))
+
+    def _end_of(self, message: Message, document: Any) -> int | None:
+        found = None if self._expires is None else _found(self._expires, message, document)
+        return None if found is None or found == "" else self.ends.read(found)
 
     def _name(self, message: Message, document: Any) -> str:
         hull = self._hull(message, document)

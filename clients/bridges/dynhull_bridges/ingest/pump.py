@@ -3,7 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic
 from typing import Any
 
@@ -39,6 +39,7 @@ class Settings:
         to_end: whether to end once no message is left.
         patience: the seconds after which a broker that does not answer is given up; None for never.
         accept_gaps: whether to go on where the broker has removed messages before they were read.
+        conditions: which keys are put, and when they leave: arguments of a put.
     """
 
     mapping: Mapping
@@ -46,6 +47,7 @@ class Settings:
     to_end: bool
     patience: float | None
     accept_gaps: bool = False
+    conditions: dict[str, Any] = field(default_factory=dict)
 
 
 class GapError(Exception):
@@ -236,9 +238,10 @@ class Pump:
     def _tell(self) -> None:
         """Log, once, how the first time was read."""
         mapping = self._settings.mapping
-        if mapping.times.note is not None:
-            log.info(mapping.times.note)
-            mapping.times.note = None
+        for each in (mapping.times, mapping.ends):
+            if each.note is not None:
+                log.info(each.note)
+                each.note = None
         if mapping.warning is not None:
             log.warning(mapping.warning)
             mapping.warning = None
@@ -268,6 +271,7 @@ class Pump:
             keyed=settings.mapping.keyed,
             degrees=settings.mapping.degrees,
             create=settings.create,
+            conditions=settings.conditions,
             bad=self._set_aside,
             settled=self._settled,
             away=self._server_away,

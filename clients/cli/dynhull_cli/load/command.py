@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..conditions import ONLY, TTL, Only, conditions
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..plural import plural
@@ -82,6 +83,8 @@ def load(
         str | None,
         _input("Column of the times at which keys leave the hull, written like --time; empty for never. With --key."),
     ] = None,
+    only: Annotated[Only | None, _input(ONLY)] = None,
+    ttl: Annotated[str | None, _input(TTL)] = None,
     geometry: Annotated[
         str | None,
         _input("Column of geometries, WKT or WKB. Default: geometry, geom, wkt or the like, where no x and y are."),
@@ -154,8 +157,7 @@ def load(
     for option, value in (("--time-unit", time_unit), ("--time-zone", time_zone), ("--time-format", time_format)):
         if value is not None and time is None and expires is None:
             raise ValueError(f"{option} is given with --time or --expires")
-    if expires is not None and key is None:
-        raise ValueError("--expires is given with --key: only keys leave at times of their own")
+    of_puts = conditions(only, ttl, key=key, expires=expires)
     options = Options(
         x,
         y,
@@ -217,6 +219,7 @@ def load(
             geographic=geographic,
             resume=resume,
             replace=replace,
+            conditions=of_puts,
         )
     loaded, counts, points = sending.counts.taken, sending.counts, sending.points
     if as_json:

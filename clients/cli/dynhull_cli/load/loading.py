@@ -1,10 +1,10 @@
 """Reads the points of an input and sends them to a hull, each exactly once."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from itertools import chain
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
@@ -90,11 +90,12 @@ def load_points(
     geographic: bool | None,
     resume: bool,
     replace: bool,
+    conditions: Mapping[str, Any],
 ) -> Sending:
     """Create the hull where it is missing, and add the points that earlier runs of the same load did not add.
 
     A new hull is geographic if `geographic` says so or, without it, if the input does. `known` returns the hull that
-    was there before, None without one.
+    was there before, None without one. `conditions`: which keys are put, and when they leave.
 
     Returns:
         What became of the rows.
@@ -110,7 +111,7 @@ def load_points(
             raise ValueError(_no_points(source, bad))
         _print_notes(source.notes)
         _make(client, name, source, known, geographic, silent=resume, replace=replace)
-        sending = Sending(client, name, producer, patience, resume=resume, bad=bad)
+        sending = Sending(client, name, producer, patience, resume=resume, bad=bad, conditions=conditions)
         with (
             _resumable("--resume in place of --replace" if replace else "--resume", producer),
             _progress(source) as read,

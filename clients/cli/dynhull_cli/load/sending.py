@@ -1,9 +1,9 @@
 """Sends the rows of a load in numbered batches, each exactly once, and sets those aside that the server refuses."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from dynhull_client import Applied, DynhullError, HullClient, InvalidRequestError, Writer
@@ -54,6 +54,7 @@ class Sending:
         patience: seconds to wait for a server that does not answer.
         resume: whether batches that the hull has already are passed over; otherwise LoadedBeforeError if it has some.
         bad: takes the rows that are refused.
+        conditions: which keys are put, and when they leave: arguments of a put.
 
     Attributes:
         counts: what became of the rows.
@@ -63,7 +64,15 @@ class Sending:
     """
 
     def __init__(
-        self, client: HullClient, name: str, producer: str | None, patience: float, *, resume: bool, bad: BadRows
+        self,
+        client: HullClient,
+        name: str,
+        producer: str | None,
+        patience: float,
+        *,
+        resume: bool,
+        bad: BadRows,
+        conditions: Mapping[str, Any],
     ) -> None:
         self.counts = Counts()
         self.points: int | None = None
@@ -75,6 +84,7 @@ class Sending:
         self._patience = patience
         self._resume = resume
         self._bad = bad
+        self._conditions = conditions
         self._uid = ""
         self._begun = False  # whether the first writer has been opened
         self._waiting: deque[_Sent] = deque()
@@ -118,14 +128,14 @@ class Sending:
         self._uid = writer.uid
         try:
             for index, each in enumerate(self._waiting):
-                each.outcome = _put(writer, each.rows)
+                each.outcome = self._put(writer, each.rows)
                 if not index:
                     each.outcome.result()  # another row of it may be refused
             for number, rows in numbered:
                 read(len(rows))
                 if number > self.known:
                     self._waiting.append(_Sent(number, rows))
-                    self._waiting[-1].outcome = _put(writer, rows)
+                    self._waiting[-1].outcome = self._put(writer, rows)
                     self._settle()
             writer.flush()
         except DynhullError as error:
@@ -156,14 +166,13 @@ class Sending:
         for each in self._waiting:
             each.outcome = None
 
-
-def _put(writer: Writer, rows: Rows) -> "Future[Applied]":
-    if not len(rows):  # its number is taken all the same
-        outcome = writer.put(insert=rows.points)
-        writer.flush()
-        return outcome
-    times = None if rows.times is None else as_times(rows.times)
-    if rows.keys is None:
-        return writer.put(insert=rows.points, times=times)
-    expires = None if rows.expires is None else as_times(rows.expires)
-    return writer.put(keys=rows.keys, points=rows.points, times=times, expire_times=expires)
+    def _put(self, writer: Writer, rows: Rows) -> "Future[Applied]":
+        if not len(rows):  # its number is taken all the same
+            outcome = writer.put(insert=rows.points)
+            writer.flush()
+            return outcome
+        times = None if rows.times is None else as_times(rows.times)
+        if rows.keys is None:
+            return writer.put(insert=rows.points, times=times)
+        expires = None if rows.expires is None else as_times(rows.expires)
+        return writer.put(keys=rows.keys, points=rows.points, times=times, expire_times=expires, **self._conditions)
