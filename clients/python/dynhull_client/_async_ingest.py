@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from functools import partial, update_wrapper
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self
 
 from ._ingest import Ingest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from datetime import timedelta
+    from collections.abc import Callable, Coroutine
     from types import TracebackType
 
-    import numpy.typing as npt
-
     from ._async_connection import AsyncConnection
-    from ._batch import Only
     from ._calls import Ingesting
     from ._messages import Ingested
+
+
+P = ParamSpec("P")
+
+
+def _in_thread(
+    method: Callable[Concatenate[Ingest, P], None],
+) -> Callable[Concatenate[AsyncIngest, P], Coroutine[Any, Any, None]]:
+    """A method of an Ingest, in the thread of an AsyncIngest."""
+
+    async def run(self: AsyncIngest, /, *arguments: P.args, **named: P.kwargs) -> None:
+        await self._in_thread(partial(method, self._ingest, *arguments, **named))
+
+    update_wrapper(run, method)
+    return run
 
 
 class AsyncIngest:
@@ -41,36 +52,7 @@ class AsyncIngest:
         """The effect of all batches; None until the context was left without an error."""
         return self._ingest.summary
 
-    async def apply(
-        self,
-        insert: npt.ArrayLike | None = None,
-        delete: npt.ArrayLike | None = None,
-        move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
-        *,
-        keys: Any = None,
-        points: npt.ArrayLike | None = None,
-        times: Any = None,
-        remove: Any = None,
-        only: Only | None = None,
-        ttl: float | timedelta | None = None,
-        expire_times: Any = None,
-    ) -> None:
-        """Send a batch; arguments and errors as for `Ingest.apply`."""
-        await self._in_thread(
-            partial(
-                self._ingest.apply,
-                insert,
-                delete,
-                move,
-                keys=keys,
-                points=points,
-                times=times,
-                remove=remove,
-                only=only,
-                ttl=ttl,
-                expire_times=expire_times,
-            )
-        )
+    apply = _in_thread(Ingest.apply)
 
     def __repr__(self) -> str:
         return f"<AsyncIngest to {self._name!r}>"
