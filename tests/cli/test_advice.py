@@ -64,6 +64,11 @@ LOADS = [
         "--expires is given with --key",
         "load {name} points.csv --key x --expires y",
     ),
+    (
+        "load {name} points.csv --key x --expires y --ttl 5m",
+        "--ttl and --expires both say when keys leave",
+        "load {name} points.csv --key x --ttl 5m",
+    ),
     ("query loaded vertices --keys", "leave out --keys", "query loaded vertices"),
     ("load {name} world.csv", "--replace --plane loads", "load {name} world.csv --replace --plane"),
     (
@@ -101,6 +106,7 @@ FOLLOWED_ELSEWHERE = {
     "--client-cert": "test_commands.py: test_tls",
     "--client-key": "test_commands.py: test_tls",
     "dynhull serve": "every test with a server",
+    "--config": "ogrinfo of GDAL",
     "--id": "test_table.py: the columns of the demo",
     "--time": "test_table.py: the columns of the demo",
     "--keys-of": "test_keyed.py: test_integer_keys_and_another_hull",
