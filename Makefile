@@ -1,7 +1,7 @@
 # One word for each thing people do here. Everything runs in .venv, made on first use from uv.lock.
 PYTHON ?= python3
 BIN := .venv/bin
-KERNEL := $(shell find dynhull/kernel server/dynhull_server/native -type f)
+KERNEL := $(shell find dynhull/kernel server/dynhull_server/native server/dynhull_server/state/fences/events/format.py -type f)
 COMPILER := $(firstword $(shell for each in "$$CXX" c++ g++ clang++; do command -v "$$each"; done; true))
 # Certificates of the system: behind a proxy that inspects TLS, pip and uv trust the same.
 export UV_SYSTEM_CERTS ?= 1

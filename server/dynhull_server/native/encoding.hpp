@@ -14,30 +14,7 @@
 
 namespace dynhull_server {
 
-// What an event has, in its mark; the type is in the lower bits.
-enum Mark : std::uint8_t { HAS_POSITION = 16, HAS_PREVIOUS = 32, HAS_DISTANCE = 64, HAS_EVENT_TIME = 128 };
-// What a block has, and how it is written.
-enum BlockFlag : std::uint8_t {
-  HAS_HULLS = 1,
-  HAS_EVENT_TIMES = 2,
-  HAS_FIRST_TIMES = 4,
-  ONE_EACH = 32,
-  NO_AREAS = 64,
-  DECIMALS = 128,
-};
-// What an event has that is alone, and how it is written.
-enum LoneFlag : std::uint8_t {
-  LONE_HULL = 1,
-  LONE_AREA = 2,
-  LONE_FIRST_TIME = 4,
-  LONE_CAUSES = 8,
-  LONE_DECIMALS = 32,
-  LONE_STRING = 64,
-  LONE_INTEGER = 128,
-};
-constexpr std::uint8_t MOVED = 1;                            // a cause
-constexpr std::int64_t NEAR = 1'893'456'000'000'000;         // the beginning of 2030
-constexpr double PLACES = 1e7, GREATEST = 9007199254740992;  // 2**53
+constexpr std::uint8_t MOVED = 1;  // a cause
 
 using Integers = std::vector<std::int64_t>;
 
@@ -147,9 +124,9 @@ struct Differing {
 };
 
 inline std::uint8_t mark_of(const Event& event) {
-  return static_cast<std::uint8_t>(event.type | (event.has_position() ? HAS_POSITION : 0) |
-                                   (event.has_previous() ? HAS_PREVIOUS : 0) | (event.is_far() ? HAS_DISTANCE : 0) |
-                                   (event.event_time != NO_TIME ? HAS_EVENT_TIME : 0));
+  return static_cast<std::uint8_t>(
+      event.type | (event.has_position() ? Mark::HAS_POSITION : 0) | (event.has_previous() ? Mark::HAS_PREVIOUS : 0) |
+      (event.is_far() ? Mark::HAS_DISTANCE : 0) | (event.event_time != NO_TIME ? Mark::HAS_EVENT_TIME : 0));
 }
 
 // An event that is alone, without members and origins. `hull` is empty if it follows from the fence.
@@ -160,10 +137,10 @@ inline void encode_lone(const Run& run, const Event& event, std::string_view key
   if (event.has_previous()) before = as_decimals(event.before_x, event.before_y);
   const bool decimals = here.has_value() == event.has_position() && before.has_value() == event.has_previous();
   out.byte(0);
-  out.byte((hull ? LONE_HULL : 0) | (run.area_revision ? LONE_AREA : 0) |
-           (event.first_time != NO_TIME ? LONE_FIRST_TIME : 0) | (event.causes != MOVED ? LONE_CAUSES : 0) |
-           (decimals ? LONE_DECIMALS : 0) | (run.kind == STRING_KEY ? LONE_STRING : 0) |
-           (run.kind == INTEGER_KEY ? LONE_INTEGER : 0));
+  out.byte((hull ? LoneFlag::HAS_HULL : 0) | (run.area_revision ? LoneFlag::HAS_AREA : 0) |
+           (event.first_time != NO_TIME ? LoneFlag::HAS_FIRST_TIME : 0) |
+           (event.causes != MOVED ? LoneFlag::HAS_CAUSES : 0) | (decimals ? LoneFlag::DECIMALS : 0) |
+           (run.kind == STRING_KEY ? LoneFlag::STRING_KEY : 0) | (run.kind == INTEGER_KEY ? LoneFlag::INTEGER_KEY : 0));
   out.unsigned_integer(static_cast<std::uint64_t>(run.fence));
   out.unsigned_integer(static_cast<std::uint64_t>(run.first));
   out.byte(mark_of(event));
@@ -282,9 +259,9 @@ inline void encode_block(std::span<const Run> runs, std::span<const Event> event
   };
   out.unsigned_integer(events.size());
   out.unsigned_integer(runs.size());
-  out.byte(more | (named ? HAS_HULLS : 0) | (event_times.empty() ? 0 : HAS_EVENT_TIMES) |
-           (first_times ? HAS_FIRST_TIMES : 0) | (one_each ? ONE_EACH : 0) | (areas ? 0 : NO_AREAS) |
-           (decimals ? DECIMALS : 0));
+  out.byte(more | (named ? BlockFlag::HAS_HULLS : 0) | (event_times.empty() ? 0 : BlockFlag::HAS_EVENT_TIMES) |
+           (first_times ? BlockFlag::HAS_FIRST_TIMES : 0) | (one_each ? BlockFlag::ONE_EACH : 0) |
+           (areas ? 0 : BlockFlag::NO_AREAS) | (decimals ? BlockFlag::DECIMALS : 0));
   of_runs([](const Run& run) { return run.fence; });
   of_runs([](const Run& run) { return run.first; });
   if (!one_each) of_runs([](const Run& run) { return run.count; });

@@ -13,29 +13,19 @@ import numpy.typing as npt
 
 from ...compiled import native
 from ...state.fences.events.block import EVENT, RUN, EventBlock, Integers, block_of
+from ...state.fences.events.format import BlockFlag, Mark
 from ...state.fences.model.records import Origin
 from ...state.records import NO_TIME
 from .columns import Cursor
 from .event_columns import columns_of, put_integers
 from .event_positions import WORD, take_decimals, take_previous
 from .event_rows import (
-    HAS_DISTANCE,
-    HAS_EVENT_TIME,
-    HAS_POSITION,
-    HAS_PREVIOUS,
     OF_PAIRS,
-    TYPE_BITS,
     put_members,
     take_members,
 )
 from .lone_events import LONE, decode_lone, encode_lone, lone_run
 from .varints import put_text, put_unsigned, take_signed, take_text, take_unsigned
-
-# What a block has.
-HAS_HULLS, HAS_EVENT_TIMES, HAS_FIRST_TIMES, HAS_INSIDE, HAS_ORIGINS = 1, 2, 4, 8, 16
-# How it is written, since format 8: without the counts of runs, as each is one event; without revisions of areas, as
-# there are none; positions as multiples of 1e-7.
-ONE_EACH, NO_AREAS, DECIMALS = 32, 64, 128
 
 
 class Runs(NamedTuple):
@@ -54,7 +44,7 @@ class Runs(NamedTuple):
 
 def encode_block(block: EventBlock, own: npt.NDArray[np.bool_]) -> bytes:
     """A block as bytes. `own` says of which runs the hull is the one whose keys the fence compares: it is left out."""
-    more = HAS_INSIDE * bool(block.inside) | HAS_ORIGINS * bool(block.origins)
+    more = BlockFlag.HAS_INSIDE * bool(block.inside) | BlockFlag.HAS_ORIGINS * bool(block.origins)
     if len(block) == 1 and (more or native is None):
         return encode_lone(int(block.fences[0]), block.events(0)[0], own=bool(own[0]))
     if native is None:
@@ -81,14 +71,14 @@ def _encoded(block: EventBlock, own: npt.NDArray[np.bool_], more: int) -> bytear
     columns = columns_of(block)
     fences, firsts, counts, hulls, kinds, subject_revisions, area_revisions, times = columns.runs
     n, m, named, areas = len(block), len(block.runs), not own.all(), block.runs["area_revision"].any()
-    flags = HAS_HULLS * named | HAS_EVENT_TIMES * (len(columns.event_times) > 0)
-    flags |= HAS_FIRST_TIMES * (columns.first_times is not None) | more
-    flags |= ONE_EACH * (n == m) | NO_AREAS * (not areas) | DECIMALS * columns.decimal
+    flags = BlockFlag.HAS_HULLS * named | BlockFlag.HAS_EVENT_TIMES * (len(columns.event_times) > 0)
+    flags |= BlockFlag.HAS_FIRST_TIMES * (columns.first_times is not None) | more
+    flags |= BlockFlag.ONE_EACH * (n == m) | BlockFlag.NO_AREAS * (not areas) | BlockFlag.DECIMALS * columns.decimal
     put_unsigned(out, n)
     put_unsigned(out, m)
     out.append(flags)
     put_integers(out, fences, firsts)
-    if not flags & ONE_EACH:
+    if not flags & BlockFlag.ONE_EACH:
         put_integers(out, counts)
     if named:
         used, places = np.unique(hulls[~own], return_inverse=True)
@@ -131,42 +121,42 @@ def decode_block(payload: bytes, own: Callable[[int], str]) -> EventBlock:
     runs, rows = np.empty(m, RUN), np.empty(n, EVENT)
     runs["fence"], runs["first"], runs["count"] = _take_runs(cursor, n, m, flags)
     names, of_runs = [], np.zeros(m, np.int64)
-    if flags & HAS_HULLS:
+    if flags & BlockFlag.HAS_HULLS:
         names = [take_text(cursor) for _ in range(take_unsigned(cursor))]
         of_runs = take(cursor, m)
     if of_runs.min() < 0 or of_runs.max() > len(names):
         raise ValueError(f"a hull is number {of_runs.max()} of {len(names)}")
     runs["hull"], names = _with_own(of_runs, names, [own(number) for number in runs["fence"][of_runs == 0].tolist()])
     runs["kind"], runs["subject_revision"] = take(cursor, m), take(cursor, m)
-    runs["area_revision"] = 0 if flags & NO_AREAS else take(cursor, m)
+    runs["area_revision"] = 0 if flags & BlockFlag.NO_AREAS else take(cursor, m)
     runs["time"] = take(cursor, m)
     marks, rows["causes"], rows["length"] = (take(cursor, n).astype(np.uint8) for _ in range(3))
     keys = bytes(cursor.take(int(rows["length"].sum(dtype=np.int64))))
-    there, before = marks & HAS_POSITION != 0, marks & HAS_PREVIOUS != 0
+    there, before = marks & Mark.HAS_POSITION != 0, marks & Mark.HAS_PREVIOUS != 0
     points, previous = np.full((n, 2), np.nan), np.full((n, 2), np.nan)
-    if flags & DECIMALS:
+    if flags & BlockFlag.DECIMALS:
         points[there], previous[before] = take_decimals(cursor, take, there, before)
     else:
         points[there] = cursor.points(int(there.sum()))
         previous[before] = take_previous(cursor, points[before])
-    rows["type"] = marks & np.uint8(TYPE_BITS)
+    rows["type"] = marks & np.uint8(Mark.TYPE)
     rows["x"], rows["y"] = points.T
     rows["before_x"], rows["before_y"] = previous.T
     rows["distance"] = np.where(there | np.isin(rows["type"], OF_PAIRS), 0.0, np.nan)
-    far = marks & HAS_DISTANCE != 0
+    far = marks & Mark.HAS_DISTANCE != 0
     rows["distance"][far] = np.frombuffer(cursor.take(WORD * int(far.sum())), "<f8")
     rows["event_time"] = rows["first_time"] = NO_TIME
-    if flags & HAS_EVENT_TIMES:
-        timed = marks & HAS_EVENT_TIME != 0
+    if flags & BlockFlag.HAS_EVENT_TIMES:
+        timed = marks & Mark.HAS_EVENT_TIME != 0
         rows["event_time"][timed] = _take_integers(cursor, int(timed.sum()))
-    if flags & HAS_FIRST_TIMES:
+    if flags & BlockFlag.HAS_FIRST_TIMES:
         rows["first_time"] = _take_integers(cursor, n)
     inside = {}
-    for _ in range(take_unsigned(cursor) if flags & HAS_INSIDE else 0):
+    for _ in range(take_unsigned(cursor) if flags & BlockFlag.HAS_INSIDE else 0):
         row = take_unsigned(cursor)
         inside[row] = take_members(cursor)
     origins = {}
-    for _ in range(take_unsigned(cursor) if flags & HAS_ORIGINS else 0):
+    for _ in range(take_unsigned(cursor) if flags & BlockFlag.HAS_ORIGINS else 0):
         row = take_unsigned(cursor)
         origins[row] = Origin(take_text(cursor), take_unsigned(cursor))
     if not cursor.at_end:
@@ -196,7 +186,7 @@ def decode_runs(payload: bytes) -> Runs:
 def _counts(cursor: Cursor) -> tuple[int, int, int]:
     n, m = take_unsigned(cursor), take_unsigned(cursor)
     (flags,) = cursor.take(1)
-    if not 0 < m <= n or (flags & ONE_EACH and m < n):
+    if not 0 < m <= n or (flags & BlockFlag.ONE_EACH and m < n):
         raise ValueError(f"a row has {n} events in {m} runs, and the flags {flags:#x}")
     return n, m, flags
 
@@ -204,7 +194,7 @@ def _counts(cursor: Cursor) -> tuple[int, int, int]:
 def _take_runs(cursor: Cursor, n: int, m: int, flags: int) -> Runs:
     take = _take_one if n == 1 else _take_integers
     fences, firsts = take(cursor, m), take(cursor, m)
-    return Runs(fences, firsts, np.ones(m, np.int64) if flags & ONE_EACH else take(cursor, m))
+    return Runs(fences, firsts, np.ones(m, np.int64) if flags & BlockFlag.ONE_EACH else take(cursor, m))
 
 
 # Columns of integers

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ...state.fences.events.block import RUN, EventBlock
+from ...state.fences.events.format import Mark
 from ...state.records import NO_TIME
 from .columns import point_bytes
 from .event_positions import WORD, decimals_of, put_decimals, put_previous
-from .event_rows import HAS_DISTANCE, HAS_EVENT_TIME, HAS_POSITION, HAS_PREVIOUS
 from .varints import put_signed
 
 Column = npt.NDArray[np.integer[Any]]
@@ -60,7 +60,7 @@ def columns_of(block: EventBlock) -> Columns:
     there, before = ~np.isnan(points[:, 0]), ~np.isnan(previous[:, 0])
     far = ~np.isnan(rows["distance"]) & (rows["distance"] != 0)
     timed = rows["event_time"] != NO_TIME
-    has = HAS_POSITION * there + HAS_PREVIOUS * before + HAS_DISTANCE * far + HAS_EVENT_TIME * timed
+    has = Mark.HAS_POSITION * there + Mark.HAS_PREVIOUS * before + Mark.HAS_DISTANCE * far + Mark.HAS_EVENT_TIME * timed
     positions = bytearray()
     decimals = decimals_of(points[there], previous[before])
     if decimals is None:

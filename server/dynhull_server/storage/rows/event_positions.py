@@ -13,11 +13,10 @@ import numpy.typing as npt
 from dynhull.arrays import Points
 
 from ...state.fences.events.block import Bytes, Integers
+from ...state.fences.events.format import GREATEST, PLACES
 from .columns import Cursor
 
 WORD = 8
-# Multiples of 1e-7 up to this one are integers that a double holds.
-PLACES, GREATEST = 1e7, 2.0**53
 # The numbers from which on an integer needs one byte more.
 LIMITS = np.array([1 << 8 * size for size in range(WORD)], np.uint64)
 

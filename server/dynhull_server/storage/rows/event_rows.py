@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 
 from dynhull.keys import PackedKeys
 
+from ...state.fences.events.format import INTEGER_KEY, STRING_KEY, Mark
 from ...state.fences.model.records import Delay, EventType, FenceEvent, Inside, Key, Members, Position, Subject
 from ...state.records import NO_TIME, Keys
 from .columns import Cursor, key_bytes, time_bytes
@@ -19,12 +20,8 @@ PAIR = struct.Struct(">QQ")
 DISTANCE = struct.Struct("<d")
 INTEGER = struct.Struct("<Q")
 
-# The first byte of an event: its type, and what it has. A distance without bytes of its own is 0.
-TYPE_BITS = 15
 OF_PAIRS = (EventType.BEGIN, EventType.CEASE)  # they have a distance without a position
-HAS_POSITION, HAS_PREVIOUS, HAS_DISTANCE, HAS_EVENT_TIME = 16, 32, 64, 128
-# The third byte, after the causes.
-NO_KEY, STRING_KEY, INTEGER_KEY = 0, 1, 2
+# The third byte, after the causes: beside the kind of the key.
 KEY_BITS = 3
 HAS_FIRST_TIME, HAS_HULL, HAS_INSIDE = 4, 8, 16
 # Of some keys inside: beside their kind, whether their times follow.
@@ -47,16 +44,16 @@ def decode_events(payload: bytes, sequence: int, own: str) -> Iterator[FenceEven
             key = take_text(cursor)
         elif third & KEY_BITS == INTEGER_KEY:
             (key,) = INTEGER.unpack(cursor.take(INTEGER.size))
-        kind = EventType(first & TYPE_BITS)
+        kind = EventType(first & Mark.TYPE)
         position = previous = None
-        distance = 0.0 if first & HAS_POSITION or kind in OF_PAIRS else None
-        if first & HAS_POSITION:
+        distance = 0.0 if first & Mark.HAS_POSITION or kind in OF_PAIRS else None
+        if first & Mark.HAS_POSITION:
             position = POSITION.unpack(cursor.take(POSITION.size))
-        if first & HAS_PREVIOUS:
+        if first & Mark.HAS_PREVIOUS:
             previous = take_differing(cursor, position)
-        if first & HAS_DISTANCE:
+        if first & Mark.HAS_DISTANCE:
             (distance,) = DISTANCE.unpack(cursor.take(DISTANCE.size))
-        event_time = time + take_signed(cursor) if first & HAS_EVENT_TIME else NO_TIME
+        event_time = time + take_signed(cursor) if first & Mark.HAS_EVENT_TIME else NO_TIME
         first_time = time + take_signed(cursor) if third & HAS_FIRST_TIME else NO_TIME
         inside = take_members(cursor) if third & HAS_INSIDE else ()
         yield FenceEvent(

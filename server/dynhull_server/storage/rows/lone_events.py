@@ -5,20 +5,16 @@ Before that, a row with one event had the form of those with many: `event_blocks
 
 from collections.abc import Callable
 
+from ...state.fences.events.format import NEAR, PLACES, LoneFlag, Mark
 from ...state.fences.model.records import Cause, EventType, FenceEvent, Key, Origin, Position
 from ...state.records import NO_TIME
 from .columns import Cursor
-from .event_positions import PLACES, as_decimal
+from .event_positions import as_decimal
 from .event_rows import (
     DISTANCE,
-    HAS_DISTANCE,
-    HAS_EVENT_TIME,
-    HAS_POSITION,
-    HAS_PREVIOUS,
     INTEGER,
     OF_PAIRS,
     POSITION,
-    TYPE_BITS,
     put_differing,
     put_members,
     take_differing,
@@ -28,12 +24,7 @@ from .varints import put_signed, put_text, put_unsigned, take_signed, take_text,
 
 # The first byte, which for many events is their number.
 LONE = b"\0"
-# The second byte: what the event has beside what its mark says, and how it is written. Without causes it is a move.
-HAS_HULL, HAS_AREA, HAS_FIRST_TIME, HAS_CAUSES, HAS_MORE = 1, 2, 4, 8, 16
-DECIMALS, STRING_KEY, INTEGER_KEY = 32, 64, 128
 HAS_INSIDE, HAS_ORIGIN = 1, 2  # a further byte, of few events
-# Microseconds since 1970 at the beginning of 2030: times within nine years of it take seven bytes.
-NEAR = 1_893_456_000_000_000
 
 Decimals = tuple[int, int]
 
@@ -48,13 +39,15 @@ def encode_lone(number: int, event: FenceEvent, *, own: bool) -> bytes:
     """
     here, before = _decimal(event.position), _decimal(event.previous)
     decimals = (here is None) == (event.position is None) and (before is None) == (event.previous is None)
-    flags = HAS_HULL * (not own) | HAS_AREA * (event.area_revision != 0) | DECIMALS * decimals
-    flags |= HAS_FIRST_TIME * (event.first_time != NO_TIME) | HAS_CAUSES * (event.causes != Cause.MOVED)
+    flags = LoneFlag.HAS_HULL * (not own) | LoneFlag.HAS_AREA * (event.area_revision != 0)
+    flags |= LoneFlag.DECIMALS * decimals | LoneFlag.HAS_FIRST_TIME * (event.first_time != NO_TIME)
+    flags |= LoneFlag.HAS_CAUSES * (event.causes != Cause.MOVED)
     more = HAS_INSIDE * bool(event.inside) | HAS_ORIGIN * (event.origin is not None)
-    flags |= HAS_MORE * (more != 0)
-    flags |= STRING_KEY * isinstance(event.key, str) | INTEGER_KEY * isinstance(event.key, int)
-    mark = event.type | HAS_POSITION * (event.position is not None) | HAS_PREVIOUS * (event.previous is not None)
-    mark |= HAS_DISTANCE * bool(event.distance) | HAS_EVENT_TIME * (event.event_time != NO_TIME)
+    flags |= LoneFlag.HAS_MORE * (more != 0)
+    flags |= LoneFlag.STRING_KEY * isinstance(event.key, str) | LoneFlag.INTEGER_KEY * isinstance(event.key, int)
+    mark = event.type | Mark.HAS_POSITION * (event.position is not None)
+    mark |= Mark.HAS_PREVIOUS * (event.previous is not None)
+    mark |= Mark.HAS_DISTANCE * bool(event.distance) | Mark.HAS_EVENT_TIME * (event.event_time != NO_TIME)
     out = bytearray(LONE)
     out.append(flags)
     for count in (number, event.sequence):
@@ -115,36 +108,36 @@ def decode_lone(payload: bytes, own: Callable[[int], str]) -> tuple[int, FenceEv
     _, flags = cursor.take(2)
     number, sequence = take_unsigned(cursor), take_unsigned(cursor)
     (mark,) = cursor.take(1)
-    (causes,) = cursor.take(1) if flags & HAS_CAUSES else (Cause.MOVED.value,)
+    (causes,) = cursor.take(1) if flags & LoneFlag.HAS_CAUSES else (Cause.MOVED.value,)
     revision, time = take_unsigned(cursor), take_signed(cursor) + NEAR
-    area_revision = take_unsigned(cursor) if flags & HAS_AREA else 0
-    hull = take_text(cursor) if flags & HAS_HULL else own(number)
+    area_revision = take_unsigned(cursor) if flags & LoneFlag.HAS_AREA else 0
+    hull = take_text(cursor) if flags & LoneFlag.HAS_HULL else own(number)
     position = previous = None
-    if flags & DECIMALS:
-        here = _take_decimal(cursor) if mark & HAS_POSITION else None
+    if flags & LoneFlag.DECIMALS:
+        here = _take_decimal(cursor) if mark & Mark.HAS_POSITION else None
         position = _position(here)
-        if mark & HAS_PREVIOUS:
+        if mark & Mark.HAS_PREVIOUS:
             x, y = _take_decimal(cursor)
             previous = _position((x + here[0], y + here[1]) if here else (x, y))
     else:
-        if mark & HAS_POSITION:
+        if mark & Mark.HAS_POSITION:
             position = POSITION.unpack(cursor.take(POSITION.size))
-        if mark & HAS_PREVIOUS:
+        if mark & Mark.HAS_PREVIOUS:
             previous = take_differing(cursor, position)
-    kind = EventType(mark & TYPE_BITS)
-    distance = 0.0 if mark & HAS_POSITION or kind in OF_PAIRS else None
-    if mark & HAS_DISTANCE:
+    kind = EventType(mark & Mark.TYPE)
+    distance = 0.0 if mark & Mark.HAS_POSITION or kind in OF_PAIRS else None
+    if mark & Mark.HAS_DISTANCE:
         (distance,) = DISTANCE.unpack(cursor.take(DISTANCE.size))
-    event_time = time + take_signed(cursor) if mark & HAS_EVENT_TIME else NO_TIME
-    first_time = time + take_signed(cursor) if flags & HAS_FIRST_TIME else NO_TIME
-    (more,) = cursor.take(1) if flags & HAS_MORE else (0,)
+    event_time = time + take_signed(cursor) if mark & Mark.HAS_EVENT_TIME else NO_TIME
+    first_time = time + take_signed(cursor) if flags & LoneFlag.HAS_FIRST_TIME else NO_TIME
+    (more,) = cursor.take(1) if flags & LoneFlag.HAS_MORE else (0,)
     inside = take_members(cursor) if more & HAS_INSIDE else ()
     origin = Origin(take_text(cursor), take_unsigned(cursor)) if more & HAS_ORIGIN else None
     rest = cursor.take(len(payload) - cursor.position)
     key: Key | None = None
-    if flags & STRING_KEY:
+    if flags & LoneFlag.STRING_KEY:
         key = str(rest, "utf-8")
-    elif flags & INTEGER_KEY:
+    elif flags & LoneFlag.INTEGER_KEY:
         if len(rest) != INTEGER.size:
             raise ValueError(f"an integer key of {len(rest)} bytes")
         (key,) = INTEGER.unpack(rest)

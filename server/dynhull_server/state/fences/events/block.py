@@ -16,48 +16,18 @@ from dynhull.keys import PackedKeys
 
 from ...records import Keys
 from ..model.records import EventType, FenceEvent, Key, Members, Origin
+from .format import EVENT_FIELDS, INTEGER_BYTES, INTEGER_KEY, NO_KEY, RUN_FIELDS, STRING_KEY
 
 Integers = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
 Records = npt.NDArray[np.void]
 
-# The keys of a run: none, strings, or integers of 8 bytes, little-endian.
-NO_KEY, STRING_KEY, INTEGER_KEY = 0, 1, 2
-INTEGER_BYTES = 8
 INTEGER_LENGTH = bytes([INTEGER_BYTES])
 MANY = 2**62
 TYPES = {kind.value: kind for kind in EventType}
 NOWHERE = math.nan, math.nan
-# `hull`: the place of the name of the subjects' hull; `kind`: whether the events have keys, and which; the revisions
-# and the time: as in `FenceEvent`.
-RUN = np.dtype(
-    [
-        ("fence", np.int64),
-        ("first", np.int64),
-        ("count", np.int64),
-        ("hull", np.int64),
-        ("kind", np.uint8),
-        ("subject_revision", np.int64),
-        ("area_revision", np.int64),
-        ("time", np.int64),
-    ]
-)
-COUNT = 2  # the place of that field
-# `length`: the bytes of the key; the position, that before and the distance are NaN where there is none.
-EVENT = np.dtype(
-    [
-        ("type", np.uint8),
-        ("causes", np.uint8),
-        ("length", np.uint8),
-        ("x", np.float64),
-        ("y", np.float64),
-        ("before_x", np.float64),
-        ("before_y", np.float64),
-        ("distance", np.float64),
-        ("event_time", np.int64),
-        ("first_time", np.int64),
-    ]
-)
+COUNT = 2  # the place of that field of a run
+RUN, EVENT = np.dtype(RUN_FIELDS), np.dtype(EVENT_FIELDS)
 
 
 @dataclass(slots=True, eq=False)
