@@ -172,7 +172,8 @@ class Server:
         if self._settings.journal is not None:
             self._supervisor.every(ENTITLED_SECONDS, "lease", self._look_at_lease)
         if self._settings.scrub_cpu:
-            scrub = Scrub(self._engine, self._machine.clock, self._settings.scrub_cpu, self._compared, self._followed)
+            engine, cpu = self._engine, self._settings.scrub_cpu
+            scrub = Scrub(engine.driver, engine.hulls, engine.fences, cpu, self._compared, self._followed)
             self._supervisor.every(self._settings.scrub_pause, "scrub", partial(self._scrub, scrub))
         log.info("serving", extra={"address": self.address})
 
@@ -185,13 +186,14 @@ class Server:
         if self.address:
             return
         service = HullService(
-            self._engine,
+            self._engine.driver,
+            self._engine.hulls,
             self._metrics,
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )
         fences = FenceService(
-            self._engine,
+            self._engine.fences,
             self._metrics,
             max_corners=self._settings.max_fence_corners,
             max_watch_lag=self._settings.max_watch_lag,
@@ -254,8 +256,10 @@ class Server:
             self._health.set(SERVING if well else NOT_SERVING, "", *SERVICES)
 
     def _serve_metrics(self) -> None:
-        registry = self.registry
-        registry.register(StateCollector(self._engine, self._metrics, self._supervisor, asyncio.get_running_loop()))
+        registry, engine = self.registry, self._engine
+        registry.register(
+            StateCollector(engine.driver, engine.hulls, engine.fences, self._metrics, asyncio.get_running_loop())
+        )
         page = metrics_page(self._settings, registry, self._tokens, self._calls.refused_elsewhere())
         if page is not None:
             self.metrics_url, self._stop_metrics = page.url, page.close

@@ -20,7 +20,7 @@ async def left_when_closed(turns: int) -> list[str]:
         asyncio.timeout(PATIENCE),
         engine_in_memory(divisions=ServedDivisions(Settings(in_memory=True))) as engine,
     ):
-        await engine.create("fleet", HULL)
+        await engine.hulls.create("fleet", HULL)
         writing = asyncio.create_task(insert(engine, "fleet", POINTS))
         for _ in range(turns):
             await asyncio.sleep(0)

@@ -89,14 +89,14 @@ async def put(engine: Engine, key: str, x: float) -> None:
     def batch() -> KeyedBatch:
         return KeyedBatch("str", PackedKeys.pack([key]), np.array([[x, 0.0]]), PackedKeys.pack([]))
 
-    await engine.apply("fleet", WriteBatch(1, batch), create=False)
+    await engine.hulls.apply("fleet", WriteBatch(1, batch), create=False)
 
 
 async def settled(engine: Engine) -> None:
     """Wait until what callers have begun is over, and nobody waits."""
-    while engine.core.busy:
+    while engine.driver.core.busy:
         await asyncio.sleep(0)
-    engine.core.check()
+    engine.driver.core.check()
 
 
 async def watched(engine: Engine, after: int, last: int) -> list[int]:
@@ -139,7 +139,7 @@ class Caller:
 
 async def served(engine: Engine, method: str, request: Any) -> Any:
     """The answer of the service, or what it has sent."""
-    service, caller = FenceService(engine, Metrics(), max_corners=100, max_watch_lag=PATIENCE), Caller()
+    service, caller = FenceService(engine.fences, Metrics(), max_corners=100, max_watch_lag=PATIENCE), Caller()
     answer = await getattr(service, method)(request, caller)
     return caller.sent if answer is None else answer
 
@@ -194,13 +194,13 @@ def test_a_caller_may_leave_wherever_it_waits(tmp_path: Path, name: str) -> None
 async def _life(folder: Path, name: str) -> int:
     left = 0
     async with engine_on(folder) as engine:
-        await engine.create("fleet", HullSettings("str"))
+        await engine.hulls.create("fleet", HullSettings("str"))
         await engine.fences.create("fence", replace(CIRCLE, initial="none"))
         fence = engine.fences.get("fence")
         for at in range(1, SUSPENSIONS):
-            if name.endswith("delete") and "other" not in engine.core.fences:
+            if name.endswith("delete") and "other" not in engine.driver.core.fences:
                 await engine.fences.create("other", CIRCLE)
-            if name.endswith("create") and "other" in engine.core.fences:
+            if name.endswith("create") and "other" in engine.driver.core.fences:
                 await engine.fences.delete("other")
             if name.endswith(("drop consumer", "served get", "served list")):
                 await fence.acknowledge("mail", 0)
@@ -225,7 +225,7 @@ async def _life(folder: Path, name: str) -> int:
             left += 1
         else:
             raise AssertionError("it has more suspensions than were tried")
-        engine.core.check()
+        engine.driver.core.check()
         return left
 
 

@@ -38,8 +38,8 @@ def test_turns_check_no_polygons(monkeypatch: pytest.MonkeyPatch, kind: str) -> 
     wrong = FenceConfig(area(SQUARE, BESIDE), config.kind, subjects)
 
     async def life(engine: Engine) -> None:
-        await engine.create("fleet", HullSettings("str"))
-        await engine.create("ships", HullSettings("str", frame="geographic", center=(3.0, 3.0)))
+        await engine.hulls.create("fleet", HullSettings("str"))
+        await engine.hulls.create("ships", HullSettings("str", frame="geographic", center=(3.0, 3.0)))
         await engine.fences.create("fence", config)
         for change in (engine.fences.create("wrong", wrong), engine.fences.replace("fence", wrong)):
             with pytest.raises(
@@ -70,7 +70,7 @@ def test_checks_whose_callers_have_left_leave_threads_to_others(monkeypatch: pyt
 
     async def run() -> None:
         async with engine_in_memory() as engine:
-            await engine.create("fleet", HullSettings("str"))
+            await engine.hulls.create("fleet", HullSettings("str"))
             config = FenceConfig(area(SQUARE), "hull", "fleet")
             for number in range(5):
                 caller = asyncio.create_task(engine.fences.create(f"fence-{number}", config))
@@ -79,7 +79,7 @@ def test_checks_whose_callers_have_left_leave_threads_to_others(monkeypatch: pyt
                 await turns()
                 caller.cancel()
                 await asyncio.wait([caller])
-            assert await engine.aside(lambda: "read") == "read"
+            assert await engine.driver.aside(lambda: "read") == "read"
             go_on.set()
             with pytest.raises(InvalidFenceError):
                 await engine.fences.create("fence", config)

@@ -39,13 +39,13 @@ def test_nobody_waits_longer_or_less_over_a_restart_an_hour_ago():
         supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
         engine = Engine(LIMITS, storage, supervisor, machine)
         await engine.start(lambda *_: None)
-        if not engine.has("fleet"):
-            await engine.create("fleet", HullSettings("str"))
+        if not engine.hulls.has("fleet"):
+            await engine.hulls.create("fleet", HullSettings("str"))
             for name, config in rules.items():
                 await engine.fences.create(name, dataclasses.replace(config, initial="none"))
         for position in positions:
             made = KeyedBatch("str", PackedKeys.pack(["a"]), np.array([position]), PackedKeys.pack([]), ttl=None)
-            await engine.apply("fleet", WriteBatch(1, lambda made=made: made), create=False)
+            await engine.hulls.apply("fleet", WriteBatch(1, lambda made=made: made), create=False)
         fences = {name: engine.fences.get(name) for name in rules}
         if not positions:
             await fences["delays"].reached(1)

@@ -123,12 +123,12 @@ async def put(engine: Engine, **places: float) -> None:
         points = np.array([[x, 0.0] for x in places.values()])
         return KeyedBatch("str", PackedKeys.pack(places), points, PackedKeys.pack([]))
 
-    await engine.apply("fleet", WriteBatch(1, batch), create=False)
+    await engine.hulls.apply("fleet", WriteBatch(1, batch), create=False)
 
 
 async def life(engine: Engine) -> LiveFence:
     """A fence with keys inside, outside, and on both sides of the margin."""
-    await engine.create("fleet", HullSettings("str"))
+    await engine.hulls.create("fleet", HullSettings("str"))
     fence = await engine.fences.create("fence", CIRCLE)
     await put(engine, inner=1.0, outer=9.0, late=1.0, early=6.0)
     await put(engine, late=6.0)
@@ -143,7 +143,7 @@ def test_a_flipped_side_is_found(key: str, expected: str | None) -> None:
     async def found() -> tuple[FenceFault, ...]:
         async with engine_in_memory() as engine:
             fence = await life(engine)
-            hull = engine.get("fleet")
+            hull = engine.hulls.get("fleet")
             assert (await hull.verify())[1].equal
             index, number = fence.fence.subjects["fleet"].index, fence.fence.number
             inside = set(key_list(index.inside(number))) ^ {key}
@@ -175,13 +175,13 @@ def test_a_flipped_event_is_found(monkeypatch: pytest.MonkeyPatch, change: dict[
     async def found() -> str:
         async with engine_in_memory() as engine:
             fence = await life(engine)
-            assert (await verify_events(fence, engine.aside)).equal
+            assert (await verify_events(fence, engine.driver.aside)).equal
             events, recent = await fence.events(0, 100), RecentEvents(10**6)
             events[1] = events[1]._replace(**change)
             for event in events:
                 recent.add(block_of({fence.fence.number: [event]}), 1)
             monkeypatch.setattr(fence.fence, "_recent", recent)
-            return "\n".join(map(str, (await engine.get("fleet").verify())[1].fence_faults))
+            return "\n".join(map(str, (await engine.hulls.get("fleet").verify())[1].fence_faults))
 
     assert complaint in asyncio.run(found()) + "\n"
 
@@ -190,13 +190,13 @@ def test_later_rounds_read_new_events_and_notice_what_is_missing_between() -> No
     async def found() -> list[str]:
         async with engine_in_memory() as engine:
             fence = await life(engine)
-            first = await verify_events(fence, engine.aside)
+            first = await verify_events(fence, engine.driver.aside)
             await put(engine, inner=9.0, outer=1.0)
-            second = await verify_events(fence, engine.aside, first)
+            second = await verify_events(fence, engine.driver.aside, first)
             assert second.equal
             assert (second.last, second.inside) == (first.last + 2, first.inside)
             wrong = replace(first, inside=first.inside + 1)
-            return list(map(str, (await verify_events(fence, engine.aside, wrong)).faults))
+            return list(map(str, (await verify_events(fence, engine.driver.aside, wrong)).faults))
 
     assert asyncio.run(found()) == ["fence 'fence': expected 3 inside after event 2, and +0 since, found 2 inside"]
 
@@ -206,7 +206,7 @@ def test_a_wrong_count_is_found() -> None:
         async with engine_in_memory() as engine:
             fence = await life(engine)
             fence.fence.inside += 1
-            return (await engine.get("fleet").verify())[1].fence_faults
+            return (await engine.hulls.get("fleet").verify())[1].fence_faults
 
     assert [str(each) for each in asyncio.run(found())] == [
         "fence 'fence': expected 2 subjects inside, found a count of 3"

@@ -21,7 +21,7 @@ def test_recalled_revisions_are_held_a_few_at_a_time(monkeypatch: pytest.MonkeyP
         async with engine_in_memory(history_bytes=0) as engine:
             for x in range(REVISIONS):
                 await insert(engine, "h", np.array([[x, x * x]], float))
-                hull = engine.get("h")
+                hull = engine.hulls.get("h")
                 await hull.vertices()  # which is remembered until the next
 
             async def recall(revision: int) -> None:

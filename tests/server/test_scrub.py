@@ -16,7 +16,6 @@ from dynhull_client import HullClient
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.live_hull import LiveHull
 from dynhull_server.engine.scrub import Scrub
-from dynhull_server.engine.threads import Machine
 from dynhull_server.engine.verification import LARGE, Verification
 from dynhull_server.state.hull_state import HullState
 
@@ -35,7 +34,7 @@ async def rounds(engine: Engine, number: int) -> list[tuple[str, Verification]]:
     def compared(hull: LiveHull, outcome: Verification) -> None:
         seen.append((hull.name, outcome))
 
-    scrub = Scrub(engine, Machine().clock, 1.0, compared, lambda *_: None)
+    scrub = Scrub(engine.driver, engine.hulls, engine.fences, 1.0, compared, lambda *_: None)
     for _ in range(number):
         await scrub.round()
     return seen
@@ -52,7 +51,7 @@ def test_a_wrong_hull_is_found() -> None:
                 state.hull = Liar(state.hull.points())
                 state._vertices_as_of = -1
 
-            await engine.get("wrong").read(lie)
+            await engine.hulls.get("wrong").read(lie)
             outcomes = dict(await rounds(engine, 1))
         assert outcomes["good"].difference is None
         assert outcomes["large"].difference is None

@@ -207,7 +207,7 @@ def test_pages_are_kept_for_a_minute_after_the_last() -> None:
         pages = VertexPages(clock)
         async with engine_in_memory() as engine:
             await insert(engine, "a", parabola(9))
-            hull = engine.get("a")
+            hull = engine.hulls.get("a")
             following = await first_page(pages, hull)
             await insert(engine, "a", np.array([[3.0, 100.0]]))
             for _ in range(3):
@@ -228,7 +228,7 @@ def test_what_is_kept_for_pages_is_bounded() -> None:
         pages, following = VertexPages(Clock()), []
         async with engine_in_memory() as engine:
             await insert(engine, "a", parabola(2**19))
-            hull = engine.get("a")
+            hull = engine.hulls.get("a")
             for row in range(9):  # 8 MiB each
                 following.append(await first_page(pages, hull))
                 await insert(engine, "a", np.array([[1.0, row + 2.0]]))

@@ -261,9 +261,9 @@ def test_a_wall_clock_that_is_set_back_makes_nothing_young_again() -> None:
         supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
         engine = Engine(replace(LIMITS), storage, supervisor, machine)
         await engine.start(lambda *_: None)
-        hull = engine.get("a") if engine.has("a") else await engine.create("a", settings)
+        hull = engine.hulls.get("a") if engine.hulls.has("a") else await engine.hulls.create("a", settings)
         before = hull.counts.clock or 0
-        await engine.apply("a", WriteBatch(1, lambda: decode_batch(batch)), create=False)
+        await engine.hulls.apply("a", WriteBatch(1, lambda: decode_batch(batch)), create=False)
         await hull.reached(hull.counts.revision + 1)  # the expiry
         await supervisor.stop()
         await engine.close()

@@ -279,14 +279,14 @@ class CoreServer:
             raise request.error.with_traceback(None)
         return request.result
 
-    def _birth(self) -> Birth:
+    def birth(self) -> Birth:
         return Birth(self.model.uid(), 0.0)
 
     def time(self) -> int:
         return self._time.now()
 
     async def create(self, name: str, settings: HullSettings) -> str:
-        uid: str = (await self._ask(CreateHull(Answer(), name, self._birth(), settings))).uid
+        uid: str = (await self._ask(CreateHull(Answer(), name, self.birth(), settings))).uid
         return uid
 
     async def delete(self, name: str) -> None:
@@ -305,7 +305,7 @@ class CoreServer:
     async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:  # noqa: ARG002
         write.to, write.name, write.arrived = Answer(), name, self.time()
         if create:
-            write.birth = self._birth()
+            write.birth = self.birth()
         applied: Applied = await self._ask(write)
         return applied
 
@@ -319,7 +319,7 @@ class CoreServer:
     def stream(self, name: str, *, create: bool) -> BatchStream:
         hull = self.core.get(name) if name in self.core.hulls or not create else None
         driver: Any = self
-        return BatchStream(driver, name, hull, lambda: None, self._birth)
+        return BatchStream(driver, name, hull, lambda: None)
 
     async def news(self, stream: BatchStream) -> None:
         await Wait(lambda: stream.applied or stream.refusal is not None)
@@ -348,7 +348,7 @@ class CoreServer:
         return self.core.fence(name)
 
     async def create_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:
-        found: Fence = await self._ask(CreateFence(Answer(), name, self.time(), config, self._birth(), rows=rows))
+        found: Fence = await self._ask(CreateFence(Answer(), name, self.time(), config, self.birth(), rows=rows))
         return found
 
     async def replace_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:

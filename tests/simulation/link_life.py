@@ -63,7 +63,9 @@ class LinkedServer(ShellServer):
     async def _start(self) -> None:
         await super()._start()
         metrics = Metrics()
-        service = HullService(self._engine, metrics, create_on_write=True, max_watch_lag=math.inf)
+        service = HullService(
+            self._engine.driver, self._engine.hulls, metrics, create_on_write=True, max_watch_lag=math.inf
+        )
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
         calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))
         calls.ready()

@@ -42,7 +42,7 @@ class Queries:
     def __init__(self, engine: Engine, model: Model) -> None:
         self._model = model
         metrics = Metrics()
-        self._service = HullService(engine, metrics, create_on_write=False, max_watch_lag=math.inf)
+        self._service = HullService(engine.driver, engine.hulls, metrics, create_on_write=False, max_watch_lag=math.inf)
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
         self._calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))
         self._calls.ready()

@@ -118,34 +118,34 @@ class ShellServer:
     # What clients ask for
 
     def time(self) -> int:
-        return self._engine.time()
+        return self._engine.driver.time()
 
     async def create(self, name: str, settings: HullSettings) -> str:
-        return (await self._engine.create(name, settings)).uid
+        return (await self._engine.hulls.create(name, settings)).uid
 
     async def delete(self, name: str) -> None:
-        await self._engine.delete(name)
+        await self._engine.hulls.delete(name)
 
     async def recenter(self, name: str, center: Center | None, _: int) -> Counts:
-        return (await self._engine.get(name).recenter(center))[0]
+        return (await self._engine.hulls.get(name).recenter(center))[0]
 
     async def delete_at_once(self, name: str, times: int) -> None:
-        await asyncio.gather(*(self._engine.delete(name) for _ in range(times)), return_exceptions=True)
+        await asyncio.gather(*(self._engine.hulls.delete(name) for _ in range(times)), return_exceptions=True)
 
     async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:
         try:
-            if uid and self._engine.has(name):
-                await require_present(self._engine.get(name), write.producer, uid)
-            return await self._engine.apply(name, write, create=create)
+            if uid and self._engine.hulls.has(name):
+                await require_present(self._engine.hulls.get(name), write.producer, uid)
+            return await self._engine.hulls.apply(name, write, create=create)
         except Exception as error:
-            raise gap_explained(error, self._engine, name, uid) from None
+            raise gap_explained(error, self._engine.hulls, name, uid) from None
 
     async def apply_together(self, write: WriteTogether) -> list[Applied]:
-        return await self._engine.apply_together(write)
+        return await self._engine.hulls.apply_together(write)
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
         event = asyncio.Event()
-        stream = self._engine.stream(name, event.set, create=create)
+        stream = self._engine.hulls.stream(name, event.set, create=create)
         self._news[stream] = event
         return stream
 
@@ -156,16 +156,16 @@ class ShellServer:
             await event.wait()
 
     async def vertices(self, name: str, rows: int) -> tuple[str, int, Outline]:
-        hull = self._engine.get(name)
+        hull = self._engine.hulls.get(name)
         counts, seen = await hull.read(outline, rows)
         return hull.uid, counts.revision, seen
 
     async def recall(self, name: str, uid: str, revision: int) -> Points | None:
-        async with self._engine.get(name).recalled(uid, revision) as vertices:
+        async with self._engine.hulls.get(name).recalled(uid, revision) as vertices:
             return vertices
 
     async def last(self, name: str, producer: str) -> int:
-        return await self._engine.get(name).last_sequence(producer)
+        return await self._engine.hulls.get(name).last_sequence(producer)
 
     # What clients ask of fences
 
@@ -221,7 +221,7 @@ class ShellServer:
             client.refused(asked, error, (HullNotFoundError,))
 
     async def _watch(self, client: Client, op: Operation) -> None:
-        hull = self._engine.get(op["name"])
+        hull = self._engine.hulls.get(op["name"])
         view = VerticesView(hull, keys=hull.settings.identity != "multiset")
         async with aclosing(watch(hull, view, progress_interval=1.0)) as events:
             held: tuple[Points, Any] | None = None
@@ -248,7 +248,7 @@ class ShellServer:
         """Let all clients finish."""
         for actor in self._clients:
             self._until(actor.finished, f"the client {actor.client.producer}")
-        self._until(lambda: not self._engine._core.busy, "the core")
+        self._until(lambda: not self._engine.driver.core.busy, "the core")
 
     def waiting(self) -> list[str]:
         """The work that has ended, and should not have."""
@@ -266,8 +266,8 @@ class ShellServer:
 
     def check(self) -> None:
         """Compare what is in memory with the truth, and let background work succeed again."""
-        self._until(lambda: not self._engine._core.busy, "the core")  # points may just be leaving
-        compare(self._engine._core, self.model)
+        self._until(lambda: not self._engine.driver.core.busy, "the core")  # points may just be leaving
+        compare(self._engine.driver.core, self.model)
         # Of a commit that failed the supervisor hears when the next one succeeds.
         self._until(lambda: not set(self._supervisor.failing()) - {"commits", "examination"}, "the background work")
 

@@ -36,4 +36,4 @@ async def engine_in_memory(
 
 async def insert(engine: Engine, name: str, points: np.ndarray) -> None:
     """Insert points, into a new hull where there is none."""
-    await engine.apply(name, WriteBatch(len(points), lambda: Batch(points, NONE, 0, False)), create=True)
+    await engine.hulls.apply(name, WriteBatch(len(points), lambda: Batch(points, NONE, 0, False)), create=True)

@@ -7,7 +7,8 @@ from functools import partial
 from typing import Any
 
 from dynhull_server.engine.division import Division, StoredShard
-from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.driver import Driver
+from dynhull_server.engine.shard_store import ShardStore
 from dynhull_server.settings import Settings
 from dynhull_server.state.errors import HullNotFoundError
 from dynhull_server.state.events import Expire, WriteBatch
@@ -66,7 +67,7 @@ class ServedDivisions:
         self._worker = worker
         self._peers = peers
         self._patience = (0.0 if peers is None else peers.takeover) or AWAY_SECONDS
-        self._engine: Engine | None = None
+        self._driver: Driver | None = None
         self._roots: dict[str, ServedRoot] = {}
         self._shards: dict[tuple[str, Place], LocalShard] = {}
         self._ending: set[asyncio.Task[None]] = set()
@@ -89,21 +90,23 @@ class ServedDivisions:
             return "config.shards", reason
         return None
 
-    async def start(self, engine: Engine, shards: Sequence[HullRow], roots: Sequence[Hull]) -> None:
+    async def start(self, driver: Driver, store: ShardStore, shards: Sequence[HullRow], roots: Sequence[Hull]) -> None:
         """Begin, with the shards and the roots that the storage has."""
-        self._engine = engine
+        self._driver, self._store = driver, store
         for row in shards:
-            self._shards[row.uid, place_of(row.settings)] = LocalShard(engine, row)
+            self._shards[row.uid, place_of(row.settings)] = self._shard(row)
         for hull in roots:
             self.begin(hull)
-        engine.supervisor.every(LOOK_SECONDS, "waiting for shards", self._look)
-        engine.supervisor.every(WANTED_SECONDS, "shards that are not needed", self._drop_unwanted)
+        driver.supervisor.every(LOOK_SECONDS, "waiting for shards", self._look)
+        driver.supervisor.every(WANTED_SECONDS, "shards that are not needed", self._drop_unwanted)
 
     def begin(self, hull: Hull) -> None:
         """Begin with the root of a hull, unless it has begun."""
         if hull.uid not in self._roots:
             greet, deliver = partial(self._greet, hull), partial(self._deliver, hull)
-            root = self._roots[hull.uid] = ServedRoot(self._started, hull, greet, deliver, self._patience)
+            root = self._roots[hull.uid] = ServedRoot(
+                self._started, self._store.epoch, hull, greet, deliver, self._patience
+            )
             if self._closed:  # its creation has just been committed
                 self._end(root)
 
@@ -144,12 +147,12 @@ class ServedDivisions:
             self._started.supervisor.succeeded(SHARDS)
             return answer
         except Exception as error:
-            if self._engine is not None and not isinstance(error, PeerAwayError):
-                self._engine.supervisor.failed(SHARDS, error)
+            if self._driver is not None and not isinstance(error, PeerAwayError):
+                self._driver.supervisor.failed(SHARDS, error)
             raise
 
     async def _answer(self, letter: Any) -> Any:
-        if self._engine is None or self._closed:
+        if self._driver is None or self._closed:
             raise PeerAwayError("this worker is starting or stopping")
         match letter:
             case Greeting():
@@ -162,7 +165,7 @@ class ServedDivisions:
                 return Answer(await known.receive(letter.message))
             case Wanted():
                 wanted = self._has(letter)
-                if not self._engine.entitled():  # another one may have the hull, and the shard is deleted if nobody has
+                if not self._store.entitled():  # another one may have the hull, and the shard is deleted if nobody has
                     raise PeerAwayError("this worker may not own the partition any more")
                 return IsWanted(wanted)
         raise TypeError(f"not a letter: {letter}")
@@ -173,19 +176,18 @@ class ServedDivisions:
         key = greeting.uid, place_of(settings)
         shard = self._shards.get(key)
         if shard is None:
-            engine = self._started
-            name, number = name_of_shard(greeting.name, *key), engine.core.number_of_shard()
+            name, number = name_of_shard(greeting.name, *key), self._started.core.number_of_shard()
             row = HullRow(number, name, greeting.uid, greeting.created, settings)
-            shard = self._shards[key] = LocalShard(engine, row, stored=False)
+            shard = self._shards[key] = self._shard(row, stored=False)
         await shard.store()
         return shard
 
     # What roots and shards ask of each other
 
     @property
-    def _started(self) -> Engine:
-        assert self._engine is not None  # nothing begins before
-        return self._engine
+    def _started(self) -> Driver:
+        assert self._driver is not None  # nothing begins before
+        return self._driver
 
     async def _greet(self, hull: Hull, place: Place) -> int:
         row = hull.row
@@ -199,6 +201,9 @@ class ServedDivisions:
         answer = await self._send(self._worker_of(hull.name, place), Letter(hull.uid, *place, message))
         reply: say.Reply | None = answer.reply
         return reply
+
+    def _shard(self, row: HullRow, *, stored: bool = True) -> LocalShard:
+        return LocalShard(self._started.machine.threads.pool("shard", 1), self._store, row, stored=stored)
 
     def _worker_of(self, name: str, place: Place) -> int:
         return worker_of_shard(name, place.number, self._workers)
@@ -234,9 +239,9 @@ class ServedDivisions:
                 del self._shards[key]
                 await shard.close()
                 try:
-                    await self._started.drop_shard(row.number)
+                    await self._store.drop(row.number)
                 except Exception:  # it is still there, so it has to be asked about again
-                    self._shards[key] = LocalShard(self._started, row)
+                    self._shards[key] = self._shard(row)
                     raise
 
     def _end(self, root: ServedRoot) -> None:

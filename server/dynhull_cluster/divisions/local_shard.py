@@ -4,7 +4,8 @@ import asyncio
 from functools import partial
 from typing import Any
 
-from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.shard_store import ShardStore
+from dynhull_server.engine.threads import Pool
 from dynhull_server.state.contents.live import LiveContents
 from dynhull_server.state.records import HullRow, Kept
 
@@ -17,7 +18,8 @@ class LocalShard:
     """A shard, from its first message until `close`.
 
     Args:
-        engine: has the storage.
+        pool: its thread.
+        store: has the storage.
         row: the row of the shard.
         stored: whether it is certain that the storage has it.
 
@@ -29,13 +31,13 @@ class LocalShard:
         unsaved: the number of points in steps since the last snapshot.
     """
 
-    def __init__(self, engine: Engine, row: HullRow, *, stored: bool = True) -> None:
+    def __init__(self, pool: Pool, store: ShardStore, row: HullRow, *, stored: bool = True) -> None:
         self.row = row
         self.stored = stored
         self.number = row.number
         self.points = self.unsaved = 0
-        self._engine = engine
-        self._pool = engine.machine.threads.pool("shard", 1)
+        self._pool = pool
+        self._store = store
         self._log: StoredShardLog | None = None
         self._shard: Shard | None = None
         self._saved = 0
@@ -45,7 +47,7 @@ class LocalShard:
     async def store(self) -> None:
         """Put it into the storage; again where an earlier attempt has failed, or its caller has gone."""
         if not self.stored:
-            await self._engine.add_shard(self.row)
+            await self._store.add(self.row)
             self.stored = True
 
     async def epoch(self) -> int:
@@ -84,7 +86,7 @@ class LocalShard:
 
     def _loaded(self) -> tuple[StoredShardLog, Shard]:
         if self._log is None or self._shard is None:
-            self._log = StoredShardLog(self._engine, self.row)
+            self._log = StoredShardLog(self._store, self.row)
             self._shard = Shard(self.row.settings, self._log)
         return self._log, self._shard
 

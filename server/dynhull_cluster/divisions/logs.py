@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.driver import Driver
+from dynhull_server.engine.shard_store import ShardStore
 from dynhull_server.engine.waiter import Waiter
 from dynhull_server.state.batch import NO_POINTS
 from dynhull_server.state.events import Follow, ReadHull
@@ -40,7 +41,7 @@ class StoredRootLog:
     """The decisions of a hull: the log of the hull that its readers see.
 
     Args:
-        engine: the hulls.
+        driver: drives the core that has the hull.
         hull: the hull.
         epochs: those of the roots of this process.
         known: the greatest epoch that its shards know of.
@@ -49,8 +50,8 @@ class StoredRootLog:
         due: of each shard, the time by the server's clock before which none of its points leaves.
     """
 
-    def __init__(self, engine: Engine, hull: Hull, epochs: Epochs, known: int) -> None:
-        self._engine = engine
+    def __init__(self, driver: Driver, hull: Hull, epochs: Epochs, known: int) -> None:
+        self._driver = driver
         self._hull = hull
         self._epochs = epochs
         self._epoch = known
@@ -62,7 +63,7 @@ class StoredRootLog:
         if epoch not in (None, self._epoch):
             raise FencedError
         self._epoch = self._epochs.next(self._epoch)
-        _, decided = self._engine.ask_from_thread(ReadHull(Waiter(), self._hull, _decided))
+        _, decided = self._driver.ask_from_thread(ReadHull(Waiter(), self._hull, _decided))
         return self._epoch, decided
 
     def decide(self, epoch: int, decisions: Sequence[Decision]) -> None:
@@ -79,7 +80,7 @@ class StoredRootLog:
     def follow(self, records: list[Record]) -> None:
         """Have the readers see revisions, and the core when points leave next."""
         due = min((each for each in self.due.values() if each is not None), default=None)
-        self._engine.ask_from_thread(Follow(Waiter(), self._hull, records, due))
+        self._driver.ask_from_thread(Follow(Waiter(), self._hull, records, due))
 
     def _records(self, decision: Decision) -> list[Record]:
         effects = list(decision.effects.values())
@@ -122,7 +123,7 @@ class StoredShardLog:
     """The steps of a shard. Made in the thread of the shard.
 
     Args:
-        engine: has the storage.
+        store: has the storage.
         row: the shard.
 
     Attributes:
@@ -132,11 +133,11 @@ class StoredShardLog:
         added: the number of points in steps since the snapshot that it has read.
     """
 
-    def __init__(self, engine: Engine, row: HullRow) -> None:
-        self._engine = engine
+    def __init__(self, store: ShardStore, row: HullRow) -> None:
+        self._store = store
         self._row = row
-        self._keeps = engine.keeps
-        self._kept: Kept | None = engine.read_from_thread(row.number) if self._keeps else Kept()
+        self._keeps = store.keeps
+        self._kept: Kept | None = store.read(row.number) if self._keeps else Kept()
         kept = self._kept
         last = kept.sequences
         self.epoch, self.step = last.get(EPOCHS, 0), last.get(STEPS, 0)
@@ -194,7 +195,7 @@ class StoredShardLog:
 
     def read(self) -> tuple[Kept, int]:
         """All points, and the number of the last step."""
-        kept = self._kept or self._engine.read_from_thread(self._row.number)
+        kept = self._kept or self._store.read(self._row.number)
         self._kept = None
         return kept, self.step
 
@@ -211,7 +212,7 @@ class StoredShardLog:
         if found is None:
             raise DamagedError(f"shard {self._row.settings.shard} of {self._row.name!r} keeps steps that were undone")
         _, revision, step, clock = found
-        cut = self._engine.cut_from_thread(self._row.number, revision) if self._keeps else None
+        cut = self._store.cut(self._row.number, revision) if self._keeps else None
         return [] if cut is None else [cut], revision, step, clock
 
     def _dropped(self, step: int) -> None:
@@ -219,7 +220,7 @@ class StoredShardLog:
 
     def _commit(self, changes: list[Any]) -> None:
         if self._keeps:
-            self._engine.commit_from_thread(changes)
+            self._store.commit(changes)
 
 
 def _decided(state: HullState) -> Decided:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.driver import Driver
 from dynhull_server.engine.waiter import Waiter
 from dynhull_server.state import events
 from dynhull_server.state.errors import (
@@ -63,7 +63,8 @@ class RootThread:
     """A root, one after the other, in a thread. The methods without a result are called from the event loop.
 
     Args:
-        engine: the hulls.
+        driver: drives the core that has the hull.
+        epoch: that of this server as the owner of its storage.
         hull: the hull that its readers see.
         took: called on the event loop after each call in the thread.
 
@@ -72,15 +73,15 @@ class RootThread:
         damage: what is damaged, so that every request is refused; None for nothing.
     """
 
-    def __init__(self, engine: Engine, hull: Hull, took: Callable[[Turn], None]) -> None:
+    def __init__(self, driver: Driver, epoch: int, hull: Hull, took: Callable[[Turn], None]) -> None:
         self.answered: list[Told] = []
         self.damage: Exception | None = None
-        self._engine = engine
+        self._driver = driver
         self._hull = hull
         self._took = took
         self._loop = asyncio.get_running_loop()
-        self._pool = engine.machine.threads.pool("root", 1)
-        self._epochs = Epochs(engine.epoch)
+        self._pool = driver.machine.threads.pool("root", 1)
+        self._epochs = Epochs(epoch)
         self._root: Root | None = None
         self._log: StoredRootLog | None = None
         self._backlog: list[Request] = []
@@ -153,12 +154,12 @@ class RootThread:
         return failure
 
     def _make_root(self, known: int) -> None:
-        self._log = StoredRootLog(self._engine, self._hull, self._epochs, known)
+        self._log = StoredRootLog(self._driver, self._hull, self._epochs, known)
         settings = self._hull.row.settings
         self._opened = False
-        now = self._engine.machine.clock.monotonic()
+        now = self._driver.machine.clock.monotonic()
         as_one = replace(settings, shards=0)  # it admits batches as one hull does
-        self._root = Root(as_one, self._engine.limits, settings.shards, self._log, now)
+        self._root = Root(as_one, self._driver.limits, settings.shards, self._log, now)
         backlog, self._backlog = self._backlog, []
         self._submit(backlog)
 
@@ -188,7 +189,7 @@ class RootThread:
             return
         if not self._opened:
             read = events.ReadHull(Waiter(), self._hull, lambda state: state.hull.points())
-            _, seen = self._engine.ask_from_thread(read)
+            _, seen = self._driver.ask_from_thread(read)
             if not np.array_equal(seen, root.hull.points()):
                 raise ShardsDifferError("the shards have other vertices than those that were decided")
         due = root.due_of_shards()

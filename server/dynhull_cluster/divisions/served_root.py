@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynhull.arrays import Points
 from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
-from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.driver import Driver
 from dynhull_server.engine.verification import Verification, first_difference
 from dynhull_server.engine.waiter import Waiter
 from dynhull_server.state import events
@@ -48,23 +48,24 @@ class ServedRoot:
     """A root, until `close`. It is a Division.
 
     Args:
-        engine: the hulls.
+        driver: drives the core that has the hull.
+        epoch: that of this server as the owner of its storage.
         hull: the hull that its readers see.
         greet: looks for a shard.
         deliver: brings a message to a shard.
         patience: the seconds that requests wait for a shard whose worker cannot be reached.
     """
 
-    def __init__(self, engine: Engine, hull: Hull, greet: Greet, deliver: Deliver, patience: float) -> None:
-        self._engine = engine
+    def __init__(self, driver: Driver, epoch: int, hull: Hull, greet: Greet, deliver: Deliver, patience: float) -> None:
+        self._driver = driver
         self._hull = hull
         self._greet = greet
         self._deliver = deliver
         self._patience = patience
         self._loop = asyncio.get_running_loop()
-        self._clock = engine.machine.clock
+        self._clock = driver.machine.clock
         self._work = f"shards of {hull.name}"
-        self._thread = RootThread(engine, hull, self._took)
+        self._thread = RootThread(driver, epoch, hull, self._took)
         self._waits = False
         self._generations: frozenset[int] | None = None  # those that are needed; None where that is not known
         self._couriers: dict[Place, tuple[say.Request, asyncio.Task[None]]] = {}
@@ -114,7 +115,7 @@ class ServedRoot:
     async def contents(self) -> tuple[Counts, Contents]:
         """All points, in the order of their keys if they have any."""
         counts, (answers, _) = await self._ask(say.AllOf())
-        return counts, await self._engine.aside(partial(joined, answers))
+        return counts, await self._driver.aside(partial(joined, answers))
 
     async def verify(self) -> tuple[Counts, Verification]:
         """Compare the hull with Chan's algorithm on the points of all shards."""
@@ -135,7 +136,7 @@ class ServedRoot:
                 all(each.keys_equal for each in answers),
             )
 
-        return counts, await self._engine.aside(compare)
+        return counts, await self._driver.aside(compare)
 
     async def reshard(self, shards: int) -> Counts:
         """Divide the points among another number of shards."""
@@ -166,7 +167,7 @@ class ServedRoot:
     def look(self) -> None:
         """Refuse what waits for a shard that has been away for long. Called several times a second."""
         if self._thread.damage is not None:
-            self._engine.supervisor.failed(self._work, DamagedError(str(self._thread.damage)))
+            self._driver.supervisor.failed(self._work, DamagedError(str(self._thread.damage)))
         now = self._clock.monotonic()
         for place, since in self._unanswered.items():
             patience = self._patience if place in self._away else SILENT_SECONDS
@@ -198,7 +199,7 @@ class ServedRoot:
             error = await self._begin()
             if error is None or isinstance(error, HullNotFoundError | StoppingError):
                 return
-            self._engine.supervisor.failed(self._work, error)
+            self._driver.supervisor.failed(self._work, error)
             await self._clock.sleep(pause)
             pause = min(2 * pause, LONGEST_PAUSE)
 
@@ -206,7 +207,7 @@ class ServedRoot:
         """Greet the shards, and make a root. Returns what prevents that."""
         try:
             read = events.ReadHull(Waiter(), self._hull, _division)
-            _, division = await self._engine.ask(read)
+            _, division = await self._driver.ask(read)
         except Exception as error:  # the storage may have failed
             return error
         places = [Place(division.generation, number) for number in range(division.shards)]
@@ -227,9 +228,9 @@ class ServedRoot:
         if self._closed:
             return
         if turn.opened:
-            self._engine.supervisor.succeeded(self._work)
+            self._driver.supervisor.succeeded(self._work)
         if turn.failure is not None and self._starting.done():
-            self._engine.supervisor.failed(self._work, turn.failure)
+            self._driver.supervisor.failed(self._work, turn.failure)
             self._starting = self._loop.create_task(self._start(FIRST_PAUSE))
         if turn.messages is None:  # there is no root, and shards are greeted
             return
@@ -265,7 +266,7 @@ class ServedRoot:
                 self._away.add(place)
                 await self._clock.sleep(AGAIN_SECONDS)
             except Exception as error:  # it has failed, and the next message finds another one
-                self._engine.supervisor.failed(self._work, error)
+                self._driver.supervisor.failed(self._work, error)
                 self._away.add(place)
                 await self._clock.sleep(FIRST_PAUSE)
             else:

@@ -4,12 +4,12 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..state.events import Arrived, Birth, Gone, Request, Stream, WriteBatch
+from ..state.events import Arrived, Gone, Request, Stream, WriteBatch
 from ..state.hull import Hull
 
 if TYPE_CHECKING:
     from ..state.batch import Applied
-    from .engine import Engine
+    from .driver import Driver
 
 
 class BatchStream:
@@ -24,33 +24,30 @@ class BatchStream:
         rows: the number of points in them.
     """
 
-    def __init__(
-        self, engine: "Engine", name: str, hull: Hull | None, notify: Callable[[], None], birth: Callable[[], Birth]
-    ) -> None:
+    def __init__(self, driver: "Driver", name: str, hull: Hull | None, notify: Callable[[], None]) -> None:
         self.applied: deque[tuple[int, Applied]] = deque()
         self.refusal: Exception | None = None
         self.batches = 0
         self.rows = 0
-        self._engine = engine
+        self._driver = driver
         self._stream = Stream(name, hull)
-        self._birth = birth
         self._notify = notify
 
     def write(self, requests: Sequence[WriteBatch]) -> None:
         """Send batches that have arrived together."""
         stream = self._stream
         hull, name = stream.hull, stream.name
-        birth = self._birth() if hull is None else None
-        arrived = self._engine.time() if hull is None or hull.timed else 0
+        birth = self._driver.birth() if hull is None else None
+        arrived = self._driver.time() if hull is None or hull.timed else 0
         for request in requests:
             self.rows += request.rows
             request.to, request.name, request.stream = self, name, stream
             request.birth, request.arrived = birth, arrived
         self.batches += len(requests)
         if len(requests) == 1:
-            self._engine.dispatch(requests[0])
+            self._driver.dispatch(requests[0])
         elif requests:
-            self._engine.dispatch(Arrived(list(requests)))
+            self._driver.dispatch(Arrived(list(requests)))
 
     def answer(self, request: Request) -> None:
         """Take the answer to a batch."""
@@ -65,4 +62,4 @@ class BatchStream:
 
     def close(self) -> None:
         """Stop the stream: batches that have not begun are not applied."""
-        self._engine.dispatch(Gone(self._stream))
+        self._driver.dispatch(Gone(self._stream))

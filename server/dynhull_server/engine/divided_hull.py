@@ -1,6 +1,6 @@
 """A hull over shards as its callers use it: what needs all points, its shards answer."""
 
-from typing import TYPE_CHECKING
+import asyncio
 
 import numpy as np
 import numpy.typing as npt
@@ -12,13 +12,12 @@ from ..state.hull import Hull
 from ..state.hull_state import Counts
 from ..state.records import QuarantineRules
 from .division import Division
+from .driver import Driver
+from .fences import Fences
 from .layers import Layers, Peeling
 from .live_hull import LiveHull
 from .recalls import Recalls
 from .verification import Verification
-
-if TYPE_CHECKING:
-    from .engine import Engine
 
 NO_LAYERS = "is divided among shards, and only its outermost layer is known"
 
@@ -44,10 +43,18 @@ class DividedHull(LiveHull):
         division: the shards.
     """
 
-    def __init__(self, engine: "Engine", hull: Hull, recalls: Recalls, division: Division) -> None:
-        super().__init__(engine, hull, recalls)
+    def __init__(
+        self,
+        driver: Driver,
+        hull: Hull,
+        recalls: Recalls,
+        fences: Fences,
+        copies: asyncio.Semaphore,
+        division: Division,
+    ) -> None:
+        super().__init__(driver, hull, recalls, fences, copies)
         self.division = division
-        self.peeling = NoLayers(self, engine.aside, engine.copies)
+        self.peeling = NoLayers(self, driver.aside, copies)
 
     @property
     def size(self) -> int:

@@ -15,7 +15,8 @@ from ..state.hull_state import Counts
 from ..state.records import Contents, HullRow, HullSettings, Kept, Keys
 
 if TYPE_CHECKING:
-    from .engine import Engine
+    from .driver import Driver
+    from .shard_store import ShardStore
     from .verification import Verification
 
 
@@ -73,7 +74,9 @@ class Divisions(Protocol):
     def why_not(self, settings: HullSettings) -> tuple[str, str] | None:
         """The field for which no hull with these settings can be divided, and the reason; None if it can be."""
 
-    async def start(self, engine: "Engine", shards: Sequence[HullRow], roots: Sequence[Hull]) -> None:
+    async def start(
+        self, driver: "Driver", store: "ShardStore", shards: Sequence[HullRow], roots: Sequence[Hull]
+    ) -> None:
         """Begin, with the shards and the roots that the storage has."""
 
     def begin(self, hull: Hull) -> None:

@@ -3,21 +3,17 @@
 from collections.abc import Iterator
 from functools import partial
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..state.errors import FenceNotFoundError
 from ..state.fences.model.fence import Fence
 from ..state.fences.model.tallies import Column
-from ..state.limits import FenceLimits
 from ..storage.port import Storage
-from .fences import LiveFence
+from .driver import Driver
+from .fences import Fences, LiveFence
 from .server_time import MICROSECONDS
-from .threads import Clock
-
-if TYPE_CHECKING:
-    from .engine import Engine
 
 # Events since it was last stored who is inside, at least, before it is stored again: a start reads them.
 LEAST_EVENTS = 4096
@@ -45,29 +41,29 @@ class FenceKeeping:
     """The work, called periodically by the supervisor.
 
     Args:
-        engine: the fences.
+        driver: drives the core that has the fences, and knows how many events are kept, and for how long.
+        fences: the fences.
         storage: keeps their events.
-        clock: the time.
-        limits: how many events are kept, and for how long.
     """
 
     SECONDS = 1.0
 
-    def __init__(self, engine: "Engine", storage: Storage, clock: Clock, limits: FenceLimits) -> None:
-        self._engine = engine
+    def __init__(self, driver: Driver, fences: Fences, storage: Storage) -> None:
+        self._driver = driver
+        self._fences = fences
         self._storage = storage
-        self._clock = clock
-        self._limits = limits
+        self._clock = driver.machine.clock
+        self._limits = driver.limits.fences
         self._plans: dict[int, _Plan] = {}
         self._due: list[tuple[int, int]] = []  # a heap of times and numbers; outdated where the plan has another time
-        engine.fences.stirred.update(dict.fromkeys(engine.core.fences.values()))
+        fences.stirred.update(dict.fromkeys(driver.core.fences.values()))
 
     async def round(self) -> None:
         """Look at the fences that have changed since the last round, and at those whose oldest events are too old."""
-        fences = self._engine.fences
+        fences = self._fences
         stirred, fences.stirred = fences.stirred, {}
         stirred |= dict.fromkeys(self._crossed())
-        now = self._engine.time()
+        now = self._driver.time()
         while self._due and self._due[0][0] <= now:
             due, number = heappop(self._due)
             plan = self._plans.get(number)
@@ -92,7 +88,7 @@ class FenceKeeping:
 
     def _crossed(self) -> Iterator[Fence]:
         """The fences that subjects have crossed, but those with which there is nothing to do: nearly all, as a rule."""
-        tallies, limits = self._engine.core.tallies, self._limits
+        tallies, limits = self._driver.core.tallies, self._limits
         columns = tallies.columns
         stirred = tallies.stirred()
         if not limits.max_fence_event_age:
@@ -125,18 +121,18 @@ class FenceKeeping:
         config = fence.row.config
         first = await self._first(fence)
         if fence.row.config is not config:  # replaced meanwhile: the next round looks by the limits of now
-            self._engine.fences.stirred[fence] = None
+            self._fences.stirred[fence] = None
             return
         stored = fence.last - fence.unsaved
         if fence.unsaved >= max(LEAST_EVENTS, fence.inside) or (first > stored + 1 and fence.unsaved):
-            await self._store(self._engine.fences.live(fence))
+            await self._store(self._fences.live(fence))
         if first > fence.first and not fence.ended:
             try:
                 boundary = self._storage.boundary(fence.number, first)
             except KeyError:  # its deletion is committed, and about to be published
                 return
             if boundary > fence.first:
-                await self._engine.fences.live(fence).drop_events(boundary)
+                await self._fences.live(fence).drop_events(boundary)
 
     async def _first(self, fence: Fence) -> int:
         """The sequence of the oldest event that the limits let stay."""
@@ -145,9 +141,9 @@ class FenceKeeping:
         plan = self._plans.get(fence.number)
         if not age or (plan is not None and plan.age == age):
             return first
-        oldest = self._engine.time() - age
+        oldest = self._driver.time() - age
         while first <= fence.last:
-            events = await self._engine.fences.live(fence).events(first - 1, LOOKED_AT)
+            events = await self._fences.live(fence).events(first - 1, LOOKED_AT)
             if not events:
                 break
             young = next((event for event in events if event.time >= oldest), None)
@@ -161,6 +157,6 @@ class FenceKeeping:
     async def _store(self, live: LiveFence) -> None:
         inside = await live.waiting()
         steps = self._storage.inside(live.fence.number, inside)
-        while (step := await self._engine.run(self._engine.disk, partial(next, steps, None))) is not None:
-            await self._engine.commit([step])
+        while (step := await self._driver.on_disk(partial(next, steps, None))) is not None:
+            await self._driver.commit([step])
         live.fence.unsaved = max(live.fence.last - inside.sequence, 0)

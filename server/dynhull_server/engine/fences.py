@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,10 +26,8 @@ from ..state.fences.model.requests import (
 )
 from ..state.fences.trip.leg import members
 from ..storage.port import Storage, StorageError
+from .driver import Driver
 from .waiter import Waiter
-
-if TYPE_CHECKING:
-    from .engine import Engine
 
 T = TypeVar("T")
 # The checks of polygons at one time. Invalid ones may take long, and large reads have the same threads.
@@ -43,9 +41,10 @@ class LiveFence:
         fence: its committed state.
     """
 
-    def __init__(self, engine: "Engine", storage: Storage, fence: Fence) -> None:
+    def __init__(self, driver: Driver, storage: Storage, watched: "dict[int, LiveFence]", fence: Fence) -> None:
         self.fence = fence
-        self._engine = engine
+        self._driver = driver
+        self._watched = watched
         self._storage = storage
         self._moved: asyncio.Event | None = None
 
@@ -76,17 +75,17 @@ class LiveFence:
 
     async def acknowledge(self, consumer: str, sequence: int | None, uid: str = "") -> Consumer:
         """Acknowledge events for a consumer, which is created if it is new."""
-        request = PutConsumer(Waiter(), self.name, self._engine.time(), consumer, sequence, uid)
-        found: Consumer = await self._engine.ask(request)
+        request = PutConsumer(Waiter(), self.name, self._driver.time(), consumer, sequence, uid)
+        found: Consumer = await self._driver.ask(request)
         return found
 
     async def drop_consumer(self, consumer: str) -> None:
         """Delete a consumer."""
-        await self._engine.ask(DropConsumer(Waiter(), self.name, self._engine.time(), consumer))
+        await self._driver.ask(DropConsumer(Waiter(), self.name, self._driver.time(), consumer))
 
     async def drop_events(self, first: int) -> None:
         """Drop the events before `first`."""
-        await self._engine.ask(DropEvents(Waiter(), self.name, self._engine.time(), self.fence, first))
+        await self._driver.ask(DropEvents(Waiter(), self.name, self._driver.time(), self.fence, first))
 
     async def events(self, after: int, most: int) -> list[FenceEvent]:
         """At most that many events after a sequence, from the oldest one that is kept.
@@ -99,7 +98,7 @@ class LiveFence:
             return found
         try:
             read = partial(self._storage.read_events, self.fence.number, after, most)
-            events: list[FenceEvent] = await self._engine.run(self._engine.disk, read)
+            events: list[FenceEvent] = await self._driver.on_disk(read)
         except KeyError:  # deleted meanwhile: what is left of it is in memory
             return self.fence.events(self.fence.oldest_recent - 1, most) or []
         except (StorageError, OSError, MemoryError) as error:
@@ -111,13 +110,13 @@ class LiveFence:
         while not self.fence.ended and self.fence.last < sequence:
             if self._moved is None:
                 self._moved = asyncio.Event()
-                self._engine.fences.watched[self.fence.number] = self
+                self._watched[self.fence.number] = self
             await self._moved.wait()
 
     def moved(self) -> None:
         """Wake the waiting callers."""
         if self._moved is not None:
-            del self._engine.fences.watched[self.fence.number]
+            del self._watched[self.fence.number]
             self._moved.set()
             self._moved = None
 
@@ -128,7 +127,7 @@ class LiveFence:
             function: the function.
             rows: the number of subjects that it reads, about.
         """
-        found: T = await self._engine.ask(ReadFence(Waiter(), self.name, self._engine.time(), function, rows=rows))
+        found: T = await self._driver.ask(ReadFence(Waiter(), self.name, self._driver.time(), function, rows=rows))
         return found
 
 
@@ -136,7 +135,7 @@ class Fences:
     """The fences of an engine.
 
     Args:
-        engine: the engine.
+        driver: drives the core that has them.
         storage: keeps their events.
 
     Attributes:
@@ -146,8 +145,8 @@ class Fences:
         watched: those whose next event somebody waits for, by number.
     """
 
-    def __init__(self, engine: "Engine", storage: Storage) -> None:
-        self._engine = engine
+    def __init__(self, driver: Driver, storage: Storage) -> None:
+        self._driver = driver
         self._storage = storage
         self._live: dict[Fence, LiveFence] = {}
         self._checks = asyncio.Semaphore(MOST_CHECKS)
@@ -156,15 +155,15 @@ class Fences:
         self.watched: dict[int, LiveFence] = {}
 
     def __len__(self) -> int:
-        return len(self._engine.core.fences)
+        return len(self._driver.core.fences)
 
     def all(self) -> list[LiveFence]:
         """All fences, by name."""
-        return [self.live(fence) for fence in list(self._engine.core.fences.values())]
+        return [self.live(fence) for fence in list(self._driver.core.fences.values())]
 
     def get(self, name: str) -> LiveFence:
         """The fence of that name, or raise FenceNotFoundError."""
-        return self.live(self._engine.core.fence(name))
+        return self.live(self._driver.core.fence(name))
 
     def page(self, prefixes: Sequence[str], after: str, size: int) -> tuple[list[LiveFence], bool]:
         """At most `size` fences whose names follow `after`, and whether there are more.
@@ -173,7 +172,7 @@ class Fences:
         """
         fences: list[LiveFence] = []
         for prefix in prefixes:
-            for name in self._engine.core.fences.irange(minimum=max(prefix, after)):
+            for name in self._driver.core.fences.irange(minimum=max(prefix, after)):
                 if not name.startswith(prefix):
                     break
                 if name == after:
@@ -185,23 +184,23 @@ class Fences:
 
     async def create(self, name: str, config: FenceConfig) -> LiveFence:
         """Create a fence, or raise the error that refuses it."""
-        engine = self._engine
+        driver = self._driver
         checked = await self._checked(config)
-        request = CreateFence(Waiter(), name, engine.time(), config, engine.birth(), checked, rows=self._rows(config))
-        return self.live(await engine.ask(request))
+        request = CreateFence(Waiter(), name, driver.time(), config, driver.birth(), checked, rows=self._rows(config))
+        return self.live(await driver.ask(request))
 
     async def replace(self, name: str, config: FenceConfig) -> LiveFence:
         """Replace the area and the settings of a fence, or raise the error that refuses it."""
         checked = await self._checked(config)
-        request = ReplaceFence(Waiter(), name, self._engine.time(), config, checked, rows=self._rows(config))
-        return self.live(await self._engine.ask(request))
+        request = ReplaceFence(Waiter(), name, self._driver.time(), config, checked, rows=self._rows(config))
+        return self.live(await self._driver.ask(request))
 
     async def delete(self, name: str) -> None:
         """Delete a fence, or raise FenceNotFoundError or NotStoredError."""
-        fence = self._engine.core.fences.get(name)
+        fence = self._driver.core.fences.get(name)
         if fence is None:
             raise FenceNotFoundError(name)
-        await self._engine.ask(DeleteFence(Waiter(), name, self._engine.time(), rows=fence.inside))
+        await self._driver.ask(DeleteFence(Waiter(), name, self._driver.time(), rows=fence.inside))
 
     def stir(self, fences: Sequence[Fence], events: EventBlock | None) -> None:
         """Count new events, and wake those who watch their fences.
@@ -233,11 +232,11 @@ class Fences:
         if not isinstance(area, PolygonArea):
             return None
         try:
-            center = None if config.kind == "prefix" else self._engine.core.get(config.subjects).state.center
+            center = None if config.kind == "prefix" else self._driver.core.get(config.subjects).state.center
         except HullNotFoundError:
             center = None
         await self._checks.acquire()
-        checking = asyncio.ensure_future(self._engine.aside(partial(check_polygons, area, center)))
+        checking = asyncio.ensure_future(self._driver.aside(partial(check_polygons, area, center)))
         checking.add_done_callback(lambda _: self._checks.release())
         # A caller who leaves does not end it, nor free its thread.
         checked: CheckedArea = await asyncio.shield(checking)
@@ -246,7 +245,7 @@ class Fences:
     def _rows(self, config: FenceConfig) -> int:
         """The number of subjects, about."""
         try:
-            return self._engine.get(config.subjects).counts.points
+            return self._driver.core.get(config.subjects).counts.points
         except HullNotFoundError:
             return 0
 
@@ -254,7 +253,7 @@ class Fences:
         """The fence as its callers use it."""
         live = self._live.get(fence)
         if live is None:
-            live = LiveFence(self._engine, self._storage, fence)
+            live = LiveFence(self._driver, self._storage, self.watched, fence)
             if not fence.ended:
                 self._live[fence] = live
         return live

@@ -2,16 +2,14 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..state.errors import HullNotFoundError
 from ..storage.port import Storage
-from .threads import Clock
-
-if TYPE_CHECKING:
-    from .division import StoredShard
-    from .engine import Engine
-    from .live_hull import LiveHull
+from .division import Divisions, StoredShard
+from .driver import Driver
+from .hulls import Hulls
+from .live_hull import LiveHull
 
 # Batches have priority on the disk: each step of a snapshot or sweep is followed by a pause of this many times its
 # duration.
@@ -25,18 +23,20 @@ class Housekeeping:
     SNAPSHOT_SECONDS = 1.0
     SWEEP_SECONDS = 5.0
 
-    def __init__(self, engine: "Engine", storage: Storage, clock: Clock) -> None:
-        self._engine = engine
+    def __init__(self, driver: Driver, hulls: Hulls, storage: Storage, divisions: Divisions | None) -> None:
+        self._driver = driver
+        self._hulls = hulls
         self._storage = storage
-        self._clock = clock
+        self._divisions = divisions
+        self._clock = driver.machine.clock
 
     async def checkpoint(self) -> None:
         """Checkpoint the storage."""
-        await self._engine.run(self._engine.disk, self._storage.checkpoint)
+        await self._driver.on_disk(self._storage.checkpoint)
 
     async def sync(self) -> None:
         """Make the commits so far durable."""
-        await self._engine.run(self._engine.disk, self._storage.sync)
+        await self._driver.on_disk(self._storage.sync)
 
     async def sweep(self) -> None:
         """Remove the data of deleted hulls."""
@@ -49,7 +49,7 @@ class Housekeeping:
         at least `least_points`.
         """
         failure: Exception | None = None
-        for hull in self._engine:
+        for hull in self._hulls:
             if hull.unsaved < max(least_points, hull.size):
                 continue
             try:
@@ -58,7 +58,7 @@ class Housekeeping:
                 continue
             except Exception as error:  # go on with the other hulls
                 failure = failure or error
-        for shard in () if self._engine.divisions is None else self._engine.divisions.shards():
+        for shard in () if self._divisions is None else self._divisions.shards():
             if shard.unsaved < max(least_points, shard.points):
                 continue
             try:
@@ -68,13 +68,13 @@ class Housekeeping:
         if failure is not None:
             raise failure
 
-    async def _snapshot(self, hull: "LiveHull") -> None:
+    async def _snapshot(self, hull: LiveHull) -> None:
         unsaved = hull.unsaved
         _, kept = await hull.read(lambda state: state.kept(), rows=hull.counts.points)
         await self._carry_out(self._storage.snapshot(hull.number, kept))
         hull.saved(unsaved)
 
-    async def _snapshot_of_shard(self, shard: "StoredShard") -> None:
+    async def _snapshot_of_shard(self, shard: StoredShard) -> None:
         taken = shard.take()
         if taken is not None:
             kept, unsaved = taken
@@ -84,8 +84,8 @@ class Housekeeping:
     async def _carry_out(self, steps: Iterator[Any]) -> None:
         while True:
             begun = self._clock.monotonic()
-            step = await self._engine.run(self._engine.disk, partial(next, steps, None))
+            step = await self._driver.on_disk(partial(next, steps, None))
             if step is None:
                 return
-            await self._engine.commit([step])
+            await self._driver.commit([step])
             await self._clock.sleep(PAUSE_FACTOR * (self._clock.monotonic() - begun))

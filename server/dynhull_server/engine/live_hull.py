@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from dynhull import DynamicHull, globe
 from dynhull.arrays import Checked, Points
 from dynhull.keys import PackedKeys
 
-from ..state.batch import NO_POINTS, KeyedBatch
+from ..state.batch import NO_POINTS, Applied, KeyedBatch
 from ..state.contents.keyed import KINDS
 from ..state.core import SMALL
 from ..state.errors import (
@@ -35,15 +35,14 @@ from ..state.outline import GlobeOutline, Outline
 from ..state.records import Center, Committed, Contents, HullSettings, Keys, QuarantineRules
 from ..state.sample import sample
 from .difference import Differences
+from .driver import Driver
 from .fence_verification import MOST_FAULTS, verify_events, verify_sides
+from .fences import Fences
 from .layers import Peeling
 from .recalls import Recalls
 from .steps import BLOCK, FEW_ROWS, at_once, in_blocks
 from .verification import Verification, verify
 from .waiter import Waiter
-
-if TYPE_CHECKING:
-    from .engine import Engine
 
 T = TypeVar("T")
 
@@ -56,15 +55,23 @@ class LiveHull:
 
     Batches and reads run one at a time in order of arrival, so every read sees exactly one, committed revision.
 
+    Args:
+        driver: drives the core that has it.
+        hull: its committed state.
+        recalls: reads earlier revisions.
+        fences: the fences that compare it.
+        copies: limits the copies of hulls that large reads make.
+
     Attributes:
         differences: the differences between its vertices at successive reads.
         peeling: its convex layers.
     """
 
-    def __init__(self, engine: "Engine", hull: Hull, recalls: Recalls) -> None:
-        self.differences = Differences(engine.aside)
-        self.peeling = Peeling(self, engine.aside, engine.copies)
-        self._engine = engine
+    def __init__(self, driver: Driver, hull: Hull, recalls: Recalls, fences: Fences, copies: asyncio.Semaphore) -> None:
+        self.differences = Differences(driver.aside)
+        self.peeling = Peeling(self, driver.aside, copies)
+        self._driver = driver
+        self._fences = fences
         self._hull = hull
         self._recalls = recalls
         self._moved: asyncio.Event | None = None
@@ -175,9 +182,9 @@ class LiveHull:
         while True:
             if self._hull.counts.revision < min_revision:
                 await self.reached(min_revision)
-            if rows <= SMALL and self._engine.idle(self._hull):
+            if rows <= SMALL and self._driver.idle(self._hull):
                 return self._hull.counts, function(self._hull.state)
-            counts, result = await self._engine.ask(ReadHull(Waiter(), self._hull, function, rows=rows))
+            counts, result = await self._driver.ask(ReadHull(Waiter(), self._hull, function, rows=rows))
             if counts.revision >= min_revision:
                 return counts, result
 
@@ -202,7 +209,7 @@ class LiveHull:
             await self.reached(min_revision)
             await other.reached(other_min_revision)
             request = ReadTogether(Waiter(), parts, lambda states: function(*states), rows=rows)
-            (counts, other_counts), result = await self._engine.ask(request)
+            (counts, other_counts), result = await self._driver.ask(request)
             if counts.revision >= min_revision and other_counts.revision >= other_min_revision:
                 return counts, other_counts, result
 
@@ -250,7 +257,7 @@ class LiveHull:
             return await self.read(lambda state: question(state.outline(), slice(0, rows)), rows, min_revision)
         counts, vertices = await self.vertices(min_revision, layer)
         if check is not None and counts.center is not None:
-            await (at_once if rows <= FEW_ROWS else self._engine.aside)(partial(check, counts.center))
+            await (at_once if rows <= FEW_ROWS else self._driver.aside)(partial(check, counts.center))
         return counts, await self.ask_vertices(counts, vertices, question, rows)
 
     async def ask_vertices(
@@ -259,7 +266,7 @@ class LiveHull:
         """Answer such a query for these vertices of the hull, outside of the trips."""
         outline = await self.outline(counts, vertices)
         block = MEASURED_BLOCK if self.geographic else BLOCK
-        run = at_once if rows <= FEW_ROWS and len(vertices) <= FEW_ROWS else self._engine.aside
+        run = at_once if rows <= FEW_ROWS and len(vertices) <= FEW_ROWS else self._driver.aside
         answers: T = await in_blocks(run, partial(question, outline), rows, block)
         return answers
 
@@ -271,7 +278,7 @@ class LiveHull:
             outline = await self.outline(counts, vertices)
             assert isinstance(outline, DynamicHull)  # of the plane
             work = partial(outline.sketch, most)
-        found: tuple[Points, float] = await self._engine.aside(work)
+        found: tuple[Points, float] = await self._driver.aside(work)
         return found
 
     async def count(self, xy: Checked, min_revision: int = 0) -> tuple[Counts, npt.NDArray[np.int64]]:
@@ -279,8 +286,8 @@ class LiveHull:
         if len(xy) <= BLOCK:
             return await self.read(lambda state: state.hull.count_many(xy), len(xy), min_revision)
         counts, stored = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
-        hull: DynamicHull = await self._engine.aside(partial(DynamicHull, stored))
-        return counts, await in_blocks(self._engine.aside, lambda rows: hull.count_many(xy[rows]), len(xy))
+        hull: DynamicHull = await self._driver.aside(partial(DynamicHull, stored))
+        return counts, await in_blocks(self._driver.aside, lambda rows: hull.count_many(xy[rows]), len(xy))
 
     async def support(self, directions: Checked, min_revision: int = 0, layer: int = 1) -> tuple[Counts, Points]:
         """The extreme vertices, or raise HullEmptyError."""
@@ -304,7 +311,7 @@ class LiveHull:
             prefixes: only fences whose names begin with one of these are compared.
             events: whether to compare the events of these fences, too.
         """
-        run = self._engine.aside
+        run = self._driver.aside
 
         def copied(state: HullState) -> tuple[Points, Points, Contents | None, bool, Sides | None]:
             held = state.quarantine
@@ -321,14 +328,14 @@ class LiveHull:
         found = [await verify_sides(sides, run)]
         for fence in self.fences(prefixes) if events else ():
             with suppress(FenceNotFoundError):
-                found.append(await verify_events(self._engine.fences.live(fence), run))
+                found.append(await verify_events(self._fences.live(fence), run))
         faults = tuple(fault for each in found for fault in each.faults)[:MOST_FAULTS]
         seconds = outcome.seconds + sum(each.seconds for each in found)
         return counts, replace(outcome, fences=len(sides), fence_faults=faults, seconds=seconds)
 
     def fences(self, prefixes: tuple[str, ...] = ("",)) -> list[Fence]:
         """The fences that compare its keys, or it as a whole, and whose names begin with one of the prefixes."""
-        line = self._engine.core.line(self.name)
+        line = self._driver.core.line(self.name)
         return [] if line is None else [each for each in line.comparing(self.name) if each.name.startswith(prefixes)]
 
     def _sides(self, prefixes: tuple[str, ...]) -> Sides | None:
@@ -341,7 +348,7 @@ class LiveHull:
         counts, points = await self.read(lambda state: state.hull.points(), self.counts.points, min_revision)
         if len(points) <= size:
             return counts, points
-        return counts, await self._engine.aside(partial(sample, points, size))
+        return counts, await self._driver.aside(partial(sample, points, size))
 
     async def last_sequence(self, producer: str) -> int:
         """The last sequence number applied of a producer, 0 where there is none."""
@@ -357,7 +364,7 @@ class LiveHull:
             HullUnsuitableError: the hull is a plane, or cannot have this centre.
             NotStoredError: the storage has failed.
         """
-        result: tuple[Counts, bool] = await self._engine.ask(
+        result: tuple[Counts, bool] = await self._driver.ask(
             Recenter(Waiter(), self.name, center, rows=self.counts.points)
         )
         return result
@@ -385,7 +392,9 @@ class LiveHull:
         kind, none = self.settings.identity, self.keys(None)
         assert kind != "multiset"  # it has keys
         batch = KeyedBatch(kind, none, NO_POINTS, none, rules=rules)
-        applied = await self._engine.apply(self.name, WriteBatch(0, lambda: batch), create=False)
+        write = WriteBatch(0, lambda: batch)
+        write.to, write.name, write.arrived = Waiter(), self.name, self._driver.time()
+        applied: Applied = await self._driver.ask(write)
         counts, _ = await self.read(lambda _: None, min_revision=applied.revision)
         return counts
 
@@ -461,7 +470,7 @@ class LiveHull:
         if held is not None and held[0] is vertices and held[1] == center:
             return held[2]
         make = partial(GlobeOutline, vertices, center) if self.geographic else partial(DynamicHull, vertices)
-        run = at_once if len(vertices) <= FEW_ROWS else self._engine.aside
+        run = at_once if len(vertices) <= FEW_ROWS else self._driver.aside
         made: Outline = await run(make)
         self._outline = vertices, center, made
         return made

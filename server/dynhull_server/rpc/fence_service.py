@@ -4,8 +4,7 @@ from contextlib import aclosing
 
 from dynhull_proto.v1 import fence_service_pb2 as pb
 
-from ..engine.engine import Engine
-from ..engine.fences import LiveFence
+from ..engine.fences import Fences, LiveFence
 from ..engine.watch_fence import watch_fence
 from ..state.errors import FenceReplacedError, SequenceAheadError
 from ..state.fences.model.config import FenceConfig
@@ -21,17 +20,17 @@ KEYS_A_PART = 65_536
 
 
 class FenceService:
-    """The service on an engine.
+    """The service.
 
     Args:
-        engine: the fences.
+        fences: the fences.
         metrics: counts the work.
         max_corners: the largest number of corners of an area.
         max_watch_lag: the seconds that a watcher may take to receive a response.
     """
 
-    def __init__(self, engine: Engine, metrics: Metrics, *, max_corners: int, max_watch_lag: float) -> None:
-        self._fences = engine.fences
+    def __init__(self, fences: Fences, metrics: Metrics, *, max_corners: int, max_watch_lag: float) -> None:
+        self._fences = fences
         self._metrics = metrics
         self._max_corners = max_corners
         self._max_watch_lag = max_watch_lag

@@ -13,8 +13,9 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 
 from ..engine import entities
-from ..engine.engine import Engine
+from ..engine.driver import Driver
 from ..engine.entities import KeyAnswers, Question
+from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.roster import Roster
 from ..engine.steps import FEW_ROWS, Run, at_once
@@ -50,21 +51,25 @@ POINTS_A_PART = 8_192
 
 
 class HullService:
-    """The service on an engine.
+    """The service.
 
     Args:
-        engine: the hulls.
+        driver: drives the core that has the hulls.
+        hulls: the hulls.
         metrics: counts the work.
         create_on_write: whether a write to a missing hull creates it.
         max_watch_lag: the seconds that a watcher may take to receive an event.
     """
 
-    def __init__(self, engine: Engine, metrics: Metrics, *, create_on_write: bool, max_watch_lag: float) -> None:
-        self._engine = engine
+    def __init__(
+        self, driver: Driver, hulls: Hulls, metrics: Metrics, *, create_on_write: bool, max_watch_lag: float
+    ) -> None:
+        self._hulls = hulls
+        self._aside = driver.aside
         self._metrics = metrics
         self._create_on_write = create_on_write
         self._max_watch_lag = max_watch_lag
-        self._pages = VertexPages(engine.machine.clock)
+        self._pages = VertexPages(driver.machine.clock)
         self._queried = {kind: getattr(self, method) for kind, method in METHODS.items()}
 
     # Hulls
@@ -72,38 +77,38 @@ class HullService:
     async def CreateHull(self, request: pb.CreateHullRequest, call: Call) -> pb.CreateHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
-        hull = await self._engine.create(name, decode_settings(request.config))
+        hull = await self._hulls.create(name, decode_settings(request.config))
         return pb.CreateHullResponse(hull=encode.encode_hull(hull, hull.counts))
 
     async def DeleteHull(self, request: pb.DeleteHullRequest, call: Call) -> pb.DeleteHullResponse:
         name = decode.decode_name(request.name)
         call.access.require_write(name)
         with _naming_fences(call):
-            await self._engine.delete(name)
+            await self._hulls.delete(name)
         return pb.DeleteHullResponse()
 
     async def ListHulls(self, request: pb.ListHullsRequest, call: Call) -> pb.ListHullsResponse:
         prefix, after, size = decode.decode_page(request)
-        hulls, more = self._engine.page(call.access.readable(prefix), after, size)
+        hulls, more = self._hulls.page(call.access.readable(prefix), after, size)
         return pb.ListHullsResponse(
             hulls=[encode.encode_hull(hull, hull.counts) for hull in hulls],
             next_page_token=hulls[-1].name if more else "",
         )
 
     async def Recenter(self, request: pb.RecenterRequest, call: Call) -> pb.RecenterResponse:
-        hull = self._engine.get(self._written(call, request.name))
+        hull = self._hulls.get(self._written(call, request.name))
         center = decode_center(request.center, "center") if request.HasField("center") else None
         with _naming_fences(call):
             counts, hull_changed = await hull.recenter(center)
         return pb.RecenterResponse(hull=encode.encode_hull(hull, counts), hull_changed=hull_changed)
 
     async def SetQuarantine(self, request: pb.SetQuarantineRequest, call: Call) -> pb.SetQuarantineResponse:
-        hull = self._engine.get(self._written(call, request.name))
+        hull = self._hulls.get(self._written(call, request.name))
         counts = await hull.set_quarantine(decode_quarantine(request.quarantine, "quarantine"))
         return pb.SetQuarantineResponse(hull=encode.encode_hull(hull, counts))
 
     async def Reshard(self, request: pb.ReshardRequest, call: Call) -> pb.ReshardResponse:
-        hull = self._engine.get(self._written(call, request.name))
+        hull = self._hulls.get(self._written(call, request.name))
         counts = await hull.reshard(decode_shards(request.shards, "shards"))
         return pb.ReshardResponse(hull=encode.encode_hull(hull, counts))
 
@@ -119,12 +124,12 @@ class HullService:
         owner = call.owner if producer else ""  # asking gRPC for the address takes longer than a batch of one point
         write = decode_write(request, call.message_bytes, producer, owner, may_skip)
         try:
-            if request.uid and self._engine.has(name):
-                await require_present(self._engine.get(name), producer, request.uid)
-            applied = await self._engine.apply(name, write, create=self._create_on_write)
+            if request.uid and self._hulls.has(name):
+                await require_present(self._hulls.get(name), producer, request.uid)
+            applied = await self._hulls.apply(name, write, create=self._create_on_write)
         except Exception as error:
             self._metrics.batches.refused()
-            raise gap_explained(error, self._engine, name, request.uid) from None
+            raise gap_explained(error, self._hulls, name, request.uid) from None
         self._metrics.batches.applied(applied, time.perf_counter() - begun)
         response = pb.ApplyResponse()
         encode.encode_applied(applied, response.result)
@@ -138,16 +143,16 @@ class HullService:
         write = decode_together(request, names, call.message_bytes, call.owner)
         try:
             for index, each in enumerate(request.batches):
-                if each.uid and self._engine.has(each.name):
+                if each.uid and self._hulls.has(each.name):
                     write.refused = index
-                    await require_present(self._engine.get(each.name), request.producer, each.uid)
+                    await require_present(self._hulls.get(each.name), request.producer, each.uid)
             write.refused = None
-            results = await self._engine.apply_together(write)
+            results = await self._hulls.apply_together(write)
         except ANSWERED as error:
             self._metrics.batches.refused()
             if write.refused is None:
                 raise
-            reason = gap_explained(error, self._engine, names[write.refused], request.batches[write.refused].uid)
+            reason = gap_explained(error, self._hulls, names[write.refused], request.batches[write.refused].uid)
             raise PartRefusedError(write.refused, reason) from None
         response = pb.ApplyTogetherResponse()
         for applied in results:
@@ -159,8 +164,8 @@ class HullService:
         call.batches = 0
         summary = pb.IngestResponse()
         with await self._batches(call) as streamed:
-            if self._engine.has(streamed.name):
-                counts = self._engine.get(streamed.name).counts
+            if self._hulls.has(streamed.name):
+                counts = self._hulls.get(streamed.name).counts
                 summary.revision, summary.point_count = counts.revision, counts.points
             while await streamed.more():
                 for _, applied in streamed.applied():
@@ -188,7 +193,7 @@ class HullService:
         if not request.producer:
             raise decode.InvalidFieldError("producer", "", "a producer is required")
         producer = decode.decode_producer(request.producer)
-        hull = self._engine.get(name)
+        hull = self._hulls.get(name)
         await require_present(hull, producer, request.uid)
         return pb.GetProducerResponse(last_sequence=await hull.last_sequence(producer), uid=hull.uid)
 
@@ -231,7 +236,7 @@ class HullService:
             counts, contents = await entities.entities(hull, request.min_revision)
         for rows in _parts(contents):
             with call.cutoff():
-                part = await self._engine.aside(partial(encode.encode_entities, counts, contents, rows, encoding))
+                part = await self._aside(partial(encode.encode_entities, counts, contents, rows, encoding))
             await call.write_within(self._max_watch_lag, part)
 
     async def ReadPoints(self, request: pb.ReadPointsRequest, call: Call) -> None:
@@ -241,7 +246,7 @@ class HullService:
             counts, contents = await entities.contents(hull, request.min_revision)
         for rows in _parts(contents):
             with call.cutoff():
-                part = await self._engine.aside(partial(encode.encode_part, counts, contents, rows, encoding))
+                part = await self._aside(partial(encode.encode_part, counts, contents, rows, encoding))
             if not rows.start:
                 part.hull.CopyFrom(encode.encode_hull(hull, counts))
             await call.write_within(self._max_watch_lag, part)
@@ -263,9 +268,7 @@ class HullService:
             counts, extremes = await hull.support(directions, request.min_revision, layer)
             return pb.SupportResponse(revision=counts.revision, vertices=encode.encode_points(extremes, encoding))
         hull.require_keys("include_keys")
-        counts, extremes, keys = await entities.support(
-            hull, directions, request.min_revision, self._engine.aside, layer
-        )
+        counts, extremes, keys = await entities.support(hull, directions, request.min_revision, self._aside, layer)
         return pb.SupportResponse(
             revision=counts.revision,
             vertices=encode.encode_points(extremes, encoding),
@@ -391,7 +394,7 @@ class HullService:
             if not len(found):
                 raise HullEmptyError(each.name)
         separation = answers.separation_on_globe if hull.geographic else answers.separation
-        response: pb.SeparateResponse = await self._engine.aside(
+        response: pb.SeparateResponse = await self._aside(
             lambda: separation(counts, vertices, other_counts, other_vertices, encoding)
         )
         return response
@@ -432,7 +435,7 @@ class HullService:
         size = decode.decode_sample_size(request.sample_size)
         if request.include_keys:
             hull.require_keys("include_keys")
-            counts, points, keys = await entities.sample(hull, size, request.min_revision, self._engine.aside)
+            counts, points, keys = await entities.sample(hull, size, request.min_revision, self._aside)
             return pb.SamplePointsResponse(
                 revision=counts.revision,
                 points=encode.encode_points(points, encoding),
@@ -442,7 +445,7 @@ class HullService:
         return pb.SamplePointsResponse(revision=counts.revision, points=encode.encode_points(points, encoding))
 
     async def Query(self, _: object, call: Call) -> None:
-        answers = Answers(call, self._queried, self._engine, self._metrics, self._max_watch_lag)
+        answers = Answers(call, self._queried, self._hulls, self._metrics, self._max_watch_lag)
         async for message in call.messages():
             with call.cutoff():
                 await answers.answer(message.reads)
@@ -483,7 +486,7 @@ class HullService:
                         message = await encode.encode_watched(
                             event,
                             encoding,
-                            self._engine.aside,
+                            self._aside,
                             measures=request.include_measures,
                             geographic=hull.geographic,
                         )
@@ -497,10 +500,10 @@ class HullService:
         outline, most = decode.decode_many_contents(request)
         position = decode.decode_many_position(request)
         interval = decode.decode_rate(request.max_events_per_second) or MANY_INTERVAL
-        states = HullStates(self._engine, encoding, outline=outline, most=most)
+        states = HullStates(self._hulls, self._aside, encoding, outline=outline, most=most)
         kind = encoding, outline, most
         with (
-            self._engine.rosters.use(kind, choice, lambda: Roster(states)) as roster,
+            self._hulls.rosters.use(kind, choice, lambda: Roster(states)) as roster,
             self._metrics.watcher() as watcher,
         ):
             async with aclosing(watch_many(roster, position, interval)) as parts:
@@ -515,7 +518,7 @@ class HullService:
 
     def _run(self, rows: int) -> Run:
         """The way to run the steps of an answer that reads this many rows."""
-        return at_once if rows <= FEW_ROWS else self._engine.aside
+        return at_once if rows <= FEW_ROWS else self._aside
 
     async def _ask_of_keys(
         self, request: pb.LocateRequest | pb.DistanceRequest, call: Call, hull: LiveHull, question: Question
@@ -533,7 +536,7 @@ class HullService:
     def _read(self, call: Call, name: str, field: str = "name") -> LiveHull:
         name = decode.decode_name(name, field)
         call.access.require_read(name)
-        return self._engine.get(name)
+        return self._hulls.get(name)
 
     def _written(self, call: Call, name: str) -> str:
         name = decode.decode_name(name)
@@ -549,9 +552,9 @@ class HullService:
                 "name", "", "the first message must name the hull, but the call has no message"
             )
         name = self._written(call, first.name)
-        if first.uid and self._engine.has(name):
-            await require_present(self._engine.get(name), first.producer, first.uid)
-        return StreamedBatches(call, first, name, self._engine, self._metrics, create=self._create_on_write)
+        if first.uid and self._hulls.has(name):
+            await require_present(self._hulls.get(name), first.producer, first.uid)
+        return StreamedBatches(call, first, name, self._hulls, self._metrics, create=self._create_on_write)
 
 
 @contextmanager

@@ -6,12 +6,12 @@ from dynhull.arrays import Points
 from dynhull_proto.v1 import hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ..engine.engine import Engine
+from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.positions import Standing
 from ..engine.roster import Entry
 from ..engine.rosters import Choice
-from ..engine.steps import FEW_ROWS, at_once
+from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.watch_many import Part, Picture
 from ..state.errors import HullNotFoundError
 from ..state.hull_state import Counts
@@ -28,24 +28,28 @@ PICTURES = {
 
 
 class HullStates:
-    """The states of the hulls of an engine.
+    """The states of hulls.
 
     Args:
-        engine: the hulls.
+        hulls: the hulls.
+        aside: runs what takes long.
         encoding: that of vertices.
         outline: whether to send vertices.
         most: the most vertices of each hull, 0 for all.
     """
 
-    def __init__(self, engine: Engine, encoding: points_pb2.PointEncoding, *, outline: bool, most: int) -> None:
-        self._engine = engine
+    def __init__(
+        self, hulls: Hulls, aside: Run, encoding: points_pb2.PointEncoding, *, outline: bool, most: int
+    ) -> None:
+        self._hulls = hulls
+        self._aside = aside
         self._encoding = encoding
         self._outline = outline
         self._most = most
 
     def standings(self) -> list[Standing]:
         """How far the server is."""
-        return [self._engine.standing]
+        return [self._hulls.standing]
 
     async def encode(self, entry: Entry) -> bytes:
         """The state of a hull."""
@@ -53,7 +57,7 @@ class HullStates:
             return name_only(entry, pb.HULL_PRESENCE_GONE)
         message = pb.WatchManyResponse()
         try:
-            await self._describe(self._engine.get(entry.name), message.hulls.add(name=entry.name))
+            await self._describe(self._hulls.get(entry.name), message.hulls.add(name=entry.name))
         except HullNotFoundError:  # it has gone meanwhile
             return name_only(entry, pb.HULL_PRESENCE_GONE)
         return message.SerializeToString()
@@ -66,7 +70,7 @@ class HullStates:
         counts, vertices = await hull.vertices()
         encode_counts(hull, counts, now)
         now.vertex_count = len(vertices)
-        run = at_once if len(vertices) <= FEW_ROWS else self._engine.aside
+        run = at_once if len(vertices) <= FEW_ROWS else self._aside
         if len(vertices):
             measures: hull_pb2.Measures = await hull.measured(
                 vertices, partial(encode_measures, vertices, run, geographic=hull.geographic)

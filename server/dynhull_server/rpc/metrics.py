@@ -13,10 +13,11 @@ from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from ..engine.engine import Engine
+from ..engine.driver import Driver
+from ..engine.fences import Fences
+from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.server_time import MICROSECONDS
-from ..engine.supervisor import Supervisor
 from .background import background_families
 from .batch_counts import BatchCounts
 from .call_counts import CallCounts
@@ -136,11 +137,12 @@ class StateCollector(Collector):
     """Collects hulls, watchers and counts of calls and batches on the event loop, when called from another thread."""
 
     def __init__(
-        self, engine: Engine, metrics: Metrics, supervisor: Supervisor, loop: asyncio.AbstractEventLoop
+        self, driver: Driver, hulls: Hulls, fences: Fences, metrics: Metrics, loop: asyncio.AbstractEventLoop
     ) -> None:
-        self._engine = engine
+        self._driver = driver
+        self._hulls = hulls
+        self._fences = fences
         self._metrics = metrics
-        self._supervisor = supervisor
         self._loop = loop
 
     def collect(self) -> Iterator[Metric]:
@@ -151,13 +153,13 @@ class StateCollector(Collector):
         return [
             *self._gauges(),
             *self._metrics.calls.families(),
-            *self._metrics.batches.families(self._engine.expired),
-            *background_families(self._supervisor),
-            *fence_families(self._engine.fences, self._engine.time()),
+            *self._metrics.batches.families(self._driver.expired),
+            *background_families(self._driver.supervisor),
+            *fence_families(self._fences, self._driver.time()),
         ]
 
     def _gauges(self) -> list[GaugeMetricFamily]:
-        hulls = list(self._engine)
+        hulls = list(self._hulls)
         points = GaugeMetricFamily("dynhull_hull_points", "Points of the largest hulls.", labels=["hull"])
         vertices = GaugeMetricFamily(
             "dynhull_hull_vertices", "Vertices of the largest hulls when last read.", labels=["hull"]
@@ -185,7 +187,7 @@ class StateCollector(Collector):
         """The lag of the slowest clock that follows event times."""
         clocks = [hull.counts.clock for hull in hulls if hull.settings.window and hull.settings.window.clock == "data"]
         slowest = min((clock for clock in clocks if clock is not None), default=None)
-        return 0.0 if slowest is None else max(self._engine.time() - slowest, 0) / MICROSECONDS
+        return 0.0 if slowest is None else max(self._driver.time() - slowest, 0) / MICROSECONDS
 
 
 def _on(loop: asyncio.AbstractEventLoop, function: Any) -> Any:

@@ -6,7 +6,7 @@ from typing import Any
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ..engine.engine import Engine
+from ..engine.hulls import Hulls
 from ..state.errors import StoppingError
 from .calls import Call
 from .decode import InvalidFieldError
@@ -39,17 +39,17 @@ class Answers:
     Args:
         call: the call.
         methods: what answers each kind of read.
-        engine: the hulls.
+        hulls: the hulls.
         metrics: counts the reads.
         patience: the seconds that the client may take to receive a response.
     """
 
     def __init__(
-        self, call: Call, methods: Mapping[str, Behave], engine: Engine, metrics: Metrics, patience: float
+        self, call: Call, methods: Mapping[str, Behave], hulls: Hulls, metrics: Metrics, patience: float
     ) -> None:
         self._call = call
         self._methods = methods
-        self._engine = engine
+        self._hulls = hulls
         self._metrics = metrics
         self._patience = patience
         # Serialized responses: their concatenation is a response with the answers of all.
@@ -110,7 +110,7 @@ class Answers:
             least = getattr(request, revision)
             if least:
                 hull = getattr(request, name) or request.name
-                if not self._engine.has(hull) or self._engine.get(hull).counts.revision < least:
+                if not self._hulls.has(hull) or self._hulls.get(hull).counts.revision < least:
                     return True
         return False
 

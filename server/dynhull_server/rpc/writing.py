@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from dynhull_proto.v1 import hull_service_pb2
 
-from ..engine.engine import Engine
+from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..state.batch import Applied
 from ..state.errors import HullNotFoundError, RestoredError, SequenceGapError
@@ -62,15 +62,15 @@ async def require_present(hull: LiveHull, producer: str, uid: str) -> None:
             raise RestoredError(hull.name, hull.uid, producer, await hull.last_sequence(producer))
 
 
-def gap_explained(error: Exception, engine: Engine, name: str, uid: str) -> Exception:
+def gap_explained(error: Exception, hulls: Hulls, name: str, uid: str) -> Exception:
     """The error that refuses a batch; RestoredError for a gap where batches may be missing because of a backup.
 
     Who says of which hull the numbers are, has skipped some, as `require_present` has compared the uid; or the hull was
     led back, and nobody has noticed: the present uid lets a caller with acknowledged numbers decide.
     """
-    if type(error) is not SequenceGapError or not engine.has(name):
+    if type(error) is not SequenceGapError or not hulls.has(name):
         return error
-    hull = engine.get(name)
+    hull = hulls.get(name)
     if uid:
         error.uid = hull.uid
     if uid or not hull.restored:
@@ -87,7 +87,7 @@ class StreamedBatches:
         call: the call.
         first: its first message, which names the hull and may name a producer.
         name: the name of the hull.
-        engine: the hulls.
+        hulls: the hulls.
         create: whether the first batch creates a missing hull.
         metrics: counts the batches.
 
@@ -99,18 +99,18 @@ class StreamedBatches:
         HullNotFoundError: no hull has that name, and `create` is False.
     """
 
-    def __init__(self, call: Call, first: Any, name: str, engine: Engine, metrics: Metrics, *, create: bool) -> None:
+    def __init__(self, call: Call, first: Any, name: str, hulls: Hulls, metrics: Metrics, *, create: bool) -> None:
         self._call = call
         self.name = name
         self._producer = decode.decode_producer(first.producer)
         self._may_skip = decode.decode_may_skip(self._producer, first.may_skip)
         self.several = isinstance(first, hull_service_pb2.StreamRequest) and first.accept_results
-        self._engine = engine
+        self._hulls = hulls
         self._uid: str = first.uid
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._room = asyncio.Event()
-        self._batches = engine.stream(name, self._notify, create=create)
+        self._batches = hulls.stream(name, self._notify, create=create)
         self._arrivals: deque[float] = deque()
         self._failure: Exception | None = None
         self._take(first)
@@ -133,7 +133,7 @@ class StreamedBatches:
         while not batches.applied:
             if batches.refusal is not None:
                 self._metrics.batches.refused()
-                raise gap_explained(batches.refusal, self._engine, self.name, self._uid).with_traceback(None)
+                raise gap_explained(batches.refusal, self._hulls, self.name, self._uid).with_traceback(None)
             if self._reading.done() and not batches.batches:
                 if self._failure is not None:
                     raise self._failure

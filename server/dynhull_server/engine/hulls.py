@@ -1,0 +1,171 @@
+"""The hulls by name, as their callers use them."""
+
+import asyncio
+from collections.abc import Callable, Iterator, Sequence
+
+from ..state.batch import Applied
+from ..state.errors import HullUnsuitableError
+from ..state.events import CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
+from ..state.hull import Hull
+from ..state.records import DEFAULT, HullSettings
+from ..storage.port import Storage
+from .batch_stream import BatchStream
+from .divided_hull import DividedHull
+from .division import Divisions
+from .driver import Driver
+from .fences import Fences
+from .layers import COPIES
+from .live_hull import LiveHull
+from .positions import Standing, standing
+from .recalls import Recalls
+from .rosters import Rosters
+from .waiter import Waiter
+
+
+class Hulls:
+    """The hulls of an engine.
+
+    Args:
+        driver: drives the core that has them.
+        storage: keeps them.
+        fences: the fences that compare them.
+        divisions: runs hulls over shards; None for a server that has none.
+
+    Attributes:
+        rosters: those of the watches of many hulls.
+    """
+
+    def __init__(self, driver: Driver, storage: Storage, fences: Fences, divisions: Divisions | None) -> None:
+        self.rosters = Rosters(lambda: driver.core.hulls.values())
+        self._driver = driver
+        self._fences = fences
+        self._divisions = divisions
+        self._copies = asyncio.Semaphore(COPIES)
+        self._recalls = Recalls(storage, driver.on_disk)
+        self._live: dict[Hull, LiveHull] = {}
+        self._incarnation = driver.machine.token()  # that of hulls in memory; others find theirs in the storage
+        self._standing = standing(self._incarnation, driver.published)
+
+    def __len__(self) -> int:
+        return len(self._driver.core.hulls)
+
+    def __iter__(self) -> Iterator[LiveHull]:
+        return iter([self._live_hull(hull) for hull in list(self._driver.core.hulls.values())])
+
+    def get(self, name: str) -> LiveHull:
+        """The hull of that name, or raise HullNotFoundError."""
+        return self._live_hull(self._driver.core.get(name))
+
+    def has(self, name: str) -> bool:
+        """Whether a hull of that name exists."""
+        return name in self._driver.core.hulls
+
+    def page(self, prefixes: Sequence[str], after: str, size: int) -> tuple[list[LiveHull], bool]:
+        """At most `size` hulls whose names follow `after`, and whether there are more.
+
+        Only names that begin with one of the prefixes. These are sorted, and none of them begins with another.
+        """
+        hulls: list[LiveHull] = []
+        for prefix in prefixes:
+            for name in self._driver.core.hulls.irange(minimum=max(prefix, after)):
+                if not name.startswith(prefix):
+                    break
+                if name == after:
+                    continue
+                if len(hulls) == size:
+                    return hulls, True
+                hulls.append(self.get(name))
+        return hulls, False
+
+    async def create(self, name: str, settings: HullSettings = DEFAULT) -> LiveHull:
+        """Create an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""
+        if settings.divided:
+            no_shards = "config.shards", "cannot be divided: this server has no shards"
+            why_not = no_shards if self._divisions is None else self._divisions.why_not(settings)
+            if why_not is not None:
+                field, reason = why_not
+                raise HullUnsuitableError(name, reason, field=field)
+        hull: Hull = await self._driver.ask(CreateHull(Waiter(), name, self._driver.birth(), settings))
+        return self._live_hull(hull)
+
+    async def delete(self, name: str) -> None:
+        """Delete the hull of that name, or raise HullNotFoundError or NotStoredError."""
+        await self._driver.ask(DeleteHull(Waiter(), name, self._driver.time()))
+
+    async def apply(self, name: str, request: WriteBatch, *, create: bool) -> Applied:
+        """Apply a batch as the next revision of a hull, or raise the error that refuses it.
+
+        With `create`, a missing hull is created.
+        """
+        request.to, request.name = Waiter(), name
+        if create:
+            request.birth = self._driver.birth()
+        request.arrived = self._driver.time()
+        applied: Applied = await self._driver.ask(request)
+        return applied
+
+    async def apply_together(self, request: WriteTogether) -> list[Applied]:
+        """Apply a batch to each of several hulls, or raise the error that refuses one of them: then none is applied."""
+        request.to = Waiter()
+        for part in request.parts:
+            part.arrived = self._driver.time()
+        results: list[Applied] = await self._driver.ask(request)
+        return results
+
+    def stream(self, name: str, notify: Callable[[], None], *, create: bool) -> BatchStream:
+        """A stream of batches to one hull; `notify` is called after each that was applied or refused.
+
+        Raises:
+            HullNotFoundError: no hull has that name, and `create` is False.
+        """
+        hull = self._driver.core.get(name) if self.has(name) or not create else None
+        return BatchStream(self._driver, name, hull, notify)
+
+    @property
+    def standing(self) -> Standing:
+        """How far what is published has come."""
+        if not self._driver.core.undecided:  # otherwise it may lack an earlier commit than the latest
+            self._standing = standing(self._incarnation, self._driver.published)
+        return self._standing
+
+    # What the engine calls
+
+    def restored(self, incarnation: str) -> None:
+        """Begin with the hulls of the storage, whose incarnation this is."""
+        self._incarnation = incarnation
+
+    def moved(self, hulls: Sequence[Hull]) -> None:
+        """Wake the watchers of hulls: each has a new revision, or was deleted."""
+        for hull in hulls:
+            hull.committed = self._driver.published
+            self._move(hull)
+        self.rosters.moved(hulls)
+
+    def divide(self, hull: Hull, requests: Sequence[WriteBatch | Expire]) -> None:
+        """Have the shards of a hull carry out requests."""
+        assert self._divisions is not None  # otherwise there is no such hull
+        self._divisions.carry_out(hull, requests)
+
+    def _move(self, hull: Hull) -> None:
+        if hull.divided and self._divisions is not None:
+            if hull.ended:
+                self._divisions.end(hull)
+            else:
+                self._divisions.begin(hull)
+        live = self._live.get(hull)
+        if live is not None:
+            live.moved()
+            if hull.ended:
+                del self._live[hull]
+
+    def _live_hull(self, hull: Hull) -> LiveHull:
+        live = self._live.get(hull)
+        if live is None:
+            around = self._driver, hull, self._recalls, self._fences, self._copies
+            if hull.divided and self._divisions is not None:
+                live = DividedHull(*around, self._divisions.of(hull))
+            else:
+                live = LiveHull(*around)
+            if not hull.ended:
+                self._live[hull] = live
+        return live
