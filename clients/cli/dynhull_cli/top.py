@@ -12,7 +12,7 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dynhull_client import HullClient, HullInfo
+    from dynhull_client import HullClient, ManyChange
 
 from .connected import AsJson, connected
 from .json_lines import json_line
@@ -24,7 +24,7 @@ from .tab_lines import tab_line
 class Row:
     """A hull with its rates, each per second: batches applied, and growth in points."""
 
-    info: "HullInfo"
+    state: "ManyChange"
     batches: float
     growth: float
 
@@ -60,27 +60,32 @@ def top(
         return
     for table in tables:
         for row in listed(table[:rows], below("hulls", prefix)):
-            info = row.info
+            state = row.state
             if as_json:
-                members = {"revision": info.revision, "points": info.points, "distinct": info.distinct}
-                typer.echo(json_line(name=info.name, **members, batches=row.batches, growth=row.growth))
+                members = {"revision": state.revision, "points": state.points, "distinct": state.distinct}
+                typer.echo(json_line(name=state.hull, **members, batches=row.batches, growth=row.growth))
             else:
-                typer.echo(tab_line(info.name, info.revision, info.points, info.distinct, row.batches, row.growth))
+                typer.echo(tab_line(state.hull, state.revision, state.points, state.distinct, row.batches, row.growth))
 
 
 def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[list[Row]]:
     """All hulls after each interval, the busiest first, then the largest."""
-    before, then = {info.uid: info for info in client.list_hulls(prefix)}, time.monotonic()
-    while True:
-        time.sleep(interval)
-        infos, now = list(client.list_hulls(prefix)), time.monotonic()
-        rows = []
-        for info in infos:
-            last = before.get(info.uid, info)
-            passed = now - then
-            rows.append(Row(info, (info.revision - last.revision) / passed, (info.points - last.points) / passed))
-        yield sorted(rows, key=lambda row: (-row.batches, -row.info.points, row.info.name))
-        before, then = {info.uid: info for info in infos}, now
+    from .many import Followed
+
+    with client.watch_many(prefix, max_rate=max(10.0, 2 / interval)) as watch:
+        followed = Followed(watch)
+        before, then = {state.uid: state for state in followed.states()}, time.monotonic()
+        while True:
+            time.sleep(interval)
+            states, now = followed.states(), time.monotonic()
+            rows = []
+            for state in states:
+                last = before.get(state.uid, state)
+                passed = now - then
+                grown = (state.points - last.points) / passed
+                rows.append(Row(state, (state.revision - last.revision) / passed, grown))
+            yield sorted(rows, key=lambda row: (-row.batches, -row.state.points, row.state.hull))
+            before, then = {state.uid: state for state in states}, now
 
 
 def _shown(rows: list[Row]) -> "Table":
@@ -96,6 +101,6 @@ def _shown(rows: list[Row]) -> "Table":
 
 
 def _cells(row: Row) -> list[str]:
-    info = row.info
-    counts = [f"{each:,}" for each in (info.revision, info.points, info.distinct)]
-    return [info.name, *counts, f"{row.batches:,.1f}", f"{row.growth:+,.0f}"]
+    state = row.state
+    counts = [f"{each:,}" for each in (state.revision, state.points, state.distinct)]
+    return [state.hull, *counts, f"{row.batches:,.1f}", f"{row.growth:+,.0f}"]
