@@ -16,8 +16,9 @@ from . import fences, handlers, health, hulls, points, questions, uploads
 from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
 from .events import routes as events
-from .events.documents import FenceEvent, HullChange, HullProgress, HullSnapshot
+from .events.documents import FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
 from .events.feeds import Feeds
+from .events.many import ManyFeeds
 from .figures import Figures, Measured
 from .gathering import Gatherer
 from .heads import HeadAsGet
@@ -44,7 +45,7 @@ questions."""
 # What the descriptions of routes refer to by name.
 REFERRED: tuple[type[BaseModel], ...] = (
     *(Problem, Batch, Feature, FeatureCollection, Item),
-    *(HullSnapshot, HullChange, HullProgress, FenceEvent),
+    *(HullSnapshot, HullChange, HullProgress, Hulls, FenceEvent),
 )
 SEEN_BY_PAGES = ["Idempotency-Key", "Last-Event-ID", "Authorization", "Content-Type"]
 
@@ -67,6 +68,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.settings = settings
     app.state.gatherer = Gatherer()
     app.state.feeds = Feeds()
+    app.state.many = ManyFeeds()
     app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()

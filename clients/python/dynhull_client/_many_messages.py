@@ -1,27 +1,19 @@
 """What a watch of many hulls returns."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from datetime import datetime
+from typing import Any, Literal
 
 from dynhull._shown import Shown
 from dynhull._value import Value
+from dynhull.arrays import Points
 from dynhull_proto.v1 import hull_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
-from ._messages import decode_measures, decode_points, shown_geometry, shown_svg
+from ._messages import Measures, decode_measures, decode_points, shown_geometry, shown_svg
 from ._times import decode_time
 
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from dynhull.arrays import Points
-
-    from ._messages import Measures
-
 ManyKind = Literal["state", "unchanged", "gone", "restored", "complete", "position"]
-MANY_KINDS: tuple[ManyKind, ...] = get_args(ManyKind)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

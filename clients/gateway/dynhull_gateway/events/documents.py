@@ -5,9 +5,10 @@ from pydantic import BaseModel, Field
 import dynhull_client
 
 from ..answers import Place, Rows, answering
-from ..schemas import Measures, SubjectsInside
+from ..schemas import Measures, Response, SubjectsInside
 
 # The id of an event says after which sequence to go on.
+STATE = [name for name in dynhull_client.ManyChange.__dataclass_fields__ if name not in ("kind", "position")]
 SENT = [name for name in dynhull_client.FenceEvent.__dataclass_fields__ if name != "after"]
 
 
@@ -71,6 +72,28 @@ class FenceEvent(BaseModel):
     inside: list[SubjectsInside] = Field([], description="Of snapshot and closed, who was inside, by hull.")
 
 
+@answering(dynhull_client.ManyChange, STATE, partial=True)
+class HullNow(Response):
+    """The newest that is known of one of many hulls; fields that do not apply are left out."""
+
+    measures: Measures | None = Field(None, description="Its measures; without points there are none.")
+
+
+class Hulls(BaseModel):
+    """What has become of many hulls: event `hulls`."""
+
+    hulls: list[HullNow] = Field(description="Their newest states.")
+    gone: list[str] = Field(description="Those that are there no more.")
+    unchanged: list[str] = Field(description="Those that are as they were at the id that the stream goes on from.")
+
+
+OF_MANY = (
+    "retry: 1000\n\n"
+    "event: begin\ndata: {}\n\n"
+    'event: hulls\ndata: {"hulls":[{"hull":"fleet/a","uid":"fe203b7c85e2be96","revision":2,"points":3,"distinct":3,'
+    '"held":0,"vertex_count":3,"geographic":false,"error":0.0}],"gone":[],"unchanged":[]}\n\n'
+    'event: complete\nid: 00000000000000000000000200065fbb4e8d1a40\ndata: {"hulls":1}\n\n'
+)
 OF_HULL = (
     "retry: 1000\n\n"
     "event: snapshot\nid: fe203b7c85e2be96:1\n"

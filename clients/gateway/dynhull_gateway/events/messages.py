@@ -36,3 +36,11 @@ def resumed(ident: str | None) -> tuple[str, int] | None:
     uid, _, number = (ident or "").rpartition(":")
     ours = uid and number.isdecimal() and len(number) <= 20 and int(number) < 2**64
     return (uid, int(number)) if ours else None
+
+
+def position_of(ident: str) -> bytes | None:
+    """The position of many hulls in a Last-Event-ID; None if it is none of ours: the reader gets all of them."""
+    try:
+        return bytes.fromhex(ident)
+    except ValueError:
+        return None

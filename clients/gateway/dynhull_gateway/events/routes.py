@@ -1,21 +1,24 @@
 """Where events are read."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
+from pydantic import Field
 
 from dynhull_client import AsyncHullClient, UnavailableError
 
 from ..callers import Caller, token_of
 from ..problems import ProblemError
-from ..schemas import LARGEST, NAME, FencePath, HullPath
+from ..schemas import LARGEST, NAME, FencePath, HullPath, Prefix
 from . import documents
-from .feeds import Form, View
+from .feeds import PATIENCE_SECONDS, Form, View
 from .fence_events import Reading
 from .fence_events import events as fence_events
-from .messages import parted, resumed
+from .many import ManyView
+from .messages import parted, position_of, resumed
 from .stream import EventStream
 
 router = APIRouter(tags=["events"])
@@ -47,6 +50,13 @@ MaxVertices = Annotated[
         "by which the hull reaches beyond them, rounded up; on the globe in metres.",
     ),
 ]
+Names = Annotated[
+    Sequence[Annotated[str, Field(pattern=NAME)]],
+    Query(
+        max_length=10_000, description="In place of a prefix, a hull that has this name, or will have it; repeatable."
+    ),
+]
+WithOutlines = Annotated[bool, Query(description="Whether to send the vertices of each hull.")]
 Consumer = Annotated[
     str | None,
     Query(pattern=NAME, description="A durable consumer, which knows its place: events after the acknowledged one."),
@@ -107,6 +117,42 @@ async def hull_events(
     view = View(token_of(request), name, f or form or "changes", rate, keys, measures, layer, max_vertices)
     state = request.app.state
     texts = state.feeds.read(client, view, resumed(last_event_id), state.settings.keepalive_seconds, state.figures)
+    return EventStream(texts, state.health, state.figures)
+
+
+@router.get("/watch", response_class=Described, responses=events(documents.OF_MANY))
+async def watch_many(
+    request: Request,
+    client: Caller,
+    prefix: Prefix = "",
+    name: Names = (),
+    outlines: WithOutlines = False,
+    max_vertices: MaxVertices = None,
+    rate: Rate = 10.0,
+    last_event_id: LastEventId = None,
+) -> Response:
+    """Follow many hulls: those of a prefix, or those with the given names, which may come later.
+
+    From "begin" to "complete" every hull that there is is named, in events "hulls" with their states; what a reader
+    holds of others is no more. Then "hulls" has the newest state of each that has changed or is new, and the names of
+    those that are gone. "restored" is a "begin" after which states may be older than those before it. A reader that
+    connects again with the id of its last event gets what differs, and the names of the others as "unchanged".
+
+    The data of "hulls" is JSON, as described by the schema Hulls; "problem", a Problem, ends the stream.
+    """
+    if name and prefix:
+        raise ProblemError(400, "name: give prefix or name, not both", "INVALID_FIELD", field="name", value=name[0])
+    if max_vertices is not None and not outlines:
+        detail = "max_vertices: only with outlines=true: without it no vertices are sent"
+        raise ProblemError(400, detail, "INVALID_FIELD", field="max_vertices", value=str(max_vertices))
+    _admit(request)
+    view = ManyView(token_of(request), prefix, tuple(sorted(set(name))), outlines, max_vertices, rate)
+    with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
+        async with client.watch_many(**view.arguments(), timeout=PATIENCE_SECONDS) as allowed:
+            await anext(allowed)  # whether these hulls may be read
+    state = request.app.state
+    position = None if last_event_id is None else position_of(last_event_id)
+    texts = state.many.read(client, view, position, state.settings.keepalive_seconds)
     return EventStream(texts, state.health, state.figures)
 
 
