@@ -120,7 +120,7 @@ async def hull_events(
     return EventStream(texts, state.health, state.figures)
 
 
-@router.get("/watch", response_class=Described, responses=events(documents.OF_MANY))
+@router.get("/events", response_class=Described, responses=events(documents.OF_MANY))
 async def watch_many(
     request: Request,
     client: Caller,
