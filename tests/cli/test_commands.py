@@ -106,6 +106,34 @@ def test_watch(hull):
     assert (event["area"], event["bounds"]) == (16, [0, 0, 4, 4])
 
 
+def test_watch_of_many(hull, served):
+    done = dynhull("watch", "--prefix", hull, "--events", 1)
+    assert (done.exit_code, done.stdout) == (0, f"state\t{hull}\t1\t6\t4\t16.0\t16.0\n")
+    done = dynhull("watch", "--prefix", hull, "--events", 2, "--json", "--outlines")
+    state, complete = map(json.loads, done.stdout.splitlines())
+    assert (state["kind"], state["hull"], state["revision"], state["points"]) == ("state", hull, 1, 6)
+    assert (state["vertices"], state["measures"]["area"]) == ([[0, 0], [4, 0], [4, 4], [0, 4]], 16)
+    assert complete["kind"] == "complete"
+    with HullClient(served) as client:
+        client.create_hull(f"{hull}/new")
+    done = dynhull("watch", "--prefix", hull, "--events", 3, "--json", "--position", complete["position"])
+    assert {"state", "complete"} <= {json.loads(line)["kind"] for line in done.stdout.splitlines()}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("a", "--prefix", "a"),
+        ("a", "--outlines"),
+        ("--prefix", "a", "--keys"),
+        ("--prefix", "a", "--position", "x"),
+    ],
+)
+def test_watches_that_make_no_sense(arguments):
+    assert dynhull("watch", *arguments).exit_code == 2
+
+
 def test_watch_tells_each_change_at_once(hull, served):
     command = [COMMAND, "watch", hull, "--json", "--max-rate", "0", "--events", "3"]
     with HullClient(served) as client, Process(command, stdout=subprocess.PIPE, text=True) as watching:

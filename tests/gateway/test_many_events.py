@@ -1,0 +1,123 @@
+"""Many hulls as server-sent events: whoever reads them holds the newest state of each."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from gateway_process import Events, Gateway
+
+from dynhull_client import HullClient
+
+SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]
+
+
+@pytest.fixture
+def client(address: str) -> Iterator[HullClient]:
+    with HullClient(address) as client:
+        yield client
+
+
+class Reader:
+    """Keeps what the events say.
+
+    Attributes:
+        hulls: the newest state of each hull.
+        ident: the id to go on after.
+    """
+
+    def __init__(
+        self, gateway: Gateway, path: str, ident: str | None = None, hulls: dict[str, Any] | None = None
+    ) -> None:
+        headers = {} if ident is None else {"Last_Event_ID": ident}
+        self._events = Events(gateway, path, **headers)
+        self.hulls: dict[str, Any] = dict(hulls or {})
+        self.ident = ident
+        self._named: set[str] = set()
+
+    def until(self, kind: str) -> None:
+        for event in self._events:
+            self.ident = event.get("id", self.ident)
+            data = json.loads(event["data"]) if "data" in event else {}
+            if event.get("event") in ("begin", "restored"):
+                self._named = set()
+            for hull in data.get("hulls", []) if event.get("event") == "hulls" else []:
+                self.hulls[hull["hull"]] = hull
+                self._named.add(hull["hull"])
+            self._named |= set(data.get("unchanged", []))
+            for gone in data.get("gone", []):
+                self.hulls.pop(gone, None)
+            if event.get("event") == "complete":
+                self.hulls = {name: self.hulls[name] for name in self._named}
+            if event.get("event") == kind:
+                return
+        raise AssertionError(f"the stream has ended without {kind}")
+
+    def close(self) -> None:
+        self._events.close()
+
+
+def present(client: HullClient, prefix: str) -> dict[str, tuple[str, int, float | None]]:
+    found = {}
+    for info in client.list_hulls(prefix):
+        area = client.get_hull(info.name).measures.area
+        found[info.name] = info.uid, info.revision, area if info.points else None
+    return found
+
+
+def held(reader: Reader) -> dict[str, tuple[str, int, float | None]]:
+    return {
+        name: (hull["uid"], hull["revision"], hull["measures"]["area"] if "measures" in hull else None)
+        for name, hull in reader.hulls.items()
+    }
+
+
+def test_a_reader_holds_what_there_is_and_goes_on_where_it_was(gateway: Gateway, client: HullClient, name: str) -> None:
+    for part in "abc":
+        client.create_hull(f"{name}/{part}")
+        client.apply(f"{name}/{part}", insert=SQUARE)
+    reader = Reader(gateway, f"/events?prefix={name}/&rate=100")
+    reader.until("complete")
+    assert held(reader) == present(client, f"{name}/")
+    client.apply(f"{name}/a", insert=[[9, 9]])
+    client.delete_hull(f"{name}/b")
+    client.create_hull(f"{name}/new")
+    while held(reader) != present(client, f"{name}/"):
+        reader.until("hulls")
+    reader.close()
+    client.apply(f"{name}/c", insert=[[7, 7]])
+    client.delete_hull(f"{name}/a")
+    again = Reader(gateway, f"/events?prefix={name}/&rate=100", reader.ident, reader.hulls)
+    again.until("complete")
+    assert held(again) == present(client, f"{name}/")
+    again.close()
+
+
+def test_outlines_of_names(gateway: Gateway, client: HullClient, name: str) -> None:
+    client.create_hull(name)
+    client.apply(name, insert=SQUARE)
+    reader = Reader(gateway, f"/events?name={name}&name={name}-later&outlines=true&max_vertices=3")
+    reader.until("complete")
+    assert len(reader.hulls[name]["vertices"]) == 3
+    assert reader.hulls[name]["error"] > 0
+    client.create_hull(f"{name}-later")
+    reader.until("hulls")
+    assert set(reader.hulls) == {name, f"{name}-later"}
+    reader.close()
+
+
+def test_an_id_of_something_else_begins_with_all(gateway: Gateway, client: HullClient, name: str) -> None:
+    client.create_hull(name)
+    for ident in ("zz", "00", "fe203b7c85e2be96:1"):
+        reader = Reader(gateway, f"/events?name={name}", ident)
+        reader.until("complete")
+        assert set(reader.hulls) == {name}
+        reader.close()
+
+
+@pytest.mark.parametrize(
+    ("query", "field"), [("prefix=a&name=b", "name"), ("max_vertices=3", "max_vertices"), ("name=a%20b", "name")]
+)
+def test_refused(gateway: Gateway, query: str, field: str) -> None:
+    answer = gateway.get(f"/events?{query}")
+    assert (answer.status, answer.json["field"]) == (400, field)
