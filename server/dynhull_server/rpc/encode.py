@@ -228,9 +228,9 @@ def encode_held(
 
 async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
     """The measures of the hull with these vertices, one step per measure."""
-    area, perimeter, diameter, bounds = measure.area, measure.perimeter, measure.diameter, measure.bounds
+    area, perimeter, bounds = measure.area, measure.perimeter, measure.bounds
     if geographic:
-        area, perimeter, diameter, bounds = globe.area, globe.perimeter, globe.diameter, globe.bounds
+        area, perimeter, bounds = globe.area, globe.perimeter, globe.bounds
     x = y = math.nan
     if not geographic:
         x, y = await run(partial(measure.centroid, vertices))
@@ -244,9 +244,16 @@ async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hu
         min_y=min_y,
         max_x=max_x,
         max_y=max_y,
-        diameter=await run(partial(diameter, vertices)),
-        width=None if geographic else await run(partial(measure.width, vertices)),
     )
+
+
+async def encode_all_lengths(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
+    """The measures with diameter and width, which take longer than all others."""
+    measures = await encode_measures(vertices, run, geographic=geographic)
+    measures.diameter = await run(partial(globe.diameter if geographic else measure.diameter, vertices))
+    if not geographic:
+        measures.width = await run(partial(measure.width, vertices))
+    return measures
 
 
 def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
