@@ -110,9 +110,10 @@ class Measures(Value):
     Of a geographic hull, square metres and metres on WGS 84 between the geodesics; `centroid` is NaN.
 
     `bounds` are the least x, least y, greatest x and greatest y; of a geographic hull west, south, east and north in
-    degrees, west greater than east across the antimeridian, NaN from servers before 1.1. `diameter` is the greatest
-    distance of two points, and `width` the least one of parallel lines with all points between: NaN on the globe, and
-    both from servers before 1.1.
+    degrees, west greater than east across the antimeridian, NaN from servers before 1.1.
+
+    `diameter` is the greatest distance of two points, and `width` the least one of parallel lines with all points
+    between; on the globe it is NaN. `watch_many` has both; of a single hull both are NaN: `get_measures` has them.
     """
 
     area: float
