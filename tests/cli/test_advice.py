@@ -30,7 +30,7 @@ LOADS = [
     ("load {name} utf16be.csv", "--encoding utf-16-be", "load {name} utf16be.csv --encoding utf-16-be"),
     ("load {name} three.csv", "--x 1 --y 2", "load {name} three.csv --x 1 --y 2"),
     ("load {name} years.csv", "add --header", "load {name} years.csv --header --x 2020 --y 2021"),
-    ("load {name} named.csv", "name its x column with --x; it has a, b", "load {name} named.csv --x a --y b"),
+    ("load {name} named.csv", "name two with --x and --y; it has a, b", "load {name} named.csv --x a --y b"),
     ("load {name} named.csv --x a", "name its y column with --y", "load {name} named.csv --x a --y b"),
     ("load {name} named.csv --x a --y c", "'c' (--y); it has a, b", "load {name} named.csv --x a --y b"),
     ("load {name} line.ndjson", "--vertices takes", "load {name} line.ndjson --vertices"),

@@ -190,7 +190,7 @@ def test_longitudes_and_latitudes_of_ones_own_are_on_the_globe(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        ("a,b\n1,2\n", [], "name its x column with --x; it has a, b"),
+        ("a,b\n1,2\n", [], "name two with --x and --y; it has a, b"),
         ("", [], "is empty"),
         ("x,y\nnan,nan\n", [], "has no points"),
     ],

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from itertools import count
 
 import numpy as np
 import pytest
@@ -272,3 +273,78 @@ def test_a_place_that_the_hull_does_not_reach_is_a_bad_row(served, name, tmp_pat
     assert again.stdout == f"{name}: 0 points loaded\n"
     with HullClient(served) as client:
         assert client.get_hull(name).revision == 2
+
+
+@pytest.mark.usefixtures("served")
+@pytest.mark.parametrize(
+    "columns",
+    [
+        "GPS_LON,GPS_LAT",
+        "gpsLat,gpsLng",
+        "Latitude (deg),Longitude (deg)",
+        "lat_dd,lon_dd",
+        "Position.Lon,Position.Lat",
+    ],
+)
+def test_names_that_people_give_longitudes_and_latitudes(name, tmp_path, columns):
+    file = tmp_path / "points.csv"
+    file.write_text(f"{columns},id\n13.4,52.5,a\n13.5,52.4,b\n")
+    run("load", name, file)
+    assert listed(name)["geographic"]
+    x, y = sorted(columns.split(","), key=lambda each: "lat" in each.lower())
+    run("load", f"{name}-b", file, "--x", x, "--y", y)
+    assert listed(f"{name}-b")["geographic"]
+
+
+LIKE_DEGREES = "is a plane, and its points look like longitudes and latitudes"
+
+
+@pytest.mark.usefixtures("served")
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        ("a,b\n13.4,52.5\n", ["--x", "a", "--y", "b"], LIKE_DEGREES),
+        ("13.4,52.5\n13.5,52.4\n", [], LIKE_DEGREES),
+        ("E,N\n13.4,52.5\n", [], LIKE_DEGREES),
+        (
+            "lat,lon\n52.5,13.4\n",
+            ["--x", "lat", "--y", "lon"],
+            "takes lat for x and lon for y: the longitude comes first",
+        ),
+        ("x,y\n13.4,52.5\n", [], None),
+        ("a,b\n13.4,52.5\n", ["--x", "a", "--y", "b", "--plane"], None),
+        ("a,b\n13.4,52.5\n", ["--x", "a", "--y", "b", "--geographic"], None),
+        ("E,N\n392000.5,5820000.25\n", [], None),
+        ("0.25,0.5\n0.75,0.5\n", [], None),
+        ("13,52\n14,53\n", [], None),
+        ("a,b\n52.5,113.4\n", ["--x", "a", "--y", "b"], None),
+    ],
+    ids=count(),
+)
+def test_points_of_a_plane_that_look_like_degrees_are_remarked_on(name, tmp_path, text, options, said):
+    file = tmp_path / "points.csv"
+    file.write_text(text)
+    done = run("load", name, file, *options, "--json")
+    assert json.loads(done.stdout)["name"] == name
+    found = [line for line in done.stderr.splitlines() if LIKE_DEGREES in line or "comes first" in line]
+    assert len(found) == (said is not None), done.stderr
+    assert said is None or f"{name} {said}" in found[0]
+
+
+@pytest.mark.usefixtures("served")
+def test_put_and_circles_remark_on_degrees_in_a_plane(name):
+    run("create", name, "--keyed", "str")
+    first = run("put", name, "a", "13.4", "52.5", "--json")
+    assert f"{name} {LIKE_DEGREES}" in first.stderr
+    assert json.loads(first.stdout)["points"] == 1
+    assert run("put", name, "b", "13.5", "52.5").stderr == ""  # it has been said
+    circle = run("fences", "create", name, "--circle", "13.4", "52.5", "20000", "--subjects", name, "--json")
+    assert "is in the plane, where 20000 is in the units of x and y" in circle.stderr
+    json.loads(circle.stdout)
+    assert run("fences", "create", f"{name}/a", "--circle", "13", "52", "2", "--subjects", name).stderr == ""
+    run("create", f"{name}-globe", "--keyed", "str", "--geographic")
+    assert run("put", f"{name}-globe", "a", "13.4", "52.5").stderr == ""
+    globe = "fences", "create", f"{name}/b", "--circle", "13.4", "52.5", "20000", "--subjects", f"{name}-globe"
+    assert run(*globe).stderr == ""
+    run("create", f"{name}-floor", "--keyed", "str")
+    assert run("put", f"{name}-floor", "a", "1340.5", "52.5").stderr == ""

@@ -153,7 +153,7 @@ def test_bad_rows_of_parquet(tmp_path, name):
         ("a.csv", "", [], "a.csv is empty"),
         ("a.csv", "x,y\n", [], "a.csv has no points"),
         ("a.csv", "x,y\na,b\n", [], "line 2: x is 'a', not a number"),
-        ("a.csv", "a,b\n1,2\n", [], "name its x column with --x; it has a, b"),
+        ("a.csv", "a,b\n1,2\n", [], "name two with --x and --y; it has a, b"),
         ("a.csv", "a,b\n1,2\n", ["--x", "a", "--y", "c"], "has no column 'c' (--y); it has a, b"),
         ("a.geojson", '{"type": "FeatureCollection", "features": []}', [], "has no points"),
         ("a.geojson", '{"features": [', [], "error: a.geojson is not valid JSON after 0 features: premature EOF\n"),
@@ -330,7 +330,7 @@ def test_a_name_of_two_columns_is_not_clear(tmp_path, name):
     file = tmp_path / "twice.csv"
     file.write_text("x,x,y\n1,2,3\n")
     done = dynhull("load", name, file, "--dry-run")
-    assert (done.exit_code, "name its x column with --x; it has x, x, y" in done.stderr) == (2, True)
+    assert (done.exit_code, "name two with --x and --y; it has x, x, y" in done.stderr) == (2, True)
     done = dynhull("load", name, file, "--x", "x", "--y", "y", "--dry-run")
     assert (done.exit_code, "has 2 columns 'x': give the number of one with --x" in done.stderr) == (2, True)
     done = dynhull("load", name, file, "--x", "2", "--y", "y", "--dry-run")

@@ -206,7 +206,7 @@ def test_a_sheet_of_excel(tmp_path, name):
     code, said = read(name, sheet, "--key", "id")
     assert (code, "2 points would be loaded, x from 13.25 to 13.5" in said) == (0, True), said
     assert "  row 3: lon is 'none', not a number\n" in said
-    assert "name its x column with --x; it has id, a, b" in read(name, xlsx(sheet, [["id", "a", "b"], [1, 2, 3]]))[1]
+    assert "name two with --x and --y; it has id, a, b" in read(name, xlsx(sheet, [["id", "a", "b"], [1, 2, 3]]))[1]
 
 
 def test_without_the_extra_the_error_says_what_to_install(tmp_path, name, monkeypatch):

@@ -76,7 +76,7 @@ def test_rows_without_a_name_or_a_time_are_bad(tmp_path):
     ("text", "options", "message"),
     [
         ("", {}, "is empty"),
-        ("a,b\n1,2\n", {}, "name its x column with --x; it has a, b"),
+        ("a,b\n1,2\n", {}, "name two with --x and --y; it has a, b"),
         ("a,b\n1,2\n", {"x": "a"}, "name its y column with --y; it has a, b"),
         ("a,b\n1,2\n", {"x": "a", "y": "c"}, r"has no column 'c' \(--y\); it has a, b"),
         ("x,y\n1,2\n", {"identity": "id"}, r"has no column 'id' \(--id\); it has x, y"),

@@ -66,6 +66,8 @@ def put(
     keys, points = keyed_rows(row)
     times = None if time is None else as_times([TimeReader("--time").read(time)] * len(keys))
     applied = client.put(name, keys_for(client, name, keys), points, times, only=only, ttl=duration(ttl, "--ttl"))
+    if applied.points == applied.inserted:  # the hull was empty, and can still be another one
+        _remark_on_degrees(client, name, points)
     _report(
         name, applied, f"{plural(applied.inserted, 'key')} new, {applied.moved:,} moved{_left_out(applied)}", as_json
     )
@@ -118,6 +120,21 @@ def _all_rows(points: list[str] | None) -> "Points":
     from .rows import given_or_read, number_rows
 
     return np.concatenate(list(number_rows(given_or_read(points))))
+
+
+def _remark_on_degrees(client: "HullClient", name: str, points: "Points") -> None:
+    from .keyed_rows import known_hull
+    from .reading.columns import look_like_degrees
+
+    if not look_like_degrees(points):
+        return
+    info = known_hull(client, name)
+    if info is not None and not info.geographic:
+        typer.echo(
+            f"{name} is a plane, and its points look like longitudes and latitudes: if they are, `dynhull create NAME "
+            "--geographic` makes a hull for them, on the globe",
+            err=True,
+        )
 
 
 def _left_out(applied: "Applied") -> str:

@@ -56,13 +56,13 @@ def show(client: "HullClient", name: FenceName, as_json: AsJson = False) -> None
 
     dynhull fences show depot
     """
-    from .shown import area_text, fence_members, settings_text, subjects_text
+    from .shown import area_text, fence_members, settings_text, subjects_text, unit_of
 
     fence = client.get_fence(name)
     if as_json:
         typer.echo(json_line(**fence_members(fence)))
         return
-    typer.echo(f"area\t{area_text(fence, _unit(client, fence))}")
+    typer.echo(f"area\t{area_text(fence, unit_of(client, fence))}")
     typer.echo(f"subjects\t{subjects_text(fence)}")
     typer.echo(f"settings\t{settings_text(fence) or 'the usual ones'}")
     typer.echo(f"inside\t{fence.inside} of {plural(fence.subject_count, 'subject')}")
@@ -75,20 +75,6 @@ def show(client: "HullClient", name: FenceName, as_json: AsJson = False) -> None
             f"consumer\t{each.name}: acknowledged {each.acknowledged}, {plural(each.backlog, 'event')} to come"
             f"{oldest}{lost}"
         )
-
-
-def _unit(client: "HullClient", fence: "Fence") -> str:
-    """The unit of lengths of a fence on the globe; empty in the plane, whose unit nobody knows."""
-    from dynhull_client import Circle
-
-    from ..keyed_rows import known_hull
-
-    if not isinstance(fence.area, Circle) or not isinstance(
-        fence.subjects, str
-    ):  # those with a prefix are in the plane
-        return ""
-    hull = known_hull(client, fence.subjects)
-    return " m" if hull is not None and hull.geographic else ""
 
 
 @connected

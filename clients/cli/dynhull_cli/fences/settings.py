@@ -97,6 +97,7 @@ def create(
             raise
         fence = client.create_fence(name, **chosen, exist_ok=True)  # refuses other settings
         created = False
+    _remark_on_degrees(client, fence)
     _print(fence, "created" if created else "exists", as_json)
 
 
@@ -109,7 +110,26 @@ def replace(client: "HullClient", name: FenceName, chosen: dict[str, Any], as_js
 
     Subjects that are inside of one area and outside of the other enter or leave, with the cause fence_changed.
     """
-    _print(client.replace_fence(name, **chosen), "replaced", as_json)
+    fence = client.replace_fence(name, **chosen)
+    _remark_on_degrees(client, fence)
+    _print(fence, "replaced", as_json)
+
+
+def _remark_on_degrees(client: "HullClient", fence: "Fence") -> None:
+    """Say so if a circle of the plane seems to be meant in degrees and metres."""
+    from dynhull_client import Circle
+
+    area = fence.area
+    if not isinstance(area, Circle) or abs(area.x) > 180 or abs(area.y) > 90 or area.r <= 360:
+        return
+    from .shown import unit_of
+
+    if not unit_of(client, fence):
+        typer.echo(
+            f"{fence.name} is in the plane, where {area.r:g} is in the units of x and y: if these are degrees, "
+            "`dynhull create NAME --geographic` makes a hull on the globe, where the radius is in metres",
+            err=True,
+        )
 
 
 def _require_one(*options: tuple[str, Any]) -> None:

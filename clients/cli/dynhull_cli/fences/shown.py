@@ -4,11 +4,12 @@ from dataclasses import asdict
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
-from dynhull_client import Circle, Fence, FenceEvent, Prefix
+from dynhull_client import Circle, Fence, FenceEvent, HullClient, Prefix
 from dynhull_surface.described import Setting, described
 from dynhull_surface.settings import FenceSettings
 
 from ..durations import shown
+from ..keyed_rows import known_hull
 from ..plural import plural
 
 if TYPE_CHECKING:
@@ -44,6 +45,16 @@ def event_members(event: FenceEvent) -> dict[str, Any]:
 def inside_members(subjects: "SubjectsInside") -> dict[str, Any]:
     """Keys of one hull as members of JSON."""
     return {"hull": subjects.hull, "keys": list(subjects.keys), "revision": subjects.revision}
+
+
+def unit_of(client: HullClient, fence: Fence) -> str:
+    """The unit of lengths of a fence on the globe; empty in the plane, whose unit nobody knows."""
+    if not isinstance(fence.area, Circle) or not isinstance(
+        fence.subjects, str
+    ):  # those with a prefix are in the plane
+        return ""
+    hull = known_hull(client, fence.subjects)
+    return " m" if hull is not None and hull.geographic else ""
 
 
 def area_text(fence: Fence, unit: str = "") -> str:

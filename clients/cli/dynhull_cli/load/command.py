@@ -40,9 +40,14 @@ def load(
     ] = None,
     x: Annotated[
         str | None,
-        _input("Column of x, by name or by number from 1. Default: x, lon, lng, long, longitude or easting."),
+        _input(
+            "Column of x, by name or by number from 1. Default: x, lon, lng, long, longitude, easting or e; or GPS_LON "
+            "and the like."
+        ),
     ] = None,
-    y: Annotated[str | None, _input("Column of y. Default: y, lat, latitude or northing.")] = None,
+    y: Annotated[
+        str | None, _input("Column of y. Default: y, lat, latitude, northing or n, or GPS_LAT and the like.")
+    ] = None,
     delimiter: Annotated[
         str | None, _input("Character between the columns of CSV, or tab or space. Default: found in the first lines.")
     ] = None,

@@ -24,6 +24,7 @@ from dynhull_client import (
 from ..json_lines import json_line
 from ..keyed_rows import known_hull
 from ..plural import plural
+from ..reading.columns import are_degrees, look_like_degrees, say_plane
 from .bad_rows import BadRows
 from .chunks import Chunk, Points, Rows, blocks
 from .refusals import Expected
@@ -111,6 +112,8 @@ def load_points(
             raise ValueError(_no_points(source, bad))
         _print_notes(source.notes)
         _make(client, name, source, known, geographic, silent=resume, replace=replace)
+        if not resume:
+            _print_notes(_doubts(name, source, first.points, geographic, known))
         sending = Sending(client, name, producer, patience, resume=resume, bad=bad, conditions=conditions)
         with (
             _resumable("--resume in place of --replace" if replace else "--resume", producer),
@@ -204,6 +207,27 @@ def _check_frame(info: "HullInfo", source: Source, geographic: bool | None) -> N
             f"{info.name} is a plane: it takes {' and '.join(source.axes)} for x and y, and has square degrees. "
             "`dynhull create NAME --geographic` makes a hull on the globe",
             err=True,
+        )
+
+
+def _doubts(
+    name: str,
+    source: Source,
+    points: Points,
+    geographic: bool | None,
+    known: "Callable[[], HullInfo | None]",
+) -> Iterator[str]:
+    """Lines about points that may be no x and y, by the names of their columns or by the first ones."""
+    x, y = source.axes or ("", "")
+    if are_degrees(y, x):
+        yield f"{name} takes {x} for x and {y} for y: the longitude comes first"
+        return
+    info = known()
+    says = source.degrees or say_plane(x, y) or source.elsewhere or geographic is not None
+    if not says and (info is None or not info.geographic) and look_like_degrees(points):
+        yield (
+            f"{name} is a plane, and its points look like longitudes and latitudes: if they are, --replace "
+            "--geographic loads them as places on the globe, and --plane says that they are not"
         )
 
 

@@ -1,9 +1,13 @@
 """Finds the columns of coordinates by name."""
 
+import re
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from pathlib import Path
 
-from dynhull.arrays import COLUMN_NAMES
+import numpy as np
+
+from dynhull.arrays import COLUMN_NAMES, Points
 
 from .values import is_number
 
@@ -22,6 +26,10 @@ GEOMETRY_NAMES = (
     "geog",
 )
 DEGREES = [pair for pair in COLUMN_NAMES if pair[1] in ("lat", "latitude")]
+PLANE = [pair for pair in COLUMN_NAMES if pair not in DEGREES]
+ABBREVIATED = (("eastings", "northings"), ("east", "north"), ("e", "n"))  # names of coordinates, if there are no others
+UNITS = re.compile(r"[(\[].*")
+FILLINGS = re.compile(r"^(gps|geo|position|location|coordinates|decimal|wgs84)|(degrees|degree|deg|decimal|dd|wgs84)$")
 GREATEST_LONGITUDE, GREATEST_LATITUDE = 360.0, 90.0
 UNKNOWN_LATITUDE = 91.0  # of AIS, with the longitude 181 (ITU-R M.1371)
 
@@ -33,7 +41,19 @@ def has_pair(columns: Sequence[str]) -> bool:
 
 def are_degrees(x: str, y: str) -> bool:
     """Whether the names of two columns say that these are longitudes and latitudes."""
-    return (x.strip().lower(), y.strip().lower()) in DEGREES
+    return (_plain(x), _plain(y)) in DEGREES
+
+
+def say_plane(x: str, y: str) -> bool:
+    """Whether the names of two columns say that these are coordinates of a plane."""
+    return (_plain(x), _plain(y)) in PLANE
+
+
+def look_like_degrees(points: Points) -> bool:
+    """Whether points may well be longitudes and latitudes: within their bounds, not all whole or in the unit square."""
+    size = np.abs(points)
+    fractions = bool((points % 1).any()) and bool((size > 1).any())
+    return fractions and bool((size <= (GREATEST_LONGITUDE / 2, GREATEST_LATITUDE)).all())
 
 
 def why_no_place(lon: float, lat: float) -> str | None:
@@ -56,6 +76,11 @@ def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, 
     pair = _pair(columns)
     if x is None and y is None and pair is not None:
         return pair
+    if x is None and y is None:
+        raise ValueError(
+            f"{path} has no columns with names such as x and y or lon and lat: name two with --x and --y; "
+            f"it has {', '.join(columns)}"
+        )
     found = []
     for option, column in (("--x", x), ("--y", y)):
         if column is None:
@@ -106,6 +131,16 @@ def pair_of(columns: Iterable[str]) -> tuple[str, str] | None:
 
 
 def _pair(columns: Sequence[str]) -> tuple[int, int] | None:
+    """The places of the first pair of known names, first of those that are written like this."""
     lowered = [column.strip().lower() for column in columns]
-    pairs = (pair for pair in COLUMN_NAMES if all(lowered.count(each) == 1 for each in pair))
-    return next(((lowered.index(x), lowered.index(y)) for x, y in pairs), None)
+    for names, pairs in ((lowered, COLUMN_NAMES), (list(map(_plain, columns)), (*COLUMN_NAMES, *ABBREVIATED))):
+        for x, y in pairs:
+            if names.count(x) == names.count(y) == 1:
+                return names.index(x), names.index(y)
+    return None
+
+
+@lru_cache(maxsize=1024)
+def _plain(column: str) -> str:
+    """A name without what is often written around it: GPS_LAT and Latitude (deg) are lat and latitude."""
+    return FILLINGS.sub("", re.sub("[^a-z0-9]", "", UNITS.sub("", column.lower())))
