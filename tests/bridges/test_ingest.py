@@ -144,10 +144,13 @@ def test_messages_say_when_keys_leave_and_the_command_which_are_put(
 def test_messages_without_contents_delete_keys(client: HullClient, address: str, name: str, nats_port: int) -> None:
     """In the order of the log, and once: a key that comes back afterwards stays."""
     at = {"lon": 1, "lat": 2}
-    publish(nats_port, name, [("a", at), ("b", at), ("a", b""), ("b", b""), ("b", at), ("unknown", b"")])
+    unknown = {"lon": 181, "lat": 91}
+    publish(nats_port, name, [("a", at), ("b", at), ("a", b""), ("b", b""), ("b", at), ("no", b""), ("c", unknown)])
     options = (f"nats://127.0.0.1:{nats_port}/{name}/{name}.*", "--hull", name, "--key", "{1}")
     said = ingested(address, *options, "--tombstones", "delete")
-    assert (said[-1]["points"], said[-1]["bad"]) == (6, 0)
+    (bad,) = (line["error"] for line in said if line["event"] == "bad message")
+    assert bad == "lat is 91.0, which AIS writes where it is not available"
+    assert (said[-1]["points"], said[-1]["bad"]) == (6, 1)
     assert client.get_hull(name).info.points == 1
     assert positions(client, name, ["b"]) == {"b": (1, 2)}
 

@@ -78,8 +78,9 @@ def test_degrees_are_rounded_once():
 
 
 @pytest.mark.usefixtures("served")
-def test_what_ais_has_not_is_a_bad_row_that_says_so(tmp_path, name):
+@pytest.mark.parametrize("frame", ["--geographic", "--plane"])
+def test_what_ais_has_not_is_a_bad_row_that_says_so(tmp_path, name, frame):
     file = tmp_path / "ships.csv"
     file.write_text("mmsi,lon,lat\n1,9.9,53.5\n2,181,91\n3,181.0,91.0\n")
-    done = dynhull("load", name, file, "--key", "mmsi", "--dry-run")
+    done = dynhull("load", name, file, "--key", "mmsi", "--dry-run", frame)
     assert done.stderr.count("the latitude is 91.0, which AIS writes where it is not available") == 2

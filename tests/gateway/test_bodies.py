@@ -137,9 +137,9 @@ def test_rows_that_a_keyed_hull_refuses_are_numbered(gateway: Gateway, keyed: st
 
 def test_rows_keep_their_numbers_when_a_key_comes_again(gateway: Gateway, name: str) -> None:
     gateway.post("/hulls", {"name": name, "keyed": "str", "geographic": True})
-    rows = b"".join(b'{"key": "%s", "lon": 0, "lat": %d}\n' % row for row in ((b"a", 0), (b"a", 1), (b"b", 91)))
+    rows = b"".join(b'{"key": "%s", "lon": 0, "lat": %d}\n' % row for row in ((b"a", 0), (b"a", 1), (b"b", 95)))
     refused = gateway.post(f"/hulls/{name}/rows?coalesce=true", rows, NDJSON).json
-    assert (refused["status"], refused["row"], refused["value"]) == (400, 2, "[0.0, 91.0]"), refused
+    assert (refused["status"], refused["row"], refused["value"]) == (400, 2, "[0.0, 95.0]"), refused
 
 
 def test_compressed_bodies_are_refused(gateway: Gateway, plane: str) -> None:
@@ -297,6 +297,19 @@ def test_times_without_a_time_zone_are_read_as_the_call_says(gateway: Gateway, k
         ({"time_format": "%s"}, "time_format"),
     ):
         assert (upload("2026-03-01", **query)["field"], upload("2026-03-01", **query)["status"]) == (field, 400)
+
+
+@pytest.mark.parametrize(
+    ("kind", "body"),
+    [
+        (NDJSON, b'{"lon": 1, "lat": 2}\n{"lon": 181, "lat": 91}\n{"longitude": "181", "latitude": "91"}\n[181, 91]\n'),
+        (CSV, b"lon,lat\n1,2\n181,91\n181.0,91.0\n3,90.5\n"),
+    ],
+)
+def test_what_ais_has_not_is_a_bad_row_of_a_plane_too(gateway: Gateway, plane: str, kind: str, body: bytes) -> None:
+    done = gateway.post(f"/hulls/{plane}/rows?max_bad=2", body, kind).json
+    assert (done["inserted"], [each["row"] for each in done["bad"]]) == (2, [1, 2])
+    assert {each["detail"] for each in done["bad"]} == {"which AIS writes where it is not available"}
 
 
 def test_rows_say_when_keys_leave_and_which_keys_are_put(gateway: Gateway, name: str) -> None:

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json, to_json
 from typing_extensions import TypedDict
 
-from dynhull_cli.reading.columns import pair_of
+from dynhull_cli.reading.columns import NOT_AVAILABLE, UNKNOWN_LATITUDE, available, pair_of
 from dynhull_cli.reading.labels import LabelReader, key_of
 from dynhull_cli.reading.values import BadValueError, coordinate, number
 
@@ -115,6 +115,8 @@ class Ndjson:
                 else:
                     given = LON_LAT(line)
                     point = given["lon"], given["lat"]
+                    if point[1] == UNKNOWN_LATITUDE:
+                        raise BadValueError("lat", NOT_AVAILABLE, point[1])
                 times: tuple[int | None, ...] = ()
                 if "time" in given or "expires" in given:
                     times = self._labels.times(given.get("time"), given.get("expires"))
@@ -152,7 +154,7 @@ class Ndjson:
         if names is None and self._delete and key is not None:
             return Row(key, None)
         x, y = names or COLUMNS
-        return Row(key, (coordinate(value.get(x), x), coordinate(value.get(y), y)), time, expires)
+        return Row(key, available((x, y), coordinate(value.get(x), x), coordinate(value.get(y), y)), time, expires)
 
 
 class Csv:
@@ -193,7 +195,7 @@ class Csv:
         point = None
         if self._point is not None:
             (x, first), (y, second) = self._point
-            point = coordinate(cells[first], x), coordinate(cells[second], y)
+            point = available((x, y), coordinate(cells[first], x), coordinate(cells[second], y))
         if not self._labelled:
             return Row(None, point)
         key, time, expires = self._labels(*(None if place is None else cells[place] for place in self._places))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import orjson
 
-from dynhull_cli.reading.columns import are_degrees
+from dynhull_cli.reading.columns import are_degrees, available
 from dynhull_cli.reading.labels import key_of
 from dynhull_cli.reading.nmea import position
 from dynhull_cli.reading.time_forms import TimeForm
@@ -79,7 +79,8 @@ class Mapping:
         leaving = [] if expires is None else ["expires", expires]
         more = [*leaving, *_written(form), *(["delete"] if deletes else []), *(["nmea"] if nmea else [])]
         self.digest = sha256(repr((hull, x, y, key, time, str(form.unit), each, *more)).encode()).hexdigest()[:12]
-        self.degrees = are_degrees(last_name(x), last_name(y))
+        self._axes = last_name(x), last_name(y)
+        self.degrees = are_degrees(*self._axes)
         self.swapped = are_degrees(last_name(y), last_name(x))
         self.warning: str | None = None
         self._timed = False  # whether there was a time already
@@ -142,7 +143,8 @@ class Mapping:
                 self._look_at(found, time)
         x = coordinate(_found(self._x, message, document), "x")
         y = coordinate(_found(self._y, message, document), "y")
-        return Row(self._name(message, document), key, x, y, time, self._end_of(message, document))
+        place = available(self._axes, x, y)
+        return Row(self._name(message, document), key, *place, time, self._end_of(message, document))
 
     def _end_of(self, message: Message, document: Any) -> int | None:
         found = None if self._expires is None else _found(self._expires, message, document)

@@ -120,7 +120,7 @@ class Source:
                             f"{self.name} is in {self.elsewhere[0]}, and the hull is on the globe, in degrees: "
                             "convert it, for example with ogr2ogr -t_srs EPSG:4326"
                         )
-                    yield places_only(chunk) if on_globe else chunk
+                    yield places_only(chunk, on_globe=on_globe) if on_globe or self.degrees else chunk
         except UndecodableError as error:
             has_rows = self.format in {*TABLES, Format.NDJSON} and not self.keep_bytes
             other = "; --bad-rows FILE leaves such rows out, and copies them as they are" if has_rows else ""

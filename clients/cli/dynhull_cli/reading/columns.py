@@ -9,7 +9,7 @@ import numpy as np
 
 from dynhull.arrays import COLUMN_NAMES, Points
 
-from .values import is_number
+from .values import BadValueError, is_number
 
 LONGITUDE_LATITUDE = "longitude", "latitude"
 GEOMETRY_NAMES = (
@@ -32,6 +32,7 @@ UNITS = re.compile(r"[(\[].*")
 FILLINGS = re.compile(r"^(gps|geo|position|location|coordinates|decimal|wgs84)|(degrees|degree|deg|decimal|dd|wgs84)$")
 GREATEST_LONGITUDE, GREATEST_LATITUDE = 360.0, 90.0
 UNKNOWN_LATITUDE = 91.0  # of AIS, with the longitude 181 (ITU-R M.1371)
+NOT_AVAILABLE = "which AIS writes where it is not available"
 
 
 def has_pair(columns: Sequence[str]) -> bool:
@@ -59,13 +60,20 @@ def look_like_degrees(points: Points) -> bool:
 def why_no_place(lon: float, lat: float) -> str | None:
     """Why two numbers are no longitude and latitude; None if they are."""
     if lat == UNKNOWN_LATITUDE:
-        return f"the latitude is {lat}, which AIS writes where it is not available"
+        return f"the latitude is {lat}, {NOT_AVAILABLE}"
     if abs(lat) > GREATEST_LATITUDE:
         hint = "; the longitude comes first" if abs(lon) <= GREATEST_LATITUDE else ""
         return f"the latitude is {lat}, not from -90 to 90 degrees{hint}"
     if abs(lon) > GREATEST_LONGITUDE:
         return f"the longitude is {lon}, not from -360 to 360 degrees"
     return None
+
+
+def available(names: tuple[str, str], x: float, y: float) -> tuple[float, float]:
+    """The coordinates of a row; BadValueError if they are those of AIS for a position that is not available."""
+    if y == UNKNOWN_LATITUDE and are_degrees(*names):
+        raise BadValueError(names[1], NOT_AVAILABLE, y)
+    return x, y
 
 
 def coordinate_columns(path: Path | str, columns: Sequence[str], x: str | None, y: str | None) -> tuple[int, int]:
