@@ -279,6 +279,7 @@ def test_a_time_that_the_hull_refuses_is_a_bad_row_and_every_count_is_told(name,
     file.write_text(AHEAD)
     options = ["--event-order", *window, "--max-skew", "1m"]
     assert dynhull("create", name, "--keyed", "str", *options).exit_code == 0
+    assert dynhull("list", name).stdout.endswith("1m ahead\n")
     load = ["load", name, file, "--key", "id", "--time", "seen"]
     dry = dynhull(*load, "--dry-run")
     assert dry.stdout.startswith(f"{name}: 4 points would be loaded, x from 0.0 to 7.0"), dry.stderr

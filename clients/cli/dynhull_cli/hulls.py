@@ -219,10 +219,15 @@ def _members(info: "HullInfo") -> dict[str, Any]:
 
 def _window(info: "HullInfo") -> str:
     """The limits of the window in a few characters; empty without one."""
-    if info.window is None:
+    window = info.window
+    if window is None:
         return ""
-    age = [] if info.window.max_age is None else [shown(info.window.max_age)]
-    return ", ".join([*age, *([] if info.window.max_points is None else [f"{info.window.max_points:,} points"])])
+    limits = (
+        None if window.max_age is None else shown(window.max_age),
+        None if window.max_points is None else f"{window.max_points:,} points",
+        None if window.max_skew is None else f"{shown(window.max_skew)} ahead",
+    )
+    return ", ".join(filter(None, limits))
 
 
 def _quarantine(info: "HullInfo") -> str:
