@@ -91,6 +91,7 @@ def test_times_are_read(served, name, load, options):
     assert told == READ[options]
 
 
+@pytest.mark.usefixtures("served")
 @pytest.mark.parametrize("options", REFUSED, ids=" ".join)
 def test_times_are_refused_with_what_helps(load, options):
     done = load(["2026-03-01T12:00:00Z", *REFUSED[options]], *options, "--dry-run")
