@@ -42,16 +42,14 @@ def coordinates_of(source: Any, name: str, *, on_globe: bool | None = False) -> 
         return _of_geometries(source, name) if len(source) and is_geometry(source[0]) else source
     series: Any = getattr(source, "geometry", None) if is_geometry(source) else None
     if hasattr(series, "to_numpy"):  # of a GeoSeries or a GeoDataFrame
-        if on_globe is not None:
-            from .crs import require_frame
-
-            require_frame(getattr(series, "crs", None), name, on_globe=on_globe)
+        _require_frame(getattr(series, "crs", None), name, on_globe)
         return _of_geometries(series.to_numpy(), name)
     if _is_arrow(source):
         from ._arrow import geometries_of
 
         found = geometries_of(source, name)
         if found is not None:
+            _require_frame(found.system, name, on_globe)
             return found.coordinates if found.geometries is None else _of_geometries(found.geometries, name)
     if hasattr(source, "columns"):
         return _of_frame(source, name)
@@ -67,6 +65,13 @@ def _polars_frame(source: Any) -> Any:
         return source.collect()
     # numpy would take the fields of a struct by their place: latitude, longitude as x, y
     return source.struct.unnest() if isinstance(source, polars.Series) and source.dtype == polars.Struct else source
+
+
+def _require_frame(system: Any, name: str, on_globe: bool | None) -> None:
+    if on_globe is not None and system is not None:
+        from .crs import require_frame
+
+        require_frame(system, name, on_globe=on_globe)
 
 
 def _is_arrow(source: Any) -> bool:

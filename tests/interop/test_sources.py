@@ -124,6 +124,18 @@ def test_what_has_no_points_is_an_error(source: object, complaint: str) -> None:
     assert len(hull) == 5
 
 
+@pytest.mark.parametrize("encoding", ["geoarrow", "WKB"])
+def test_arrow_that_names_its_reference_system(encoding: str) -> None:
+    degrees = SERIES.set_crs(4326).to_arrow(geometry_encoding=encoding)
+    assert len(GeoHull(degrees)) == 5
+    with pytest.warns(UserWarning, match="taken for x and y of a plane"):
+        DynamicHull(degrees)
+    frame = FRAME.set_crs(32633).to_arrow(geometry_encoding=encoding)
+    assert len(DynamicHull(frame)) == 5
+    with pytest.raises(ValueError, match="WGS 84 / UTM zone 33N, not in degrees"):
+        GeoHull(frame)
+
+
 def test_a_single_object_is_an_error() -> None:
     with pytest.raises(ValueError, match=r"points must have shape \(n, 2\), got None"):
         DynamicHull(np.array(None))
