@@ -137,6 +137,22 @@ def test_geometries_of_csv(tmp_path, served, name, text, geographic):
     assert ("--geographic reads degrees" in said) != geographic
 
 
+@pytest.mark.parametrize(
+    ("geometries", "geographic"),
+    [
+        (wkt(PLACES), False),
+        ([f"SRID=4326;{text}" for text in wkt(PLACES)], True),
+        ([{"type": "Point", "coordinates": each} for each in PLACES.tolist()], True),
+    ],
+    ids=["wkt", "ewkt", "geojson"],
+)
+def test_geometries_of_json(tmp_path, served, name, geometries, geographic):
+    file = tmp_path / "places.ndjson"
+    file.write_text("".join(json.dumps({"id": "a", "geog": each}) + "\n" for each in geometries))
+    points, on_globe, _ = loaded(served, name, file)
+    assert (points, on_globe) == (sorted(PLACES.tolist()), geographic)
+
+
 def test_lines_and_columns_of_csv(tmp_path, name):
     file = tmp_path / "places.csv"
     file.write_text('id,lon,lat,way\n1,8,9,"LINESTRING (0 0, 1 1, 2 3)"\n2,8,9,"POINT (4\n5)"\n3,8,9\n4,8,9,POINT,,7\n')

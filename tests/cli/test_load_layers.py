@@ -191,6 +191,25 @@ def test_a_file_that_is_cut(tmp_path, name, suffix):
     assert read(name, file)[0] == 2
 
 
+def test_coordinates_that_are_no_numbers(tmp_path, name):
+    """GDAL takes them for 0."""
+    track = gpx(tmp_path / "ride.gpx", "trkpt")
+    for wrong in "x", "", "52,5", "5_2":
+        track.write_text(track.read_text().replace('lat="', f'lat="{wrong}" was="', 1).replace("<trk>", "\n<trk>", 1))
+        assert read(name, track) == (2, f"error: {track}, line 2: lat is {wrong!r}, not a number\n")
+        gpx(track, "trkpt")
+    marks = kml(tmp_path / "marks.kml")
+    marks.write_text(marks.read_text().replace(",7</", ",7\n 13,n/a</", 1))
+    assert read(name, marks) == (2, f"error: {marks}, line 2: a coordinate is 'n/a', not a number\n")
+    zipped = tmp_path / "marks.kmz"
+    with zipfile.ZipFile(zipped, "w") as archive:
+        archive.write(marks, "doc.kml")
+    assert read(name, zipped) == (2, f"error: {zipped}, doc.kml, line 2: a coordinate is 'n/a', not a number\n")
+    with zipfile.ZipFile(zipped, "w") as archive:
+        archive.write(kml(marks), "doc.kml")
+    assert "50 points would be loaded" in read(name, zipped)[1]
+
+
 def test_a_shapefile_without_its_parts(tmp_path, name):
     file = write(tmp_path / "places.shp", shapely.points(PLACES), id=NAMES)
     file.with_suffix(".prj").unlink()

@@ -121,4 +121,4 @@ def _plain(array: Any) -> Any:
 
 
 def _text(value: Value) -> str:
-    return value.hex() if isinstance(value, bytes) else value or ""
+    return value.hex() if isinstance(value, bytes) else "" if value is None else str(value)

@@ -1,4 +1,4 @@
-"""A column of geometries: well-known binary, the same in hexadecimal digits, or well-known text, perhaps with SRID."""
+"""A column of geometries: well-known binary, also in hexadecimal digits, or text, perhaps with SRID; or GeoJSON."""
 
 import re
 from collections.abc import Sequence
@@ -13,7 +13,9 @@ from .geometry import positions
 from .reference_system import note_reference_system
 from .source import Source
 
-Value = bytes | str | None
+Value = bytes | str | dict[str, Any] | None
+"""WKB, a text, or GeoJSON."""
+DEGREES = 4326  # the SRID of GeoJSON
 
 WKB_POINTS = np.dtype([("order", "u1"), ("type", "<u4"), ("xy", "<f8", (2,))])
 LITTLE_ENDIAN, POINT = 1, 1
@@ -65,6 +67,8 @@ class GeometryColumn:
 
 def _decoded(row: Value) -> tuple[int | None, Any]:
     """The SRID of a geometry, None without one, and its GeoJSON."""
+    if isinstance(row, dict):
+        return DEGREES, row
     if isinstance(row, str):
         if HEXADECIMAL.fullmatch(row):
             row = bytes.fromhex(row)

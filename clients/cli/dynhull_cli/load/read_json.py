@@ -11,12 +11,13 @@ import ijson
 
 from ..peek import peek
 from ..plural import plural
-from ..reading.columns import coordinate_columns
+from ..reading.columns import coordinate_columns, geometry_column
 from ..reading.labels import Labels
 from ..reading.text import KEPT_BYTES, PART, require_decoded
 from ..reading.values import coordinate, json_text
 from .chunks import CHUNK_ROWS, LINE, Chunks, Position, cut, picked
 from .geometry import position, positions
+from .geometry_column import GeometryColumn
 from .reference_system import note_reference_system
 from .source import Source
 
@@ -211,7 +212,9 @@ def _labels(source: Source) -> Callable[[Any], Labels] | None:
 
 
 def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
-    """Reads a row: an object with members of x and y, an array of two numbers, or a GeoJSON feature or geometry.
+    """Reads a row: an array of two numbers, a GeoJSON feature or geometry, or an object with members of x and y.
+
+    Or an object with a member that is a geometry: GeoJSON, WKT or WKB.
 
     The first object decides which members these are.
     """
@@ -219,9 +222,10 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
     members = None if x is None or y is None else (x, y)
     source.axes.extend(members or ())
     noted: list[Any] = []
+    geometries: tuple[str, GeometryColumn] | None = None
 
     def read(value: Any) -> list[Position]:
-        nonlocal members
+        nonlocal members, geometries
         if isinstance(value, list):
             return [position(value)]
         if not isinstance(value, dict):
@@ -234,6 +238,14 @@ def _row_reader(source: Source) -> Callable[[Any], list[Position]]:
                 _note(source, crs)
                 noted.append(crs)
             return positions(value.get("geometry") if feature else value, source.options.vertices)
+        if members is None and geometries is None:
+            name = geometry_column(source.name, list(value), x, y, source.options.geometry)
+            if name is not None:
+                source.notes.append(f"{source.name}: points from the geometries in {name}")
+                geometries = name, GeometryColumn(source, name, system_known=False)
+        if geometries is not None:
+            name, column = geometries
+            return column.positions(value.get(name))
         if members is None:
             names = list(value)
             i, j = coordinate_columns(source.name, names, x, y)

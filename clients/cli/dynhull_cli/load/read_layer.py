@@ -6,10 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from xml.parsers import expat
 
 import pyogrio
-from pyogrio.errors import DataLayerError, DataSourceError
 
 from ..plural import plural
 from ..reading.columns import coordinate_columns, geometry_column
@@ -18,6 +16,7 @@ from .chunks import CHUNK_ROWS, Chunks
 from .options import Format
 from .reference_system import note_reference_system
 from .source import Source
+from .xml_numbers import require_numbers
 
 # GDAL chooses a driver by what is in a file, and some drivers read what the file names, of this machine or the network.
 DRIVERS = {
@@ -30,6 +29,7 @@ DRIVERS = {
 }
 LINES_OF_POINTS = {"tracks", "routes"}  # layers of GPX; their points are layers, too
 WKB_COLUMN = "wkb_geometry"  # where the layer has no name for it
+UNREADABLE = RuntimeError, OSError, zipfile.BadZipFile  # the first is the base of pyogrio's errors
 SHAPEFILE_HEADER = struct.Struct(">i20xi")
 SHAPEFILE_MARK, WORD = 9994, 2  # bytes
 
@@ -38,8 +38,8 @@ def read_layer(source: Source) -> Chunks:
     """Chunks of points, a few features at a time, from the geometries of a layer, or from its columns of x and y."""
     if source.size is None:
         raise ValueError(f"{source.name} is a pipe, and {source.format} is read by GDAL: write it to a file first")
-    path = CHECKS.get(source.format, _path)(source)
     with _explained(source):
+        path = CHECKS.get(source.format, _path)(source)
         layer = _layer(source, path)
         info = pyogrio.read_info(path, layer=layer)
     if info["driver"] not in DRIVERS[source.format]:
@@ -117,7 +117,7 @@ def _explained(source: Source) -> Iterator[None]:
     """ValueError with the name of the file for what GDAL cannot read."""
     try:
         yield
-    except (DataSourceError, DataLayerError, OSError) as error:
+    except UNREADABLE as error:
         problem, _, _ = str(error).replace("\n", " ").partition("; It might help")
         raise ValueError(f"{source.name} cannot be read as {source.format}: {problem}") from None
 
@@ -153,13 +153,17 @@ def _shapefile(source: Source) -> str:
 
 
 def _xml(source: Source) -> str:
-    """The path; ValueError where the file is not XML to its end: GDAL reads GPX as far as it gets, without a word."""
-    if not zipfile.is_zipfile(source.name):
-        try:
-            expat.ParserCreate().ParseFile(source.file)
-        except expat.ExpatError as error:
-            raise ValueError(f"{source.name} is not XML to its end: {error}") from None
-    return _path(source)
+    """The path; ValueError where a document is no XML to its end, or a coordinate in it is no number."""
+    path = _path(source)
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            for name in archive.namelist():
+                if name.lower().endswith(".kml"):
+                    with archive.open(name) as document:
+                        require_numbers(f"{source.name}, {name}", document)
+    else:
+        require_numbers(source.name, source.file)
+    return path
 
 
 CHECKS: dict[Format, Callable[[Source], str]] = {Format.SHP: _shapefile, Format.GPX: _xml, Format.KML: _xml}

@@ -50,7 +50,7 @@ APPLIES_TO = {
     "time_unit": ROWS,
     "expires": ROWS,
     "layer": LAYERS,
-    "geometry": TABLES | {Format.PARQUET} | LAYERS,
+    "geometry": ROWS - {Format.GEOJSON},
     "time_zone": ROWS,
     "ambiguous": ROWS,
     "time_format": ROWS,
