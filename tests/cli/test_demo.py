@@ -165,6 +165,15 @@ def test_points_of_ones_own(tmp_path):
     assert is_picture(picture)
 
 
+def test_what_the_picture_needs_is_missing_before_the_replay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = tmp_path / "table.csv"
+    table.write_text("x,y\n1,2\n")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    done = demo("--points", table, "--out", tmp_path / "picture.png")
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: dynhull demo needs matplotlib, which is not installed. Install it with: pip")
+
+
 def test_longitudes_and_latitudes_of_ones_own_are_on_the_globe(tmp_path):
     file, picture = tmp_path / "fleet.csv", tmp_path / "fleet.png"
     rows = ["1,a,179,-17", "1,b,-179.5,-18", "1,c,178,-18", "2,a,179.2,-16", "3,c,-18,177"]

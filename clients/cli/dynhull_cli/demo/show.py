@@ -1,5 +1,6 @@
 """Shows a replay: its milestones, its largest hull and whether every step agreed."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from rich.console import Console
@@ -16,6 +17,8 @@ MOST_CORNERS = 12  # named in a line
 
 def show(console: Console, scene: Scene, out: Path) -> bool:
     """Replay a scene, print its milestones and draw the picture; returns whether every step agreed."""
+    if find_spec("matplotlib") is None:  # say so before the replay, not when the picture is to be drawn
+        raise ModuleNotFoundError(name="matplotlib")
     console.print(f"[bold]{scene.title}[/bold]")
     for note in scene.notes:
         console.print(note, markup=False)
