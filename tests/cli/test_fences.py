@@ -73,7 +73,7 @@ def move(name: str, key: str, x: float, y: float) -> None:
 
 
 @pytest.mark.usefixtures("served")
-def test_the_life_of_a_fence(name: str, tmp_path: Path) -> None:
+def test_the_life_of_a_fence(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert dynhull("create", name, "--keyed", "str").exit_code == 0
     move(name, "truck", 3, 1)
     create = ("create", name, "--polygon", TRIANGLE, "--subjects", name)
@@ -101,7 +101,8 @@ def test_the_life_of_a_fence(name: str, tmp_path: Path) -> None:
 
     move(name, "truck", 3, 1)
     assert ran("inside", name) == [f"{name}\ttruck"]
-    file = tmp_path / "zone.geojson"
+    monkeypatch.chdir(tmp_path)
+    file = Path("polygon.geojson")  # which begins as WKT does
     file.write_text(json.dumps(GEOJSON))
     assert ran("replace", name, "--polygon", file, "--subjects", name) == [f"{name}: replaced, 1 inside"]
     assert ran("replace", name, "--circle", 0, 0, 1, "--subjects", name) == [f"{name}: replaced, 0 inside"]

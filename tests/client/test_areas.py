@@ -38,6 +38,8 @@ def nowhere(connect: type[HullClient]) -> HullClient:
             "area.coordinates[1].exterior has 2 corners: a polygon has at least 3",
         ),
         (Shape(), "area is an empty Polygon: it has no corners"),
+        ("POLYGON ((0 0, 4 O, 4 3, 0 0))", "area is not WKT: character 18: 'O' is not a number"),
+        ("POLYGON EMPTY", "area is an empty Polygon: it has no corners"),
         (7, "area is 7: must be the name of a hull, a Circle, a Polygon or (n, 2) corners"),
     ],
 )

@@ -52,3 +52,9 @@ def test_errors_name_the_proxy(no_server: str, connect: type[HullClient]) -> Non
         with client.watch("a") as watch, pytest.raises(UnavailableError, match=f"through the proxy {no_server}"):
             next(watch)
     assert "secret" not in str(call.value)
+
+
+def test_errors_ask_whether_the_server_runs(connect: type[HullClient]) -> None:
+    with connect("127.0.0.1:1", retries=0) as client, pytest.raises(UnavailableError) as call:
+        client.create_hull("a")
+    assert call.value.__notes__ == ["Is a server running at 127.0.0.1:1 (dynhull serve), without TLS?"]

@@ -75,6 +75,8 @@ AREAS = {
         MultiPolygon([HOLED, box(5, 5, 6, 6)]),
         [Polygon(SQUARE, [HOLE]), Polygon([[6, 5], [6, 6], [5, 6], [5, 5]])],
     ),
+    "WKT": (f" {HOLED.wkt}", (Polygon(SQUARE, [HOLE]),)),
+    "several as WKT": (["polygon z((0 0 1, 4 0 2, 4 3 3, 0 0 1))"], [Polygon([[0, 0], [4, 0], [4, 3]])]),
     "geopandas": (GeoSeries([HOLED]), (Polygon(SQUARE, [HOLE]),)),
     "GeoJSON": (json.loads(json.dumps(HOLED.__geo_interface__)), (Polygon(SQUARE, [HOLE]),)),
     "GeoJSON with heights": (

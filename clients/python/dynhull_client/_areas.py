@@ -11,6 +11,7 @@ from dynhull.arrays import Points, as_coordinate, as_points
 from dynhull_proto.v1 import fence_pb2
 
 from ._messages import decode_points, encode_points
+from .wkt import is_wkt, polygons_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +71,16 @@ def as_area(area: Any) -> Area:
     """An area in one of its forms.
 
     Args:
-        area: the name of a hull, a `Circle`, a `Polygon`, (n, 2) corners, GeoJSON of polygons, a geometry with
+        area: the name of a hull, a `Circle`, a `Polygon`, (n, 2) corners, GeoJSON or WKT of polygons, a geometry with
             `__geo_interface__`, or a list of polygons in these forms.
 
     Raises:
         ValueError: a polygon has fewer than three corners, or a corner that is not finite; the message names its row.
         TypeError: it is in none of these forms.
     """
-    return area if isinstance(area, str | Circle) else tuple(_polygons(area, "area"))
+    if isinstance(area, Circle) or (isinstance(area, str) and not is_wkt(area)):
+        return area
+    return tuple(_polygons(area, "area"))
 
 
 def encode_area(area: Area, config: fence_pb2.FenceConfig) -> None:
@@ -110,6 +113,8 @@ def decode_area(config: fence_pb2.FenceConfig) -> Area:
 def _polygons(area: Any, name: str) -> Iterator[Polygon]:
     if isinstance(area, Polygon):
         yield area
+    elif isinstance(area, str) and is_wkt(area):
+        yield from _polygons(polygons_of(area, name), name)
     elif isinstance(area, Mapping) or hasattr(type(area), "__geo_interface__"):
         yield from _of_geojson(area if isinstance(area, Mapping) else area.__geo_interface__, name)
     elif isinstance(area, list | tuple | np.ndarray):

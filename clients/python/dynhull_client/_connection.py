@@ -15,7 +15,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from ._address import is_local, proxy_of, target
 from ._arguments import require_not_negative
 from ._calls import Call
-from ._errors import DynhullError, error_of
+from ._errors import DynhullError, error_of, not_sent
 from ._home import Home, require_grpc
 from ._retry import Attempts
 
@@ -118,7 +118,11 @@ class Connection:
 
     def error_of(self, call: grpc.Call | grpc.RpcError, method: str) -> DynhullError:
         """The error that a finished call of a method ended with."""
-        return error_of(call, method, self._proxy)
+        error = error_of(call, method, self._proxy)
+        if not_sent(error):
+            tls = "without" if self._tls is None else "with"
+            error.add_note(f"Is a server running at {self.address} (dynhull serve), {tls} TLS?")
+        return error
 
     def _open(self) -> None:
         require_grpc()

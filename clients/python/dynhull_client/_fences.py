@@ -67,7 +67,8 @@ def create_fence(  # noqa: D417  # the settings have their descriptions
     Args:
         name: 1 to 200 letters a to z and A to Z, digits and "._-/". A hull may have the same name.
         area: the name of a hull, whose area moves as its points do; or a polygon: (n, 2) corners, a `Polygon` with
-            holes, GeoJSON, a geometry with `__geo_interface__`, or a list of these, joined by "or"; or a `Circle`.
+            holes, GeoJSON, WKT (with shapely), a geometry with `__geo_interface__`, or a list of these, joined by "or";
+            or a `Circle`.
         subjects: the keyed hull whose keys are compared; or a `Prefix` for all keyed hulls with such names,
         other_hull: or a hull that is compared as a whole, with an area that is a hull.
         SETTINGS
