@@ -324,7 +324,7 @@ def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Bro
 
 def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullClient, fleet: str, yard: str) -> None:
     long = yard + "-long" * 20
-    client.create_fence(long, Circle(99, 99, 1), fleet, initial="none")
+    client.create_fence(long, Circle(99.123, 99.123, 1), fleet, initial="none")
     with opened(browser, url, fences=[yard, long], **PHONE) as page:
         wait_for_inside(page, yard, {"in": [1, 2]})
         client.put(fleet, ["x" * 60], [[2, 2]])
@@ -333,21 +333,58 @@ def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullC
         assert page.locator(".events .scroll").evaluate("each => each.scrollWidth <= each.clientWidth")
         names = page.locator(".table tbody th")
         expect(names).to_have_count(3)
-        assert names.evaluate_all("all => all.map(each => each.scrollWidth <= each.clientWidth)") == [True] * 3
+        for parts in (names, page.locator(".table td")):
+            fit = parts.evaluate_all("all => all.map(each => each.scrollWidth <= each.clientWidth)")
+            assert fit == [True] * len(fit)
         assert events(page).first.bounding_box()["height"] < 150
+
+
+CONTRAST = """([over, under]) => {
+    const rgb = colour => colour.startsWith("#") ? colour.match(/[0-9a-f]{2}/gi).map(each => parseInt(each, 16))
+        : colour.match(/[0-9.]+/g).slice(0, 3)
+    const light = colour => rgb(colour).map(each => each / 255)
+        .map(each => each <= 0.04045 ? each / 12.92 : ((each + 0.055) / 1.055) ** 2.4)
+        .reduce((sum, each, i) => sum + each * [0.2126, 0.7152, 0.0722][i], 0)
+    const [low, high] = [light(over), light(under)].sort((one, two) => one - two)
+    return (high + 0.05) / (low + 0.05)
+}"""
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_list_has_contrast(browser: Browser, url: str, yard: str, scheme: str) -> None:
-    contrast = """([over, under]) => {
-        const light = colour => colour.match(/[0-9.]+/g).slice(0, 3).map(each => each / 255)
-            .map(each => each <= 0.04045 ? each / 12.92 : ((each + 0.055) / 1.055) ** 2.4)
-            .reduce((sum, each, i) => sum + each * [0.2126, 0.7152, 0.0722][i], 0)
-        const [low, high] = [light(over), light(under)].sort((one, two) => one - two)
-        return (high + 0.05) / (low + 0.05)
-    }"""
     with opened(browser, url, fences=[yard], color_scheme=scheme) as page:
         for part in (".type", ".when", ".cause", ".subject"):
             ink = events(page).first.locator(part).evaluate("each => getComputedStyle(each).color")
             paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
-            assert page.evaluate(contrast, [ink, paper]) >= 4.5, part
+            assert page.evaluate(CONTRAST, [ink, paper]) >= 4.5, part
+
+
+def test_hulls_and_fences_have_contrast_on_the_dark_page(browser: Browser, url: str, fleet: str, yard: str) -> None:
+    more = [f"no-{i}" for i in range(9)]
+    with opened(browser, url, fleet, *more, fences=[yard], color_scheme="dark") as page:
+        wait_for_inside(page, yard, {"in": [1, 2]})
+        inks = page.evaluate("[...picture.hulls.values(), ...picture.fences.values()].map(({look}) => look.colour)")
+        inks += page.locator(".picker svg").evaluate_all("all => all.map(each => getComputedStyle(each).fill)")
+        grounds = page.evaluate(
+            "['--paper', '--sea', '--raised'].map(each => getComputedStyle(document.body).getPropertyValue(each))"
+        )
+        assert len(inks) == 22
+        assert min(page.evaluate(CONTRAST, [ink, ground]) for ink in inks for ground in grounds) >= 4.5
+
+
+def test_a_crowd_inside_does_not_hide_the_hull(browser: Browser, url: str, fleet: str, yard: str) -> None:
+    with opened(browser, url, fleet, fences=[yard]) as page:
+        crowd, alone = page.evaluate("""() => {
+            const crowd = Array.from({length: 50}, (_, row) => [400 + row % 7, 300 + row / 7])
+            return [sizes_in_crowds([...crowd, [9, 9]], 16).slice(0, 50), sizes_in_crowds([[9, 9], [NaN, NaN]], 16)]
+        }""")
+        assert max(crowd) < 0.5
+        assert alone == [1, 1]
+
+
+def test_old_events_have_their_date_and_all_their_zone(browser: Browser, url: str, fleet: str, yard: str) -> None:
+    look = {"timezone_id": "Asia/Kolkata"}
+    with opened(browser, url, fleet, fences=[yard], **look) as page:
+        expect(page.locator(".events h2")).to_have_text("Events newest first, the last 100, times in GMT+5:30")
+        old = 'events.show(), events.element(["9", Date.UTC(2021, 4, 6, 20), "enter", "old", "", ""], "").textContent'
+        assert page.evaluate(old).startswith("May 701:30:00")

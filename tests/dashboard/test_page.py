@@ -241,6 +241,22 @@ def test_a_key_is_found_and_followed(browser: Browser, url: str, client: HullCli
         expect(found).to_have_count(0)
 
 
+def test_keys_are_looked_for_where_there_are_some(
+    browser: Browser, url: str, client: HullClient, hull: str, name: str
+) -> None:
+    client.create_hull(f"{name}-keyed", keyed="str", geographic=True)
+    client.put(f"{name}-keyed", ["a"], [[13.123456789, 52.123456789]])
+    with opened(browser, url, hull) as page:
+        wait_for_vertices(page, hull, SQUARE)
+        field = page.get_by_label("Find a key")
+        expect(field).to_be_hidden()
+        pick(page, f"{name}-keyed")
+        field.fill("a")
+        field.press("Enter")
+        found = page.get_by_role("list", name="Where the key is").locator("li")
+        expect(found.nth(1)).to_contain_text("longitude 13.123457, latitude 52.123457, revision 1")
+
+
 def test_the_picture_stands_still_while_hulls_move_in_it(browser: Browser, url: str) -> None:
     with opened(browser, url, "none") as page:
         frame = page.evaluate("frame_around([0, 0, 10, 6], undefined)")

@@ -25,6 +25,13 @@ def axes(center: Center | None) -> tuple[str, str]:
     return ("x", "y") if center is None else ("longitude", "latitude")
 
 
+def position_text(x: float, y: float, center: Center | None) -> str:
+    """A place in words: in degrees to the decimetre, in a plane with eight digits."""
+    if center is None:
+        return f"x {x:.8g}, y {y:.8g}"
+    return f"longitude {round(x, 6):.9g}, latitude {round(y, 6):.8g}"
+
+
 def shown(places: Points, center: Center | None) -> Points:
     """The places with longitudes within half a turn of the centre, so that no hull is torn at 180 degrees.
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dynhull_cli.fences.shown import area_text, subjects_text
 from dynhull_client import Fence, HullNotFoundError
 
-from .degrees import axes
+from .degrees import axes, position_text
 from .event_rows import shortened
 from .feed import HullFeed
 from .fence_feed import FenceFeed
@@ -78,6 +78,5 @@ def describe_key(key: str, feed: HullFeed, sighting: Sighting) -> list[str]:
     if not feed.keyed:
         return [f"The points of {feed.name} have no keys", ""]
     sentence = SENTENCES[sighting.state].format(key=key, hull=feed.name)
-    x, y = axes(feed.center)
-    at = f"{x} {sighting.x:.12g}, {y} {sighting.y:.12g}, revision {sighting.revision:,}"
+    at = f"{position_text(sighting.x, sighting.y, feed.center)}, revision {sighting.revision:,}"
     return [sentence, at if sighting.seen else ""]

@@ -27,6 +27,9 @@ LOOKS = (
     Look("#CC79A7", (3, 6), "square"),
 )
 
+# On the dark page those whose contrast with it is below 4.5:1 are lighter.
+ON_DARK = {"#0072B2": "#3D9BE0", "#D55E00": "#EE7A2E", "#009E73": "#1FB98A", "#9b5de5": "#BB8CFF", "#7d8590": "#9AA5B1"}
+
 # Series of the whole server belong to no hull. This grey has a contrast above 3:1 with the light and the dark page.
 NEUTRAL = "#7d8590"
 MEAN, PERCENTILE = Look(NEUTRAL, ()), Look(NEUTRAL, (6, 3))

@@ -8,7 +8,7 @@ from typing import Any
 from dynhull_client import AsyncHullClient, DynhullError, Influence, Points, UnavailableError
 
 from .cards import number
-from .degrees import SQUARE_KILOMETRE, axes, outline, shown, shown_place
+from .degrees import SQUARE_KILOMETRE, outline, position_text, shown, shown_place
 from .feed import HullFeed
 from .feeds import Feeds
 from .outline import drawn
@@ -80,8 +80,7 @@ class OutlierFeed:
             x, y = shown_place(x, y, self._hull.center)
             found = {"vertex": [x, y], "label": area if key is None else f"{key}: {area}"}
             vertex = "its most influential vertex" if key is None else key
-            across, up = axes(self._hull.center)
-            at = f"{across} {x:.12g}, {up} {y:.12g}, revision {influence.revision:,}"
+            at = f"{position_text(x, y, self._hull.center)}, revision {influence.revision:,}"
             self.words = f"Without {vertex}, {self._name} would lose {area}", at
         drawings = [self._drawing(layer) for layer in layers]
         message = json.dumps({"kind": "outliers", "hull": self._name, "layers": drawings, **found})

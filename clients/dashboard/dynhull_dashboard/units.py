@@ -16,6 +16,11 @@ class Units:
         return self.x == self.y
 
     @property
+    def known(self) -> bool:
+        """Whether there are any."""
+        return bool(self.x or self.y)
+
+    @property
     def area(self) -> str:
         """The unit of areas."""
         if self.same:

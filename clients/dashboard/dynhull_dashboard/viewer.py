@@ -204,7 +204,9 @@ class Viewer:
         sightings = [(shown.feed.search.find(sought), shown) for shown in self._shown.values()] if sought else []
         words = [describe_key(sought, shown.feed, sighting) for sighting, shown in sightings]
         places = [[each.x, each.y, shown.look.colour] for each, shown in sightings if each.present]
-        return {"sought": sought, "found": words, "places": places}
+        # With the first drawing, so that the field for keys does not move the picture later.
+        keyed = any(shown.feed.followed and shown.feed.keyed for shown in self._shown.values())
+        return {"sought": sought, "found": words, "places": places, "keyed": keyed}
 
     def _looks(self) -> dict[str, Any]:
         return {

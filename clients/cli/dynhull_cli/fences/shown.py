@@ -58,11 +58,12 @@ def unit_of(client: HullClient, fence: Fence) -> str:
 
 
 def area_text(fence: Fence, unit: str = "") -> str:
-    """The area in a few words; `unit` is that of lengths."""
+    """The area in a few words; `unit` is that of lengths, behind a space: kilometres are said of many metres."""
     if isinstance(fence.area, str):
         return f"hull {fence.area}"
     if isinstance(fence.area, Circle):
-        return f"circle around ({fence.area.x:g}, {fence.area.y:g}), radius {fence.area.r:g}{unit}"
+        radius = f"{fence.area.r / 1000:g} km" if unit == " m" and fence.area.r >= 1000 else f"{fence.area.r:g}{unit}"
+        return f"circle around ({fence.area.x:g}, {fence.area.y:g}), radius {radius}"
     corners = sum(len(each.exterior) + sum(map(len, each.holes)) for each in fence.area)
     holes = sum(len(each.holes) for each in fence.area)
     several = f"{len(fence.area)} polygons" if len(fence.area) > 1 else "polygon"

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import json
 import re
 from html import escape
 from pathlib import Path
@@ -12,7 +13,7 @@ from tornado.web import RequestHandler
 from ..cards import key, symbol
 from ..event_rows import MOST_EVENTS
 from ..hub import Hub
-from ..looks import FENCE_COLOUR, FENCE_LOOKS, INSIDE, LOOKS, MEAN, NEUTRAL, PERCENTILE
+from ..looks import FENCE_COLOUR, FENCE_LOOKS, INSIDE, LOOKS, MEAN, NEUTRAL, ON_DARK, PERCENTILE
 from ..tiles import Tiles
 
 HERE = Path(__file__).parent
@@ -58,7 +59,7 @@ class PageHandler(RequestHandler):
 def page(hub: Hub, tiles: Tiles | None) -> tuple[str, str]:
     """The HTML, and its version."""
     units = hub.units
-    area = units.area if units.area == "km²" else f"{units.area}; km² on the globe"
+    area = "km²" if units.area == "km²" else f"{units.area}; km² on the globe" if units.known else "km² on the globe"
     settings = {
         "address": hub.address,
         "x_unit": units.x,
@@ -70,6 +71,7 @@ def page(hub: Hub, tiles: Tiles | None) -> tuple[str, str]:
         "most_events": MOST_EVENTS,
         "fence_colour": FENCE_COLOUR,
         "neutral": NEUTRAL,
+        "on_dark": json.dumps(ON_DARK),
         "percentile_dash": " ".join(map(str, PERCENTILE.dash)),
         "tiles": tiles.url if tiles else "",
         "largest_zoom": tiles.largest_zoom if tiles else 0,
@@ -77,7 +79,7 @@ def page(hub: Hub, tiles: Tiles | None) -> tuple[str, str]:
     }
     texts = {name: escape(str(value)) for name, value in settings.items()}
     pictures = {"inside": symbol(INSIDE), "mean": key(MEAN), "percentile": key(PERCENTILE)}
-    parts = {"styles": _read("page.css"), "scripts": "".join(map(_read, SCRIPTS))}
+    parts = {"styles": _read("page.css") + _dark_symbols(), "scripts": "".join(map(_read, SCRIPTS))}
     content = "".join([_read("page.html"), *parts.values(), *texts.values()])
     version = hashlib.sha256(content.encode()).hexdigest()[:16]
     return Template(_read("page.html")).substitute(texts, **pictures, **parts, version=version), version
@@ -97,6 +99,15 @@ def _hash(html: str, element: str) -> str:
     """Names the content of an element of the page, as a policy does."""
     (content,) = re.findall(f"<{element}>(.*?)</{element}>", html, re.DOTALL)
     return "sha256-" + base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+
+
+def _dark_symbols() -> str:
+    """The colours of symbols on the dark page as CSS."""
+    rules = "".join(
+        f'  [fill="{colour}"] {{ fill: {lighter}; }} [stroke="{colour}"] {{ stroke: {lighter}; }}\n'
+        for colour, lighter in ON_DARK.items()
+    )
+    return f"@media (prefers-color-scheme: dark) {{\n{rules}}}\n"
 
 
 def _read(name: str) -> str:

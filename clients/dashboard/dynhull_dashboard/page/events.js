@@ -7,6 +7,8 @@ class Events {
     this.look_for = look_for
     this.rows = new Map()
     this.shown = new Map()
+    const zone = new Intl.DateTimeFormat("en", {timeZoneName: "short"}).formatToParts().find(({type}) => type == "timeZoneName")
+    find(".events .zone").textContent = zone.value
     find(".events .scroll").addEventListener("keydown", event => this.choose(event))
   }
   // The keys in the list are one stop of the Tab key, not a hundred: arrows move between them.
@@ -33,6 +35,12 @@ class Events {
     })
   }
   show() {
+    const today = new Date().toDateString()
+    if (this.today != today) {  // other rows have their date
+      this.today = today
+      this.shown.clear()
+      find(".events tbody").replaceChildren()
+    }
     const rows = [...this.rows].flatMap(([fence, rows]) => {
       let at = Number.MAX_VALUE  // lost events have no time: they stay before what came after them
       return rows.map(row => ({row, fence, at: at = Math.min(at, row[1] ?? at)}))
@@ -66,6 +74,11 @@ class Events {
       const moment = new Date(at)
       time.dateTime = time.title = moment.toISOString()
       time.textContent = moment.toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})
+      if (moment.toDateString() != this.today) {
+        const date = document.createElement("small")
+        date.textContent = moment.toLocaleDateString("en", {day: "numeric", month: "short"})
+        time.prepend(date)
+      }
     }
     row.className = type
     row.append(cell("when", time), cell("type", EVENT_WORDS[type] ?? type), cell("subject", key ? this.button(key) : text),

@@ -57,16 +57,16 @@ function draw_fences(canvas, {view, hulls, fences}) {
 }
 function draw_marks(canvas, {view, hulls, fences, colours}) {
   for (const fence of fences.values()) {
-    canvas.beginPath()
-    for (const {place} of fence.marks(hulls)) {
-      const [across, down] = view.place(...place)
-      if (!isNaN(across)) add_marker(canvas, "star", across, down)
-    }
+    const places = fence.marks(hulls).map(({place}) => view.place(...place)), sizes = sizes_in_crowds(places, STAR_SIZE)
     canvas.fillStyle = fence.look.colour
     canvas.strokeStyle = colours.paper
     canvas.lineWidth = 1
-    canvas.fill()
-    canvas.stroke()
+    for (const crowded of [true, false]) {  // edges of a crowd would be all that is seen
+      canvas.beginPath()
+      places.forEach((place, row) => isNaN(place[0]) || sizes[row] < 1 != crowded || add_marker(canvas, "star", place, sizes[row]))
+      canvas.fill()
+      if (!crowded) canvas.stroke()
+    }
   }
 }
 // The name above or below each area, or in its middle: where there is room; else above or below, over points.

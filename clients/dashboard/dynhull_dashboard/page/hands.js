@@ -69,8 +69,8 @@ class Hands {
     if (!thing) return
     const title = document.createElement("strong")
     title.textContent = thing.title
-    const [x, y] = thing.place.map(each => +each.toPrecision(12))
-    const names = this.picture.view.globe ? ["longitude", "latitude"] : ["x", "y"]
+    const {globe} = this.picture.view, [x, y] = thing.place.map(each => globe ? +each.toFixed(6) : +each.toPrecision(8))
+    const names = globe ? ["longitude", "latitude"] : ["x", "y"]
     const lines = [`${names[0]} ${x}`, `${names[1]} ${y}`, ...(thing.revision == undefined ? [] : [`revision ${thing.revision.toLocaleString("en")}`])]
     this.tip.replaceChildren(title, ...lines.map(line => {
       const element = document.createElement("div")

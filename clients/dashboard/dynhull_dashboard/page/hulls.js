@@ -1,5 +1,6 @@
 // The hulls in the picture.
-const SURFACE_ALPHA = 0.12, POINT_ALPHA = 0.65, POINT_SIZE = 4, VERTEX_SIZE = 8
+const SURFACE_ALPHA = 0.12, POINT_ALPHA = 0.65, POINT_SIZE = 4, VERTEX_SIZE = 8, STAR_SIZE = 16
+const LEAST_SIZE = 0.35, ROOM_FOR = 4  // things in a square of twice their size do not overlap much
 const NOTHING = {revision: 0, x: [], y: [], keys: null, rings: null}
 const NO_OUTLIERS = {layers: [], vertex: null, label: ""}, LAYER_ALPHA = 0.7
 const SHAPES = {
@@ -10,15 +11,22 @@ const SHAPES = {
   hex: [0, 1, 2, 3, 4, 5].map(i => [4.6 * Math.sin(i * Math.PI / 3), -4.6 * Math.cos(i * Math.PI / 3)]),
   star: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(i => [(i % 2 ? 3.4 : 8) * Math.sin(i * Math.PI / 5), -(i % 2 ? 3.4 : 8) * Math.cos(i * Math.PI / 5)]),
 }
+// How large each of some things is drawn, from LEAST_SIZE to 1: a crowd becomes small, so that it does not hide what is below.
+function sizes_in_crowds(places, pixels) {
+  const cell = 2 * pixels, counts = new Map()
+  const cells = places.map(([across, down]) => Math.floor(across / cell) * 100_000 + Math.floor(down / cell))
+  for (const each of cells) counts.set(each, (counts.get(each) ?? 0) + 1)
+  return cells.map(each => Math.max(LEAST_SIZE, Math.min(1, Math.sqrt(ROOM_FOR / counts.get(each)))))
+}
 // Adds a marker to the path of a canvas.
-function add_marker(canvas, marker, across, down) {
+function add_marker(canvas, marker, [across, down], size) {
   const shape = SHAPES[marker]
   if (!shape) {
-    canvas.moveTo(across + VERTEX_SIZE / 2, down)
-    canvas.arc(across, down, VERTEX_SIZE / 2, 0, 2 * Math.PI)
+    canvas.moveTo(across + size * VERTEX_SIZE / 2, down)
+    canvas.arc(across, down, size * VERTEX_SIZE / 2, 0, 2 * Math.PI)
     return
   }
-  shape.forEach(([x, y], row) => row ? canvas.lineTo(across + x, down + y) : canvas.moveTo(across + x, down + y))
+  shape.forEach(([x, y], row) => row ? canvas.lineTo(across + size * x, down + size * y) : canvas.moveTo(across + size * x, down + size * y))
   canvas.closePath()
 }
 class Hull {
@@ -99,10 +107,11 @@ function draw_points(canvas, {view, hulls}) {
   canvas.globalAlpha = POINT_ALPHA
   for (const {points: {x, y}, look} of hulls.values()) {
     canvas.beginPath()
-    for (let row = 0; row < x.length; row++) {
-      const [across, down] = view.place(x[row], y[row])
-      canvas.rect(across - POINT_SIZE / 2, down - POINT_SIZE / 2, POINT_SIZE, POINT_SIZE)
-    }
+    const places = x.map((each, row) => view.place(each, y[row])), sizes = sizes_in_crowds(places, POINT_SIZE)
+    places.forEach(([across, down], row) => {
+      const size = POINT_SIZE * sizes[row]
+      canvas.rect(across - size / 2, down - size / 2, size, size)
+    })
     canvas.fillStyle = look.colour
     canvas.fill()
   }
@@ -111,10 +120,8 @@ function draw_points(canvas, {view, hulls}) {
 function draw_vertices(canvas, {view, hulls}) {
   for (const {vertices: {x, y}, look} of hulls.values()) {
     canvas.beginPath()
-    for (let row = 0; row < x.length; row++) {
-      const [across, down] = view.place(x[row], y[row])
-      if (!isNaN(across)) add_marker(canvas, look.marker, across, down)
-    }
+    const places = x.map((each, row) => view.place(each, y[row])), sizes = sizes_in_crowds(places, VERTEX_SIZE)
+    places.forEach((place, row) => isNaN(place[0]) || add_marker(canvas, look.marker, place, sizes[row]))
     canvas.fillStyle = look.colour
     canvas.fill()
   }

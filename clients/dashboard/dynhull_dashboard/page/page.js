@@ -7,6 +7,8 @@ const SILENCE = "The dashboard does not answer. Check that dynhull dashboard sti
 const settings = find(".page").dataset
 const state = {hulls: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], outliers: [],
   places: []}
+const is_dark = matchMedia("(prefers-color-scheme: dark)"), on_dark = JSON.parse(settings.onDark)
+const lit = colour => is_dark.matches ? on_dark[colour] ?? colour : colour
 const picture = new Picture(find(".map"), {
   x_unit: settings.xUnit, y_unit: settings.yUnit, tiles: {url: settings.tiles, largest_zoom: +settings.largestZoom, attribution: settings.attribution},
 })
@@ -18,7 +20,7 @@ const recorder = new Recorder(show_drawing, () => {
 })
 let time_bar = null, socket
 time_bar = new TimeBar(recorder, find(".time"))
-const time_lines = new TimeLines([...document.querySelectorAll("canvas.line")], settings.neutral,
+const time_lines = new TimeLines([...document.querySelectorAll("canvas.line")], lit(settings.neutral),
   settings.percentileDash.split(" ").map(Number))
 picture.now = () => recorder.moment
 
@@ -60,10 +62,9 @@ function update({kind: _, ...changes}) {
   Object.assign(state, changes)
   if (changes.hulls || changes.fences) {
     const hulls = state.hulls.map(({name}) => name), fences = state.fences.map(({name}) => name)
-    picture.keep(state.hulls, state.fences)
+    show_looks()
     recorder.keep([...hulls, ...fences])
     events.keep(fences)
-    time_lines.keep(state.hulls)
     find(".page").classList.toggle("fenced", fences.length > 0)
     for (const picker of pickers) picker.show()
   }
@@ -78,12 +79,21 @@ function update({kind: _, ...changes}) {
     write("#found", state.found.map(([sentence]) => sentence).join(". "))
   }
   if (changes.outliers) show_lines(".outliers", state.outliers)
+  find(".page").classList.toggle("keyed", Boolean(state.keyed || state.sought))
   if (changes.places || changes.sought != undefined) {
-    picture.places = state.places
+    picture.places = state.places.map(([x, y, colour]) => [x, y, lit(colour)])
     picture.sought = state.sought
     picture.draw_soon()
   }
 }
+// The colours are those of the page, which may become dark.
+function show_looks() {
+  const [hulls, fences] = [state.hulls, state.fences].map(looks => looks.map(look => ({...look, colour: lit(look.colour)})))
+  picture.keep(hulls, fences)
+  time_lines.keep(hulls)
+  time_lines.server_colour = lit(settings.neutral)
+}
+is_dark.addEventListener("change", show_looks)
 function chip({name, key}, remove) {
   const item = document.createElement("li"), line = document.createElement("span")
   const button = document.createElement("button")

@@ -4,7 +4,8 @@ const TIME_STEPS = [1, 2, 5, 10, 15, 30, 60, 120].map(seconds => 1000 * seconds)
 class TimeLines {
   constructor(plots, neutral, percentile_dash) {
     this.plots = plots.map(element => ({element, columns: element.dataset.columns.split(" ")}))
-    this.server_looks = [{colour: neutral, dash: []}, {colour: neutral, dash: percentile_dash}]
+    this.server_colour = neutral
+    this.server_dashes = [[], percentile_dash]
     this.rows = new Map()
     this.looks = new Map()
     for (const {element} of this.plots) {
@@ -38,7 +39,7 @@ class TimeLines {
   }
   lines(columns) {
     return [...this.rows].flatMap(([name, rows]) => columns.flatMap((column, row) => {
-      const look = name == WHOLE_SERVER ? this.server_looks[row] : this.looks.get(name)
+      const look = name == WHOLE_SERVER ? {colour: this.server_colour, dash: this.server_dashes[row]} : this.looks.get(name)
       return rows[column] && look ? [{name: name || "whole server", column, times: rows.time, values: rows[column], ...look}] : []
     }))
   }
