@@ -1,5 +1,8 @@
 """The dashboard in a real browser, on a real server."""
 
+import csv
+import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -353,11 +356,16 @@ def test_the_picture_is_paused_and_shows_what_was_before(
 ) -> None:
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)
+        revision = page.get_by_role("row").filter(has_text=hull).locator("td").nth(0)
+        expect(revision).to_have_text("1")
         page.get_by_role("application").press(" ")
         client.apply(hull, insert=[[9, 9]])
         later = [[0, 0], [4, 0], [9, 9], [0, 4]]
-        # The table goes on while the picture is paused.
-        expect(page.get_by_role("row").filter(has_text=hull).locator("td").nth(0)).to_have_text("2")
+        page.wait_for_function("() => recorder.tracks.get('said table of ').texts.at(-1).includes('>2</td>')")
+        # Words and figures are those of the picture, and the time lines have a mark.
+        expect(revision).to_have_text("1")
+        expect(description(page)).to_have_accessible_description(re.compile("at revision 1"))
+        assert page.evaluate("time_lines.moment == recorder.moment")
         expect(page.get_by_role("timer")).to_contain_text("s ago")
         wait_for_vertices(page, hull, SQUARE)
         page.get_by_role("button", name="To now").click()
@@ -466,6 +474,65 @@ def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullCli
         expect(row).to_be_visible()
         let_go(page, hull)
         expect(row).to_be_hidden()
+
+
+def test_enter_takes_the_match(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    name = name[-20:]
+    for city in ("berlin", "munich", "minsk"):
+        client.create_hull(f"{name}/{city}")
+    with opened(browser, url, "none") as page:
+        wait_for_hulls(page, f"{name}/munich")
+        for typed, city in (("mun", "munich"), (f"{name}/min", "minsk"), ("erlin", "berlin")):
+            pick(page, typed)
+            expect(page.get_by_role("button", name=f"Remove {name}/{city}", exact=True)).to_be_visible()
+        pick(page, f"{name}/none-yet")
+        expect(page.get_by_role("button", name=f"Remove {name}/none-yet", exact=True)).to_be_visible()
+        assert page.evaluate("best_match('a', ['a/b', 'a'])") == "a"
+
+
+def test_the_link_keeps_where_the_picture_is(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    client.create_hull(f"{name}-globe", geographic=True)
+    client.apply(f"{name}-globe", insert=[[10, 50], [11, 50], [11, 51]])
+    client.create_hull(name)
+    client.apply(name, insert=SQUARE)
+    for hull in (name, f"{name}-globe"):
+        with opened(browser, url, hull) as page:
+            page.wait_for_function("name => picture.hulls.get(name)?.corners?.length >= 3", arg=hull)
+            page.get_by_role("application").press("+")
+            page.get_by_role("application").press("ArrowLeft")
+            page.wait_for_function("() => location.search.includes('view=')")
+            extent = page.evaluate("picture.view.extent")
+            page.reload()
+            page.wait_for_function("name => picture.hulls.get(name)?.corners?.length >= 3 && !picture.wanted", arg=hull)
+            assert page.evaluate("picture.view.extent") == pytest.approx(extent, rel=1e-6)
+            page.get_by_role("button", name="Show all").click()
+            page.wait_for_function("() => picture.following && !location.search.includes('view=')")
+            assert page.evaluate("['1,2', 'a,b,c', '1,2,0', ',,', null].map(read_extent)") == [None] * 5
+
+
+def test_what_is_shown_is_saved(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    client.create_hull(name, keyed="str")
+    client.put(name, ["a", 'the "b", c', "d"], [[0.1, 0], [4, 0], [4, 1e-7]])
+    client.create_fence(name, [[0, 0], [9, 0], [9, 9]], name)
+    with opened(browser, url, name, fences=[name]) as page:
+        page.wait_for_function(
+            "name => picture.hulls.get(name)?.corners?.length == 3 && picture.fences.get(name)?.area.polygons.length",
+            arg=name,
+        )
+
+        def saved(kind: str) -> Path:
+            with page.expect_download() as download:
+                page.get_by_label("Save what is shown").select_option(kind)
+            return Path(download.value.path())
+
+        assert saved("PNG").read_bytes().startswith(b"\x89PNG")
+        hull, fence = json.loads(saved("GeoJSON").read_text())["features"]
+        assert hull["properties"] == {"hull": name, "revision": 1}
+        assert hull["geometry"] == {"type": "Polygon", "coordinates": [[[0.1, 0], [4, 0], [4, 1e-7], [0.1, 0]]]}
+        assert (fence["properties"], len(fence["geometry"]["coordinates"][0])) == ({"fence": name}, 4)
+        rows = list(csv.reader(saved("CSV").read_text().splitlines()))
+        assert rows[0] == ["hull", "revision", "key", "x", "y"]
+        assert rows[2:] == [[name, "1", 'the "b", c', "4", "0"], [name, "1", "d", "4", "1e-7"]]
 
 
 def test_what_is_typed_stays_when_hulls_come(browser: Browser, url: str, client: HullClient, hull: str) -> None:

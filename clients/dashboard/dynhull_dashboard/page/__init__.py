@@ -33,6 +33,7 @@ SCRIPTS = (
     "recorder.js",
     "time_lines.js",
     "events.js",
+    "saving.js",
     "page.js",
 )
 

@@ -69,9 +69,7 @@ class Hands {
     if (!thing) return
     const title = document.createElement("strong")
     title.textContent = thing.title
-    const {globe} = this.picture.view, [x, y] = thing.place.map(each => globe ? +each.toFixed(6) : +each.toPrecision(8))
-    const names = globe ? ["longitude", "latitude"] : ["x", "y"]
-    const lines = [`${names[0]} ${x}`, `${names[1]} ${y}`, ...(thing.revision == undefined ? [] : [`revision ${thing.revision.toLocaleString("en")}`])]
+    const lines = [...place_words(thing.place, this.picture.view.globe), ...(thing.revision == undefined ? [] : [`revision ${thing.revision.toLocaleString("en")}`])]
     this.tip.replaceChildren(title, ...lines.map(line => {
       const element = document.createElement("div")
       element.textContent = line

@@ -4,6 +4,7 @@ const write = (selector, text) => { if (find(selector).textContent != text) find
 const MOST_OFFERED = 20, RETRY_MILLISECONDS = 1000
 const SILENCE = "The dashboard does not answer. Check that dynhull dashboard still runs. The page shows what it last "
   + "received, and reconnects by itself."
+const SAID = ["description", "table", "fence_table", "outliers"], PAGE = ""
 const settings = find(".page").dataset
 const state = {hulls: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], outliers: [],
   places: []}
@@ -15,7 +16,9 @@ const picture = new Picture(find(".map"), {
 const events = new Events(key => seek(key))
 const recorder = new Recorder(show_drawing, () => {
   picture.live = recorder.live
+  time_lines.mark(recorder.live ? undefined : recorder.moment)
   time_bar?.update()
+  show_found()
   picture.draw_soon()
 })
 let time_bar = null, socket
@@ -46,14 +49,33 @@ function keep_in_address(noun, values) {
   history.replaceState(null, "", `?${query}`)
 }
 function take(message, text) {
-  if (message.kind == "page") return update(message)
+  if (message.kind == "page") {
+    for (const name of SAID)
+      if (message[name] != undefined) record({kind: `said ${name}`, hull: PAGE, name, said: message[name]})
+    return update(message)
+  }
   if (message.kind == "lines") return time_lines.take(message)
   if (message.kind == "vertices" || message.kind == "points") picture.trails.take(message, Date.now())
   recorder.take(message, text)
 }
+// What the page says of the moment that it shows.
+function record(message) {
+  recorder.take(message, JSON.stringify(message))
+}
+function show_said({name, said}) {
+  if (name == "description") write("#description", said)
+  else if (name == "outliers") show_lines(".outliers", said)
+  else find({table: ".of_hulls", fence_table: ".of_fences"}[name]).innerHTML = said  // the server has escaped the names
+}
+function show_found() {
+  const found = recorder.live ? state.found : state.sought ? picture.found_words() : []
+  show_lines(".found", found)
+  write("#found", found.map(([sentence]) => sentence).join(". "))
+}
 // Now, or once more at a later time.
 function show_drawing(message) {
-  if (message.kind == "events") events.take(message)
+  if (message.said != undefined) show_said(message)
+  else if (message.kind == "events") events.take(message)
   else picture.take(message)
 }
 // What has changed of what the server says about the page.
@@ -63,28 +85,22 @@ function update({kind: _, ...changes}) {
   if (changes.hulls || changes.fences) {
     const hulls = state.hulls.map(({name}) => name), fences = state.fences.map(({name}) => name)
     show_looks()
-    recorder.keep([...hulls, ...fences])
+    recorder.keep([PAGE, ...hulls, ...fences])
     events.keep(fences)
     find(".page").classList.toggle("fenced", fences.length > 0)
     for (const picker of pickers) picker.show()
   }
   for (const picker of pickers) if (changes[picker.offered]) picker.offer()
   write(".banner", state.banner)
-  for (const [name, selector] of [["note", ".note"], ["description", "#description"], ["fence_hint", ".hint"]])
+  for (const [name, selector] of [["note", ".note"], ["fence_hint", ".hint"]])
     if (changes[name] != undefined) write(selector, changes[name])
-  for (const [name, selector] of [["table", ".of_hulls"], ["fence_table", ".of_fences"]])
-    if (changes[name] != undefined) find(selector).innerHTML = changes[name]  // the server has escaped the names
-  if (changes.found) {
-    show_lines(".found", state.found)
-    write("#found", state.found.map(([sentence]) => sentence).join(". "))
-  }
-  if (changes.outliers) show_lines(".outliers", state.outliers)
   find(".page").classList.toggle("keyed", Boolean(state.keyed || state.sought))
   if (changes.places || changes.sought != undefined) {
     picture.places = state.places.map(([x, y, colour]) => [x, y, lit(colour)])
     picture.sought = state.sought
     picture.draw_soon()
   }
+  if (changes.found) show_found()
 }
 // The colours are those of the page, which may become dark.
 function show_looks() {
@@ -105,6 +121,12 @@ function chip({name, key}, remove) {
   item.append(line, name, button)
   return item
 }
+// What is meant by some letters: the name itself, else the first name of which a part begins with them, else the first that
+// has them; without any, a name that does not exist yet.
+function best_match(letters, names) {
+  const begins = name => name.startsWith(letters) || /[._/-]/.test(name) && name.split(/[._/-]/).some(part => part.startsWith(letters))
+  return [name => name == letters, begins, name => name.includes(letters)].map(fits => letters && names.find(fits)).find(name => name) ?? letters
+}
 // The chips and the field of a picker. `picked` is what it shows and changes, of the state of the page.
 class Picker {
   constructor({form, noun, most, offered, picked}) {
@@ -118,7 +140,8 @@ class Picker {
     return state[this.picked].map(({name}) => name)
   }
   add() {
-    if (this.field.value && !this.names.includes(this.field.value)) this.pick([...this.names, this.field.value])
+    const name = best_match(this.field.value, state[this.offered])
+    if (name && !this.names.includes(name)) this.pick([...this.names, name])
     this.field.value = ""
   }
   pick(names) {
@@ -169,6 +192,10 @@ finder.addEventListener("input", () => finder.value ? offer_keys() : seek(""))
 finder.addEventListener("change", () => seek(finder.value))
 find(".finder").addEventListener("submit", event => { event.preventDefault(); seek(finder.value) })
 find(".verify button").onclick = () => ask({verify: ""})
+find("[name=save]").onchange = ({target}) => {
+  SAVES[target.value](picture, new Date(recorder.moment).toISOString())
+  target.value = ""
+}
 const hands = new Hands(picture, find(".tip"), () => recorder.toggle())
 const tick = (name, checked, change) => {
   const box = find(`[name=${name}]`)
@@ -197,4 +224,6 @@ for (const [name, does] of [["in", () => hands.zoom(ZOOM_STEP)], ["out", () => h
 }
 find(".map .buttons").onkeydown = event => event.stopPropagation()
 find(".time").onsubmit = event => event.preventDefault()
+picture.wanted = read_extent(new URLSearchParams(location.search).get("view"))
+picture.moved_to = extent => keep_in_address("view", extent ? [extent.map(each => +each.toPrecision(12)).join()] : [])
 connect()

@@ -29,6 +29,8 @@ class Picture {
       this.draw_all()
     })
     this.following = true  // until the viewer moves the picture
+    this.wanted = undefined  // the extent to begin with
+    this.moved_to = () => {}  // called with the extent, or with none where all is shown
     this.moving = false
     this.live = true  // or as it was before
     this.outliers = false
@@ -79,8 +81,13 @@ class Picture {
   // Where the key is that the viewer looks for: as the server says, or as it was drawn at an earlier moment.
   found() {
     if (this.live) return this.places.map(([x, y, colour]) => ({place: [x, y], colour}))
-    const drawn = [...this.hulls.values()].map(hull => ({place: hull.place_of(this.sought), colour: hull.look.colour}))
+    const drawn = [...this.hulls.values()].map(hull => ({place: hull.place_of(this.sought), colour: hull.look.colour, hull}))
     return drawn.filter(({place}) => place)
+  }
+  // The same for an earlier moment in words.
+  found_words() {
+    const found = this.found().map(({place, hull}) => [`${this.sought} in ${hull.name}`, place_words(place, hull.globe).join(", ")])
+    return found.length ? found : [[`${this.sought} is not drawn at this moment`, ""]]
   }
   draw_all() {
     this.ground_drawn = false
@@ -97,6 +104,7 @@ class Picture {
     this.following = true
     this.plane.refit()
     this.on_globe.refit()
+    this.moved_to()
     this.draw_soon()
   }
   move(change) {
@@ -106,6 +114,7 @@ class Picture {
     clearTimeout(this.resting)
     this.resting = setTimeout(() => {
       this.moving = false
+      if (!this.following) this.moved_to(this.view.extent)
       this.draw_all()
     }, REST_MILLISECONDS)
     change(this.view)
@@ -122,6 +131,12 @@ class Picture {
       view.refit()
       this.ground_drawn = false
       this.element.closest(".page").classList.toggle("globe", view.globe)
+    }
+    if (this.wanted && globe.length) {
+      view.show_extent(this.wanted)
+      this.wanted = undefined
+      this.following = false
+      this.ground_drawn = false
     }
     if (!this.following) return
     const points = hulls.flatMap(hull => view.globe ? hull.corners : hull.polygons(view).flat(2))
@@ -172,7 +187,7 @@ class Picture {
     const colour = name => style.getPropertyValue(`--${name}`).trim()
     this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea", "veil"].map(name => [name, colour(name)]))
   }
-  draw_globe(canvas) {
+  draw_globe(canvas, tiles = this.tiles.url) {
     const {view, colours, width, height} = this
     const path = d3.geoPath(view.projection, canvas)
     const fill = (shape, style) => {
@@ -182,7 +197,7 @@ class Picture {
       canvas.fill()
     }
     fill({type: "Sphere"}, colours.sea)
-    if (this.tiles.url) {
+    if (tiles) {
       this.tiles.draw(canvas, view, this.moving)
       fill({type: "Sphere"}, colours.veil)  // what is drawn on the map has to stand out
     }
@@ -250,6 +265,16 @@ class Picture {
     canvas.restore()
     canvas.textAlign = "left"
   }
+}
+// An extent as it is in an address; undefined for what is none.
+function read_extent(text) {
+  const numbers = text?.split(",").map(Number) ?? [], [, , wide, high = wide] = numbers
+  return numbers.every(isFinite) && wide > 0 && high > 0 ? numbers : undefined
+}
+// A place, on the globe to the decimetre.
+function place_words(place, globe) {
+  const [x, y] = place.map(each => globe ? +each.toFixed(6) : +each.toPrecision(8))
+  return globe ? [`longitude ${x}`, `latitude ${y}`] : [`x ${x}`, `y ${y}`]
 }
 // One, two or five times a power of ten.
 function nice_below(length) {

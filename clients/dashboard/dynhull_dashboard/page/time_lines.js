@@ -6,6 +6,7 @@ class TimeLines {
     this.plots = plots.map(element => ({element, columns: element.dataset.columns.split(" ")}))
     this.server_colour = neutral
     this.server_dashes = [[], percentile_dash]
+    this.ahead = Infinity  // milliseconds of this page's clock before that of the times
     this.rows = new Map()
     this.looks = new Map()
     for (const {element} of this.plots) {
@@ -23,7 +24,14 @@ class TimeLines {
   clear() {
     this.rows.clear()
   }
+  // Shows where a moment of this page's clock is.
+  mark(moment) {
+    if (moment == this.moment) return
+    this.moment = moment
+    this.draw_soon()
+  }
   take({kind: _, hull, ...columns}) {
+    this.ahead = Math.min(this.ahead, Date.now() - columns.time.at(-1))
     const known = this.rows.get(hull) ?? Object.fromEntries(Object.keys(columns).map(name => [name, []]))
     this.rows.set(hull, known)
     for (const [name, values] of Object.entries(columns)) known[name].push(...values)
@@ -87,6 +95,11 @@ class TimeLines {
       canvas.setLineDash(dash)
       canvas.stroke()
       canvas.setLineDash([])
+    }
+    const marked = this.moment - this.ahead
+    if (marked >= begin && marked <= end) {
+      canvas.fillStyle = style.getPropertyValue("--ink")
+      canvas.fillRect(across(marked) - 0.5, LINE_TOP, 1, height - LINE_TOP - LINE_BOTTOM)
     }
     const last = lines.map(({name, column, values}) => `${name}${columns.length > 1 ? ` ${column}` : ""} ${shown_value(values.at(-1))}`)
     element.setAttribute("aria-label", `${element.dataset.name}: ${last.join(", ") || "nothing yet"}`)

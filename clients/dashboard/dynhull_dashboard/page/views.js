@@ -44,6 +44,14 @@ class PlaneView {
     if (this.same_scale) this.unit.fill(Math.min(...this.unit))
     this.middle = [frame[0] + wide / 2, frame[1] + high / 2]
   }
+  // The middle, and how much of x and y is in the picture.
+  get extent() {
+    return [...this.middle, this.rect.width / this.unit[0], this.rect.height / this.unit[1]]
+  }
+  show_extent([x, y, wide, high = wide]) {
+    this.frame = undefined
+    this.show([x - wide / 2, y - high / 2, x + wide / 2, y + high / 2])
+  }
   fit(points) {
     if (!points.length) return
     const frame = frame_around(box_around(points), this.frame, this.same_scale)
@@ -108,6 +116,15 @@ class GlobeView {
   }
   set scale(scale) {
     this.projection.scale(Math.max(Math.min(this.rect.width, this.rect.height) / 8, Math.min(LARGEST_SCALE, scale)))
+  }
+  // The middle, and the metres from the left to the right of the picture.
+  get extent() {
+    return [...this.middle, this.rect.width * EARTH_RADIUS / this.scale]
+  }
+  show_extent([lon, lat, wide]) {
+    this.turn([lon, lat])
+    this.scale = this.rect.width * EARTH_RADIUS / wide
+    this.fitted = true
   }
   // NaN for what is on the other side.
   place(lon, lat) {
