@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from math import inf
 
 from ._predicates import Point, crossing, orientation
-from .static._monotone_chain import half_chain
+from .static._half_chain import half_chain
 
 UPPER, LOWER = SIDES = (0, 1)
 SIGNS = (1, -1)

@@ -13,8 +13,8 @@ from .._implementation import kernel
 from .._predicates import Point, orientation
 from ..arrays import Points, as_points
 from ._boundary import check_collinear, with_boundary_points
+from ._half_chain import half_chain
 from ._jarvis import rightmost
-from ._monotone_chain import half_chain
 from .trace import Collinear, Groups, Round, Rounds, Trace, Wrap
 
 if TYPE_CHECKING:

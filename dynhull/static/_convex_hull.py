@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from .._implementation import kernel
 from ..arrays import Points, as_pairs, as_points
-from ._monotone_chain import monotone_chain
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -35,6 +34,8 @@ def convex_hull(xy: npt.ArrayLike) -> Points:
     [[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]]
     """
     if kernel is None:
+        from ._monotone_chain import monotone_chain  # and with it the events of traces: most programs need neither
+
         return monotone_chain(xy)
     # The kernel returns None where a coordinate is not finite; the check then names it.
     pairs = as_pairs(xy)

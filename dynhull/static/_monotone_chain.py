@@ -10,6 +10,7 @@ import numpy.typing as npt
 from .._predicates import Point, orientation
 from ..arrays import Points, as_points
 from ._boundary import check_collinear
+from ._half_chain import half_chain
 from .trace import Collinear, Pop, Push, Scan, Trace, Turn
 
 if TYPE_CHECKING:
@@ -50,16 +51,6 @@ def monotone_chain(xy: npt.ArrayLike, collinear: Collinear = "drop", trace: Trac
         upper = _traced_half_chain(points, 1, collinear, trace)
     hull = lower if lower == upper else lower + upper[-2:0:-1]
     return np.array(hull, dtype=np.float64).reshape(len(hull), 2)
-
-
-def half_chain(points: Sequence[Point], sign: int) -> list[Point]:
-    """The strict upper (sign +1) or lower (sign -1) chain of distinct points in lexicographic order. O(n)."""
-    chain: list[Point] = []
-    for p in points:
-        while len(chain) > 1 and sign * orientation(chain[-2], chain[-1], p) >= 0:
-            chain.pop()
-        chain.append(p)
-    return chain
 
 
 def _traced_half_chain(points: Sequence[Point], sign: int, collinear: Collinear, trace: Trace) -> list[Point]:
