@@ -2,14 +2,15 @@
 // dynhull/_fences.py.
 //
 // A new area visits the zones that its changed edges touch, and those between the old and the new boundary; their
-// subjects are decided when crossings are taken.
+// subjects are decided when crossings are taken. Its parts: where all are (zoning), what the entities have reported
+// (reports), who has crossed because of that (decisions), and the fences around the subjects' own hull (own hulls).
 #pragma once
 
 #include <map>
 #include <unordered_map>
 #include <unordered_set>
 
-#include "own_hull.hpp"
+#include "own_hulls.hpp"
 
 namespace dynhull {
 
@@ -25,9 +26,14 @@ struct Arrival {
   Departure* departure;
 };
 
-class Fences : public OwnHull {
+class Fences {
  public:
-  explicit Fences(const Slots& slots) : OwnHull(slots) {}
+  explicit Fences(const Slots& slots)
+      : zoning_(slots), reports_(zoning_), decisions_(zoning_, reports_), own_hulls_(zoning_, reports_, decisions_) {}
+  Fences(const Fences&) = delete;
+
+  // What the entities report to.
+  Reports& reports() { return reports_; }
 
   std::size_t size() const { return numbers_.size(); }
   bool has(std::int64_t number) const { return numbers_.contains(number); }
@@ -40,38 +46,38 @@ class Fences : public OwnHull {
   // Adds a fence, or replaces the area of one. `inside`: slots to be inside of a fence that is then new in any case.
   void set(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
            const std::vector<std::uint32_t>* inside) {
-    ready();
+    reports_.ready();
     const auto entry = numbers_.find(number);
     if (entry == numbers_.end()) return add_number(tree, number, std::move(area), cross, own, inside);
     const std::uint32_t handle = entry->second;
-    Fence& fence = *fences_[handle];
-    if (cross && !own) stray_changed();
+    Fence& fence = *zoning_.fences[handle];
+    if (cross && !own) reports_.stray_changed();
     if (inside || fence.own != own) {
       entry->second = inside ? add(tree, number, std::move(area), cross, own, inside)
                              : add_other_kind(tree, handle, std::move(area), cross, own);
       remove(handle);
     } else if (own) {
-      recent_.push_back(handle);
+      reports_.recent.push_back(handle);
       auto empty = std::make_shared<const Area>(Area::of_hull({}, true, area.margin));
       if (fence.area->margin != area.margin) fence.area = std::move(empty);  // until it is decided
-      owners_changed_ = true;
+      reports_.owners_changed = true;
       fence.cross = cross;
     } else {
       if (!(*fence.area == area)) {
-        recent_.push_back(handle);
-        torn_ = true;
+        reports_.recent.push_back(handle);
+        zoning_.torn = true;
         replace(handle, std::make_shared<const Area>(std::move(area)));
-        torn_ = false;
+        zoning_.torn = false;
       }
-      crossable_ += std::size_t{cross} - std::size_t{fence.cross};
+      decisions_.crossable += std::size_t{cross} - std::size_t{fence.cross};
       fence.cross = cross;
     }
-    perhaps_divide_crowded();
+    zoning_.perhaps_divide_crowded();
   }
 
   // Removes a fence, and returns the keys of the subjects that were inside.
   Crossings drop(std::int64_t number) {
-    ready();
+    reports_.ready();
     Crossings keys = inside(number);
     const auto entry = numbers_.find(number);
     remove(entry->second);
@@ -81,13 +87,13 @@ class Fences : public OwnHull {
 
   // The keys inside, in order.
   Crossings inside(std::int64_t number) {
-    ready();
+    reports_.ready();
     Crossings keys;
     const std::uint32_t handle = numbers_.at(number);
-    for_each_inside(handle, [&](std::uint32_t slot) { append_key(keys, slot); });
-    for (const Gone& gone : gone_)
-      if (was_inside(handle, gone)) append_key(keys, gone);
-    keys.sort(slots_->strings());
+    reports_.for_each_inside(handle, [&](std::uint32_t slot) { reports_.append_key(keys, slot); });
+    for (const Reports::Gone& gone : reports_.absent)
+      if (reports_.was_inside(handle, gone)) reports_.append_key(keys, gone);
+    keys.sort(zoning_.slots->strings());
     return keys;
   }
 
@@ -95,17 +101,17 @@ class Fences : public OwnHull {
 
   // Those among some keys that were removed since crossings were last taken.
   Departures departures(const std::vector<std::string>& keys) {
-    ready();
+    reports_.ready();
     Departures found;
-    if (gone_.empty()) return found;
+    if (reports_.absent.empty()) return found;
     const std::unordered_set<std::string_view> asked(keys.begin(), keys.end());
-    for (const Gone& gone : gone_) {
+    for (const Reports::Gone& gone : reports_.absent) {
       if (gone.cause != REMOVED || gone.done || gone.given || (gone.fresh && !gone.carried)) continue;
-      std::string key = key_of(gone);
+      std::string key = reports_.key_of(gone);
       if (!asked.contains(key)) continue;
       Departure departure{gone.before, {}};
-      for (const std::uint32_t handle : members_.of(gone.inside))
-        if (!fences_[handle]->own) departure.inside.push_back(fences_[handle]->number);
+      for (const std::uint32_t handle : zoning_.members.of(gone.inside))
+        if (!zoning_.fences[handle]->own) departure.inside.push_back(zoning_.fences[handle]->number);
       found.insert_or_assign(std::move(key), std::move(departure));
     }
     return found;
@@ -114,7 +120,7 @@ class Fences : public OwnHull {
   // Lets subjects that are new, each by its slot with where it comes from, have come from there. Their departures keep
   // the fences of this index. Returns which of them are new, by row.
   std::vector<bool> arrive(std::span<const Arrival> arrivals) {
-    ready();  // once for all: this looks at whatever has changed
+    reports_.ready();  // once for all: this looks at whatever has changed
     std::vector<bool> arrived(arrivals.size());
     for (std::size_t row = 0; row < arrivals.size(); ++row)
       arrived[row] = arrive(arrivals[row].slot, *arrivals[row].departure);
@@ -123,68 +129,71 @@ class Fences : public OwnHull {
 
   // Forgets subjects that have gone over.
   void give(const Departures& departures) {
-    for (Gone& gone : gone_) {
+    for (Reports::Gone& gone : reports_.absent) {
       if (gone.cause != REMOVED || gone.done || gone.given || (gone.fresh && !gone.carried)) continue;
-      const auto departure = departures.find(key_of(gone));
+      const auto departure = departures.find(reports_.key_of(gone));
       if (departure == departures.end()) continue;
       gone.given = true;
       for (const std::int64_t number : departure->second.inside) {
         const auto entry = numbers_.find(number);
-        if (entry == numbers_.end() || !members_.has(gone.inside, entry->second)) continue;
-        members_.remove(gone.inside, entry->second);
-        --fences_[entry->second]->count;
+        if (entry == numbers_.end() || !zoning_.members.has(gone.inside, entry->second)) continue;
+        zoning_.members.remove(gone.inside, entry->second);
+        --zoning_.fences[entry->second]->count;
       }
     }
   }
 
   // Whether there is nothing to decide.
   bool idle() const {
-    return strayed_.empty() && gone_.empty() && waiting_.empty() && !torn_ && !everyone_ && taken_.rows.empty() &&
-           (owners_.empty() || (changes_.empty() && !owners_changed_));
+    return reports_.strayed.empty() && reports_.absent.empty() && zoning_.waiting.empty() && !zoning_.torn &&
+           !zoning_.everyone && decisions_.taken.rows.empty() &&
+           (reports_.owners.empty() || (reports_.changes.empty() && !reports_.owners_changed));
   }
   // About how many subjects are to be decided.
-  std::size_t work() const { return strayed_.size() + gone_.size() + CROWD * (waiting_.size() + owners_.size()); }
+  std::size_t work() const {
+    return reports_.strayed.size() + reports_.absent.size() +
+           Zoning::CROWD * (zoning_.waiting.size() + reports_.owners.size());
+  }
   // After a look that found nothing to decide.
-  void rest() { begin_again(); }
+  void rest() { reports_.begin_again(); }
 
   // What has crossed since the last call, in order. `slots_at` returns the slot of the least key at each of some
   // vertices. If memory does not suffice, nothing is lost: the next call returns it.
   template <class SlotsAt>
   Crossings take(HullTree& tree, SlotsAt slots_at) {
-    for (auto& found : found_) found.clear();
-    prepare(only_strayed_matter());
-    for (const std::uint32_t handle : recent_)
-      if (fences_[handle] && *fences_[handle]->area == *fences_[handle]->decided)
-        fences_[handle]->decided = fences_[handle]->area;
-    if (everyone_) {
-      settle_strayed([](std::uint32_t, const Zone&, std::size_t) {}, [](std::size_t) {});
-      slots_->for_each([&](std::uint32_t slot) {
-        if (subjects_[slot].zone == NONE) return;  // there are no zones
-        decide(slot, zones_[subjects_[slot].zone], found_[0]);
-        cross_found(found_[0]);
+    for (auto& found : decisions_.found) found.clear();
+    reports_.prepare(reports_.only_strayed_matter());
+    for (const std::uint32_t handle : reports_.recent)
+      if (zoning_.fences[handle] && *zoning_.fences[handle]->area == *zoning_.fences[handle]->decided)
+        zoning_.fences[handle]->decided = zoning_.fences[handle]->area;
+    if (zoning_.everyone) {
+      reports_.settle_strayed([](std::uint32_t, const Zone&, std::size_t) {}, [](std::size_t) {});
+      zoning_.slots->for_each([&](std::uint32_t slot) {
+        if (zoning_.subjects[slot].zone == NONE) return;  // there are no zones
+        decisions_.decide(slot, zoning_.zones[zoning_.subjects[slot].zone], decisions_.found[0]);
+        decisions_.cross_found(decisions_.found[0]);
       });
     } else {
-      settle_strayed([&](std::uint32_t slot, const Zone& zone, std::size_t part) { decide(slot, zone, found_[part]); },
-                     [&](std::size_t part) { cross_found(found_[part]); });
+      reports_.settle_strayed([&](std::uint32_t slot, const Zone& zone,
+                                  std::size_t part) { decisions_.decide(slot, zone, decisions_.found[part]); },
+                              [&](std::size_t part) { decisions_.cross_found(decisions_.found[part]); });
     }
-    divide_crowded();
-    decide_waiting();
-    for (const std::uint32_t handle : owners_) look_at_own(*fences_[handle], tree);
-    if (carries_) report_carried();
-    report_gone();
-    list_fresh();
-    for (const std::uint32_t handle : owners_) decide_own(handle, tree, slots_at);
-    taken_.sort(slots_->strings());
-    begin_again();
+    zoning_.divide_crowded();
+    decisions_.decide_waiting();
+    for (const std::uint32_t handle : reports_.owners) own_hulls_.look_at_own(*zoning_.fences[handle], tree);
+    if (carries_) decisions_.report_carried();
+    decisions_.report_gone();
+    own_hulls_.list_fresh();
+    for (const std::uint32_t handle : reports_.owners) own_hulls_.decide_own(handle, tree, slots_at);
+    decisions_.taken.sort(zoning_.slots->strings());
+    reports_.begin_again();
     carries_ = false;
-    return std::exchange(taken_, {});
+    return std::exchange(decisions_.taken, {});
   }
 
   std::size_t bytes() const {
-    std::size_t bytes = subjects_.bytes() + zones_.bytes() + members_.bytes() + changes_.capacity() * sizeof(Change) +
-                        strayed_.capacity() * sizeof(std::uint32_t) + strays_.capacity() * sizeof(Stray) +
-                        gone_.capacity() * sizeof(Gone) + gone_keys_.capacity();
-    for (const auto& fence : fences_) bytes += fence ? fence->bytes() : 0;
+    std::size_t bytes = zoning_.subjects.bytes() + zoning_.zones.bytes() + zoning_.members.bytes() + reports_.bytes();
+    for (const auto& fence : zoning_.fences) bytes += fence ? fence->bytes() : 0;
     return bytes;
   }
 
@@ -193,40 +202,43 @@ class Fences : public OwnHull {
     const auto require = [](bool holds, const char* message) {
       if (!holds) throw std::logic_error(message);
     };
-    if (!zoned_ || torn_) return;
-    for (std::uint32_t zone = 0; zone < zones_.size(); ++zone) {
-      for (std::uint32_t at = 0; at < zones_[zone].subjects.size(); ++at) {
-        const std::uint32_t slot = zones_[zone].subjects[at];
-        require(there(slot) && subjects_[slot].zone == zone && subjects_[slot].at == at, "a subject misfiled");
-        const Point p = (*slots_)[slot].place;
-        if (subjects_.box(slot).holds(p)) require(zones_.find(p) == zone, "a subject in another zone");
+    if (!zoning_.zoned || zoning_.torn) return;
+    for (std::uint32_t zone = 0; zone < zoning_.zones.size(); ++zone) {
+      for (std::uint32_t at = 0; at < zoning_.zones[zone].subjects.size(); ++at) {
+        const std::uint32_t slot = zoning_.zones[zone].subjects[at];
+        require(zoning_.there(slot) && zoning_.subjects[slot].zone == zone && zoning_.subjects[slot].at == at,
+                "a subject misfiled");
+        const Point p = (*zoning_.slots)[slot].place;
+        if (zoning_.subjects.box(slot).holds(p)) require(zoning_.zones.find(p) == zone, "a subject in another zone");
       }
-      if (Zones::empty(zones_[zone].box)) continue;  // no point is in it
-      for (const std::uint32_t handle : zones_[zone].covering) {
-        require(fences_[handle] && !fences_[handle]->own, "a fence that is gone covers a zone");
-        require(fences_[handle]->area->holds(zones_[zone].anchor()), "a fence that does not cover its zone");
+      if (Zones::empty(zoning_.zones[zone].box)) continue;  // no point is in it
+      for (const std::uint32_t handle : zoning_.zones[zone].covering) {
+        require(zoning_.fences[handle] && !zoning_.fences[handle]->own, "a fence that is gone covers a zone");
+        require(zoning_.fences[handle]->area->holds(zoning_.zones[zone].anchor()),
+                "a fence that does not cover its zone");
       }
-      for (const Piece& piece : zones_[zone].pieces)
-        require(!piece.simple || piece.inside == (fences_[piece.fence]->area->where(zones_[zone].anchor()) > 0),
+      for (const Piece& piece : zoning_.zones[zone].pieces)
+        require(!piece.simple ||
+                    piece.inside == (zoning_.fences[piece.fence]->area->where(zoning_.zones[zone].anchor()) > 0),
                 "a piece whose anchor is elsewhere");
     }
   }
 
  private:
-  const Fence& fence(std::int64_t number) const { return *fences_[numbers_.at(number)]; }
+  const Fence& fence(std::int64_t number) const { return *zoning_.fences[numbers_.at(number)]; }
 
   bool arrive(std::uint32_t slot, Departure& departure) {
-    Change* const change = there(slot) ? change_of(slot) : nullptr;
+    Reports::Change* const change = zoning_.there(slot) ? reports_.change_of(slot) : nullptr;
     if (change == nullptr || !change->fresh || change->carried) return false;
     std::erase_if(departure.inside, [&](std::int64_t number) {
       const auto entry = numbers_.find(number);
-      return entry == numbers_.end() || fences_[entry->second]->own;
+      return entry == numbers_.end() || zoning_.fences[entry->second]->own;
     });
     for (const std::int64_t number : departure.inside) {
       const std::uint32_t handle = numbers_.at(number);
-      if (members_.has(subjects_[slot].inside, handle)) continue;
-      members_.add(subjects_[slot].inside, handle);
-      ++fences_[handle]->count;
+      if (zoning_.members.has(zoning_.subjects[slot].inside, handle)) continue;
+      zoning_.members.add(zoning_.subjects[slot].inside, handle);
+      ++zoning_.fences[handle]->count;
     }
     change->before = departure.before;
     change->carried = true;
@@ -245,7 +257,7 @@ class Fences : public OwnHull {
       numbers_.erase(entry);
       throw;
     }
-    perhaps_divide_crowded();
+    zoning_.perhaps_divide_crowded();
   }
 
   std::uint32_t add(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
@@ -257,110 +269,110 @@ class Fences : public OwnHull {
     fence->area = std::make_shared<const Area>(std::move(area));
     fence->decided = fence->area;
     fence->given = inside != nullptr;
-    fence->earlier = places();
-    grow(recent_, 1);
-    grow(owners_, 1);
-    torn_ = true;
-    if (!zoned_ && !own) {
-      zoned_ = true;
-      const bool everyone = everyone_;  // no fence had a zone: nothing is to be decided again
-      rebuild();
-      everyone_ = everyone;
-      torn_ = true;
+    fence->earlier = reports_.places();
+    Zoning::grow(reports_.recent, 1);
+    Zoning::grow(reports_.owners, 1);
+    zoning_.torn = true;
+    if (!zoning_.zoned && !own) {
+      zoning_.zoned = true;
+      const bool everyone = zoning_.everyone;  // no fence had a zone: nothing is to be decided again
+      reports_.rebuild();
+      zoning_.everyone = everyone;
+      zoning_.torn = true;
     }
     const std::uint32_t handle = free_handle();
-    fences_[handle] = std::move(fence);
-    recent_.push_back(handle);
+    zoning_.fences[handle] = std::move(fence);
+    reports_.recent.push_back(handle);
     if (own)
-      owners_.push_back(handle);
+      reports_.owners.push_back(handle);
     else
-      crossable_ += cross;
+      decisions_.crossable += cross;
     try {
-      own ? add_own(tree, handle, inside) : add_pieces(handle, inside);
+      own ? own_hulls_.add_own(tree, handle, inside) : add_pieces(handle, inside);
     } catch (...) {
       discard(handle);
       throw;
     }
-    torn_ = false;
+    zoning_.torn = false;
     return handle;
   }
 
   // Between a fence around the subjects' own hull and another one: who was inside, stays inside until decided.
   std::uint32_t add_other_kind(const HullTree& tree, std::uint32_t old, Area area, bool cross, bool own) {
     std::vector<std::uint32_t> inside;
-    for_each_inside(old, [&](std::uint32_t slot) { inside.push_back(slot); });
-    const std::uint32_t handle = add(tree, fences_[old]->number, std::move(area), cross, own, &inside);
-    Fence& fence = *fences_[handle];
-    fence.decided = fences_[old]->decided;
-    fence.decided_own = fences_[old]->decided_own;
-    fence.given = fences_[old]->given;
-    fence.earlier = fences_[old]->earlier;
+    reports_.for_each_inside(old, [&](std::uint32_t slot) { inside.push_back(slot); });
+    const std::uint32_t handle = add(tree, zoning_.fences[old]->number, std::move(area), cross, own, &inside);
+    Fence& fence = *zoning_.fences[handle];
+    fence.decided = zoning_.fences[old]->decided;
+    fence.decided_own = zoning_.fences[old]->decided_own;
+    fence.given = zoning_.fences[old]->given;
+    fence.earlier = zoning_.fences[old]->earlier;
     try {
-      for (Gone& gone : gone_) {
-        const bool was = was_inside(old, gone);
+      for (Reports::Gone& gone : reports_.absent) {
+        const bool was = reports_.was_inside(old, gone);
         fence.count += was;
-        if (was != own && (!own || was_there(fence, key_of(gone), gone.fresh && !gone.returned)))
-          members_.add(gone.inside, handle);
+        if (was != own && (!own || reports_.was_there(fence, reports_.key_of(gone), gone.fresh && !gone.returned)))
+          zoning_.members.add(gone.inside, handle);
       }
     } catch (...) {
       discard(handle);
-      torn_ = true;
+      zoning_.torn = true;
       throw;
     }
     return handle;
   }
 
   std::uint32_t free_handle() {
-    for (; first_free_ < fences_.size(); ++first_free_)
-      if (!fences_[first_free_]) return static_cast<std::uint32_t>(first_free_);
-    fences_.emplace_back();
+    for (; first_free_ < zoning_.fences.size(); ++first_free_)
+      if (!zoning_.fences[first_free_]) return static_cast<std::uint32_t>(first_free_);
+    zoning_.fences.emplace_back();
     return static_cast<std::uint32_t>(first_free_);
   }
 
   void add_pieces(std::uint32_t handle, const std::vector<std::uint32_t>* inside) {
-    Fence& fence = *fences_[handle];
+    Fence& fence = *zoning_.fences[handle];
     const Area& area = *fence.area;
     const std::vector<Edge> edges = sorted_edges(area);
     std::vector<std::uint32_t> ids(edges.size());
     std::iota(ids.begin(), ids.end(), 0);
     std::vector<Edge> near;
     for (std::size_t i = 0; inside && i < inside->size(); ++i) {
-      members_.add(subjects_[(*inside)[i]].inside, handle);
+      zoning_.members.add(zoning_.subjects[(*inside)[i]].inside, handle);
       ++fence.count;
     }
-    zones_.descend(
+    zoning_.zones.descend(
         ids, [&](std::uint32_t id) { return dynhull::strip_of(area, edges[id]); },
         [&](Point p) { return area.holds(p); },
         [&](std::uint32_t number, std::span<const std::uint32_t> touching) {
-          Zone& zone = zones_[number];
+          Zone& zone = zoning_.zones[number];
           near.clear();
           for (const std::uint32_t id : touching) near.push_back(edges[id]);
           if (touching.empty())
             zone.covering.push_back(handle);
           else
-            append_pieces(zone, handle, area, near, inside_at(area, zone.anchor()));
-          if (inside) wait_for(handle, number);
-          if (is_crowded(zone)) crowded_.push_back(number);
+            zoning_.append_pieces(zone, handle, area, near, zoning_.inside_at(area, zone.anchor()));
+          if (inside) zoning_.wait_for(handle, number);
+          if (zoning_.is_crowded(zone)) zoning_.crowded.push_back(number);
           for (const std::uint32_t slot : zone.subjects) {
-            const Point p = (*slots_)[slot].place;
+            const Point p = (*zoning_.slots)[slot].place;
             keep_off(slot, area, near);
             if (inside || !(touching.empty() || area.holds(p))) continue;
-            members_.add(subjects_[slot].inside, handle);
+            zoning_.members.add(zoning_.subjects[slot].inside, handle);
             ++fence.count;
           }
         });
     if (inside)
-      for (const std::uint32_t slot : *inside) wait_for(handle, subjects_[slot].zone);
+      for (const std::uint32_t slot : *inside) zoning_.wait_for(handle, zoning_.subjects[slot].zone);
   }
   // Makes the box of a subject smaller, so that it keeps off some edges of an area.
   void keep_off(std::uint32_t slot, const Area& area, std::span<const Edge> edges) {
-    Clearance clearance(subjects_.box(slot), (*slots_)[slot].place);
+    Clearance clearance(zoning_.subjects.box(slot), (*zoning_.slots)[slot].place);
     for (const Edge& edge : edges) clearance.keep_off(dynhull::strip_of(area, edge));
-    subjects_.box(slot) = clearance.box();
+    zoning_.subjects.box(slot) = clearance.box();
   }
   // Replaces an area. Edges that stay need no visit, unless several polygons make one of them lie inside of another.
   void replace(std::uint32_t handle, std::shared_ptr<const Area> area) {
-    Fence& fence = *fences_[handle];
+    Fence& fence = *zoning_.fences[handle];
     const std::shared_ptr<const Area> old = fence.area;
     const bool keeps = old->kind == area->kind && old->kind != Area::Kind::DISK && old->margin == area->margin &&
                        old->closed == area->closed && old->polygons.size() < 2 && area->polygons.size() < 2;
@@ -380,7 +392,7 @@ class Fences : public OwnHull {
     const auto is_added = [&](std::uint32_t id) { return id < added.size(); };
 
     std::vector<Edge> near;
-    zones_.descend(
+    zoning_.zones.descend(
         ids,
         [&](std::uint32_t id) {
           return is_added(id) ? dynhull::strip_of(*area, added[id])
@@ -388,8 +400,8 @@ class Fences : public OwnHull {
         },
         [&](Point p) { return old->holds(p) != area->holds(p); },
         [&](std::uint32_t number, std::span<const std::uint32_t> touching) {
-          Zone& zone = zones_[number];
-          wait_for(handle, number);
+          Zone& zone = zoning_.zones[number];
+          zoning_.wait_for(handle, number);
           near.clear();
           for (const Piece& piece : zone.run_of(handle))
             if (!std::binary_search(removed.begin(), removed.end(), piece.edge, edge_less)) near.push_back(piece.edge);
@@ -400,9 +412,9 @@ class Fences : public OwnHull {
           if (near.empty()) {
             if (area->holds(zone.anchor())) zone.covering.push_back(handle);
           } else {
-            append_pieces(zone, handle, *area, near, inside_at(*area, zone.anchor()));
+            zoning_.append_pieces(zone, handle, *area, near, zoning_.inside_at(*area, zone.anchor()));
           }
-          if (is_crowded(zone)) crowded_.push_back(number);
+          if (zoning_.is_crowded(zone)) zoning_.crowded.push_back(number);
           near.clear();
           for (const std::uint32_t id : touching)
             if (is_added(id)) near.push_back(added[id]);
@@ -415,35 +427,42 @@ class Fences : public OwnHull {
     try {
       forget(handle);
     } catch (const std::bad_alloc&) {
-      torn_ = true;
+      zoning_.torn = true;
     }
     discard(handle);
   }
   void forget(std::uint32_t handle) {
-    const Fence& fence = *fences_[handle];
+    const Fence& fence = *zoning_.fences[handle];
     if (fence.own) {
-      for (const std::uint32_t slot : fence.outside) members_.remove(subjects_[slot].inside, handle);
+      for (const std::uint32_t slot : fence.outside) zoning_.members.remove(zoning_.subjects[slot].inside, handle);
       return;
     }
-    for_each_zone(handle, [&](std::uint32_t number) {
-      Zone& zone = zones_[number];
+    zoning_.for_each_zone(handle, [&](std::uint32_t number) {
+      Zone& zone = zoning_.zones[number];
       std::erase(zone.covering, handle);
       std::erase(zone.pending, handle);
       std::erase_if(zone.pieces, [&](const Piece& piece) { return piece.fence == handle; });
-      for (const std::uint32_t slot : zone.subjects) members_.remove(subjects_[slot].inside, handle);
+      for (const std::uint32_t slot : zone.subjects) zoning_.members.remove(zoning_.subjects[slot].inside, handle);
     });
-    for (const std::uint32_t number : strayed_) members_.remove(subjects_[changes_[number].slot].inside, handle);
-    if (everyone_) slots_->for_each([&](std::uint32_t slot) { members_.remove(subjects_[slot].inside, handle); });
+    for (const std::uint32_t number : reports_.strayed)
+      zoning_.members.remove(zoning_.subjects[reports_.changes[number].slot].inside, handle);
+    if (zoning_.everyone)
+      zoning_.slots->for_each(
+          [&](std::uint32_t slot) { zoning_.members.remove(zoning_.subjects[slot].inside, handle); });
   }
   void discard(std::uint32_t handle) {
-    const Fence& fence = *fences_[handle];
-    for (Gone& gone : gone_) members_.remove(gone.inside, handle);
-    if (!fence.own) crossable_ -= fence.cross;
-    std::erase(owners_, handle);
-    fences_[handle].reset();
+    const Fence& fence = *zoning_.fences[handle];
+    for (Reports::Gone& gone : reports_.absent) zoning_.members.remove(gone.inside, handle);
+    if (!fence.own) decisions_.crossable -= fence.cross;
+    std::erase(reports_.owners, handle);
+    zoning_.fences[handle].reset();
     first_free_ = std::min(first_free_, std::size_t{handle});
   }
 
+  Zoning zoning_;        // where subjects and boundaries are
+  Reports reports_;      // what has changed since crossings were last taken
+  Decisions decisions_;  // who has crossed
+  OwnHulls own_hulls_;   // the fences around the subjects' own hull
   std::map<std::int64_t, std::uint32_t> numbers_;
   std::size_t first_free_ = 0;
   bool carries_ = false;  // whether a subject has come from another index since crossings were last taken

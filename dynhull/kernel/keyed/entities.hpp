@@ -59,11 +59,11 @@ class Entities {
 
   // Tells an index of fences of every change from now on, if there is no other. Not copied.
   bool attach(Fences& fences) {
-    if (fences_ != nullptr) return false;
-    fences_ = &fences;
+    if (reports_ != nullptr) return false;
+    reports_ = &fences.reports();
     return true;
   }
-  void detach() { fences_ = nullptr; }
+  void detach() { reports_ = nullptr; }
 
   // Throws DuplicateKey; then, and after every other exception, nothing has changed.
   template <class Keys>
@@ -72,7 +72,7 @@ class Entities {
     Counts counts;
     const Changes changes(2 * count);
     Batch<Keys> batch(*this, keys);
-    if (fences_) fences_->make_room(count);
+    if (reports_) reports_->make_room(count);
     if (only != Only::ALL || ordered)
       for (std::size_t i = 0; i < count; ++i) tree.require(puts.place(i));
     std::size_t change = 0;
@@ -103,7 +103,7 @@ class Entities {
       throw;
     }
     batch.commit();
-    if (fences_) report_moved(batch, puts, changes, count);
+    if (reports_) report_moved(batch, puts, changes, count);
     rename([&] { rename_moved(batch, puts, changes, count); });
     if (ages_) age(batch, count);
     return counts;
@@ -150,9 +150,9 @@ class Entities {
 
   void clear(FramedTree& tree) {
     Entities empty(slots_.strings(), ordered);
-    if (fences_) {
-      fences_->make_room_to_leave(slots_.size(), slots_.arena().living());
-      slots_.for_each([&](std::uint32_t slot) { fences_->left(slot, REMOVED); });
+    if (reports_) {
+      reports_->make_room_to_leave(slots_.size(), slots_.arena().living());
+      slots_.for_each([&](std::uint32_t slot) { reports_->left(slot, REMOVED); });
     }
     tree.clear();
     std::swap(slots_, empty.slots_);
@@ -305,17 +305,17 @@ class Entities {
   // For `forget` of the same slots.
   template <class SlotOf>
   void make_room_to_leave(std::size_t count, SlotOf slot) {
-    if (!fences_) return;
+    if (!reports_) return;
     std::size_t bytes = 0;
     for (std::size_t i = 0; slots_.strings() && i < count; ++i)
       if (slot(i) != NONE) bytes += Arena::length(slots_[slot(i)].key);
-    fences_->make_room_to_leave(count, bytes);
+    reports_->make_room_to_leave(count, bytes);
   }
   // Forgets entities that the tree does not hold any more; `slot` may return NONE.
   template <class SlotOf>
   void forget(std::size_t count, SlotOf slot, Cause cause) {
-    for (std::size_t i = 0; fences_ && i < count; ++i)
-      if (slot(i) != NONE) fences_->left(slot(i), cause);
+    for (std::size_t i = 0; reports_ && i < count; ++i)
+      if (slot(i) != NONE) reports_->left(slot(i), cause);
     rename([&] {
       for (std::size_t i = 0; i < count; ++i)
         if (slot(i) != NONE) names_->remove(slot(i), slots_[slot(i)].place);
@@ -328,14 +328,14 @@ class Entities {
   void report_moved(Rows& batch, Puts& puts, const Changes& changes, std::size_t count) {
     std::size_t change = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (i + LOOKAHEAD < count && batch[i + LOOKAHEAD].slot != NONE) fences_->fetch(batch[i + LOOKAHEAD].slot);
+      if (i + LOOKAHEAD < count && batch[i + LOOKAHEAD].slot != NONE) reports_->fetch(batch[i + LOOKAHEAD].slot);
       if (!batch[i].moved) continue;
       change += !batch[i].entered;
       const Point now = changes.place(change++);
       if (batch[i].entered)
-        fences_->appeared(batch[i].slot);
+        reports_->appeared(batch[i].slot);
       else
-        fences_->moved(batch[i].slot, puts.place(i), now);
+        reports_->moved(batch[i].slot, puts.place(i), now);
     }
   }
 
@@ -404,7 +404,7 @@ class Entities {
   SlotTable table_;
   std::unique_ptr<Names> names_;
   std::unique_ptr<Ages> ages_;  // none until the oldest are asked for
-  Fences* fences_ = nullptr;    // none, or the index that is attached
+  Reports* reports_ = nullptr;  // none, or those of the index that is attached
 };
 
 }  // namespace dynhull

@@ -4,39 +4,32 @@
 
 #include "../hull_tree.hpp"
 #include "../query/queries.hpp"
-#include "deciding.hpp"
+#include "decisions.hpp"
 
 namespace dynhull {
 
-class OwnHull : public Deciding {
- protected:
-  using Deciding::Deciding;
+class OwnHulls {
+ public:
+  OwnHulls(Zoning& zoning, Reports& reports, Decisions& decisions)
+      : zoning_(zoning), reports_(reports), decisions_(decisions) {}
 
   void add_own(const HullTree& tree, std::uint32_t handle, const std::vector<std::uint32_t>* inside) {
-    Fence& fence = *fences_[handle];
-    owners_changed_ = true;
+    Fence& fence = *zoning_.fences[handle];
+    reports_.owners_changed = true;
     fence.area = std::make_shared<const Area>(Area::of_hull(vertices_of(tree), true, fence.area->margin));
     fence.decided = fence.area;
-    std::vector<bool> within(slots_->end(), inside == nullptr);
+    std::vector<bool> within(zoning_.slots->end(), inside == nullptr);
     for (std::size_t i = 0; inside && i < inside->size(); ++i) within[(*inside)[i]] = true;
     const std::vector<Point> vertices = single_vertices(tree);
-    slots_->for_each([&](std::uint32_t slot) {
-      const Point p = (*slots_)[slot].place;
+    zoning_.slots->for_each([&](std::uint32_t slot) {
+      const Point p = (*zoning_.slots)[slot].place;
       if (within[slot] && (inside || !std::binary_search(vertices.begin(), vertices.end(), p))) {
         ++fence.count;
       } else {
         fence.outside.push_back(slot);
-        members_.add(subjects_[slot].inside, handle);
+        zoning_.members.add(zoning_.subjects[slot].inside, handle);
       }
     });
-  }
-
-  // In order.
-  static std::vector<Point> single_vertices(const HullTree& tree) {
-    std::vector<Point> vertices = vertices_of(tree);
-    std::erase_if(vertices, [&](Point p) { return tree.count(p) > 1; });
-    std::sort(vertices.begin(), vertices.end());
-    return vertices;
   }
 
   static void look_at_own(Fence& fence, const HullTree& tree) {
@@ -46,23 +39,25 @@ class OwnHull : public Deciding {
 
   // Subjects that were not there are outside at first.
   void list_fresh() {
-    for (std::size_t i = 0; i < changes_.size() && !owners_.empty(); ++i) {
-      if (!changes_[i].fresh || changes_[i].returned || !current(i)) continue;
-      const std::uint32_t slot = changes_[i].slot;
-      for (const std::uint32_t handle : owners_) {
-        Fence& fence = *fences_[handle];
-        if (members_.has(subjects_[slot].inside, handle) || was_there(fence, key_of(slot), true)) continue;
+    for (std::size_t i = 0; i < reports_.changes.size() && !reports_.owners.empty(); ++i) {
+      if (!reports_.changes[i].fresh || reports_.changes[i].returned || !reports_.current(i)) continue;
+      const std::uint32_t slot = reports_.changes[i].slot;
+      for (const std::uint32_t handle : reports_.owners) {
+        Fence& fence = *zoning_.fences[handle];
+        if (zoning_.members.has(zoning_.subjects[slot].inside, handle) ||
+            reports_.was_there(fence, reports_.key_of(slot), true))
+          continue;
         fence.outside.push_back(slot);
-        members_.add(subjects_[slot].inside, handle);
+        zoning_.members.add(zoning_.subjects[slot].inside, handle);
       }
-      changes_[i].returned = true;
+      reports_.changes[i].returned = true;
     }
-    for (const std::uint32_t handle : owners_) fences_[handle]->listed = true;
+    for (const std::uint32_t handle : reports_.owners) zoning_.fences[handle]->listed = true;
   }
 
   template <class SlotsAt>
   void decide_own(std::uint32_t handle, HullTree& tree, SlotsAt slots_at) {
-    Fence& fence = *fences_[handle];
+    Fence& fence = *zoning_.fences[handle];
     const std::vector<Point> vertices = single_vertices(tree);
     std::vector<std::uint32_t> at_vertices = slots_at(vertices);
     std::sort(at_vertices.begin(), at_vertices.end());
@@ -74,15 +69,15 @@ class OwnHull : public Deciding {
     std::sort(fence.outside.begin(), fence.outside.end());
     fence.outside.erase(std::unique(fence.outside.begin(), fence.outside.end()), fence.outside.end());
     for (const std::uint32_t slot : fence.outside) {
-      if (!there(slot) || !members_.has(subjects_[slot].inside, handle)) continue;
+      if (!zoning_.there(slot) || !zoning_.members.has(zoning_.subjects[slot].inside, handle)) continue;
       if (is_single(slot))
         outside.push_back(slot);
       else
-        cross(handle, slot, +1, 0);
+        decisions_.cross(handle, slot, +1, 0);
     }
     for (const std::uint32_t slot : at_vertices) {
-      const Point p = (*slots_)[slot].place;
-      if (!members_.has(subjects_[slot].inside, handle)) {
+      const Point p = (*zoning_.slots)[slot].place;
+      if (!zoning_.members.has(zoning_.subjects[slot].inside, handle)) {
         if (is_near_neighbours(fence.area->convex, p, fence.area->margin)) continue;
         bool stays = false;
         double distance = 0;
@@ -94,10 +89,10 @@ class OwnHull : public Deciding {
         if (stays) continue;
         outside.push_back(slot);
         fence.outside.push_back(slot);  // in case of an exception
-        cross(handle, slot, -1, distance);
+        decisions_.cross(handle, slot, -1, distance);
         continue;
       }
-      const std::optional<Point> from = start(fence, slot);
+      const std::optional<Point> from = decisions_.start(fence, slot);
       if (!fence.cross || !from || *from == p) continue;
       bool meets = false;
       double distance = 0;
@@ -105,10 +100,20 @@ class OwnHull : public Deciding {
         meets = Area::of_hull(vertices_of(tree), true, 0).meets(*from, p);
         distance = dynhull::distance(tree.nodes(), p);
       });
-      if (meets) cross(handle, slot, 0, distance);
+      if (meets) decisions_.cross(handle, slot, 0, distance);
     }
     fence.outside = std::move(outside);
   }
+
+ private:
+  // In order.
+  static std::vector<Point> single_vertices(const HullTree& tree) {
+    std::vector<Point> vertices = vertices_of(tree);
+    std::erase_if(vertices, [&](Point p) { return tree.count(p) > 1; });
+    std::sort(vertices.begin(), vertices.end());
+    return vertices;
+  }
+
   // Whether a vertex is so close to the chord of its neighbours that the hull of the others is near without a look.
   static bool is_near_neighbours(const std::vector<Point>& convex, Point p, double margin) {
     const auto vertex = std::find(convex.begin(), convex.end(), p);
@@ -117,6 +122,10 @@ class OwnHull : public Deciding {
     const Point after = vertex + 1 == convex.end() ? convex.front() : vertex[1];
     return compare_distance(p, nearest_part(p, {before, after}), margin) <= 0;
   }
+
+  Zoning& zoning_;
+  Reports& reports_;
+  Decisions& decisions_;
 };
 
 }  // namespace dynhull
