@@ -33,14 +33,13 @@ def test_an_error_that_nobody_waits_for_is_not_logged_as_forgotten() -> None:
         assert go_on.wait(PATIENCE)
         raise StorageError("the database is away")
 
-    threads = SimpleNamespace(pool=lambda _, workers: ThreadPoolExecutor(workers))
-    engine: Any = SimpleNamespace(keeps=True, machine=SimpleNamespace(threads=threads), read_from_thread=read)
+    store: Any = SimpleNamespace(keeps=True, read=read)
     row: Any = SimpleNamespace(number=1)
     said: list[Any] = []
 
     async def run() -> None:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: said.append(context["message"]))
-        await leave(begun, LocalShard(engine, row), go_on)
+        await leave(begun, LocalShard(ThreadPoolExecutor(1), store, row), go_on)
 
     asyncio.run(run())
     gc.collect()
