@@ -315,4 +315,7 @@ def test_a_batch_of_refused_rows_only_keeps_its_number(served, name, tmp_path):
     assert (done.exit_code, done.stdout) == (0, f"{name}: 0 points loaded\n")
     file.write_text("id,seen,x,y\n" + bad)
     done = dynhull("load", name, file, "--key", "id", "--time", "seen")
-    assert (done.exit_code, "has no points\n1 bad row left out:\n  line 2: time is 2099" in done.stderr) == (2, True)
+    assert (done.exit_code, f"has no points\n{file}: 1 bad row left out:\n  line 2: time is 2099" in done.stderr) == (
+        2,
+        True,
+    )

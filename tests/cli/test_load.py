@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -128,7 +129,7 @@ def test_bad_rows_are_counted_shown_and_kept(tmp_path, served, name, suffix, tex
     assert done.exit_code == 0
     assert done.stdout == f"{name}: 2 points loaded, 2 in the hull\n"
     shown = "\n".join(f"  {place}: {reason}" for place, reason in reasons[:5])
-    assert done.stderr == f"6 bad rows left out:\n{shown}\n  ... and 1 more\n"
+    assert done.stderr == f"{file}: 6 bad rows left out:\n{shown}\n  ... and 1 more\n"
     rows = kept.read_text()
     assert all(f"{place}," in rows for place, _ in reasons)
     done = dynhull("load", name, file, "--max-bad", 5, "--again")
@@ -144,7 +145,40 @@ def test_bad_rows_of_parquet(tmp_path, name):
     file = tmp_path / "points.parquet"
     pq.write_table(pa.table({"x": [1.0, None, 3.0], "y": [1.0, 2.0, float("nan")]}), file)
     done = dynhull("load", name, file)
-    assert done.stderr == "2 bad rows left out:\n  row 2: x is missing\n  row 3: y is 'nan', not finite\n"
+    assert done.stderr == f"{file}: 2 bad rows left out:\n  row 2: x is missing\n  row 3: y is nan, not finite\n"
+
+
+LARGE = 2**53 + 1  # no double has it
+
+
+@pytest.mark.parametrize("kind", ["int64", "decimal", "csv", "json", "ndjson", "geojson"])
+def test_integers_that_are_no_doubles_are_bad_rows(tmp_path, served, name, kind):
+    numbers = [LARGE, 2**53, 2**53 + 2, -LARGE, 1]
+    file = tmp_path / f"a.{kind if 'json' in kind or kind == 'csv' else 'parquet'}"
+    match kind:
+        case "int64":
+            pq.write_table(pa.table({"x": numbers, "y": [0] * 5}), file)
+        case "decimal":
+            wide = pa.array(list(map(Decimal, numbers)), pa.decimal128(38, 4))
+            pq.write_table(pa.table({"x": wide, "y": pa.array([Decimal("0.5")] * 5, pa.decimal128(9, 4))}), file)
+        case "csv":
+            file.write_text("x,y\n" + "".join(f"{each},0\n" for each in numbers))
+        case "geojson":
+            shapes = [{"type": "Point", "coordinates": [each, 0]} for each in numbers]
+            rows = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+            file.write_text(json.dumps({"type": "FeatureCollection", "features": rows}))
+        case _:
+            rows = [json.dumps([each, 0]) for each in numbers]
+            file.write_text("[" + ",".join(rows) + "]" if kind == "json" else "\n".join(rows))
+    done = dynhull("load", name, file, "--plane", "--json")
+    assert json.loads(done.stdout)["bad_rows"] == 2, done.stderr
+    unit = {"csv": "line", "ndjson": "line", "json": "item", "geojson": "feature"}.get(kind, "row")
+    first, second = (2, 5) if kind == "csv" else (1, 4)
+    assert f"{file}: 2 bad rows left out:\n  {unit} {first}: x is {LARGE}" in done.stderr
+    assert f"  {unit} {second}: x is -{LARGE}" in done.stderr
+    assert "which is not a double: integers are exact up to 2**53" in done.stderr
+    with HullClient(served) as client:
+        assert max(client.get_hull(name).vertices[:, 0].tolist()) == 2**53 + 2
 
 
 @pytest.mark.parametrize(

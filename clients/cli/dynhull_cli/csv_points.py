@@ -63,19 +63,19 @@ def read_points(
         axes = table.names[table.x], table.names[table.y]
         on_globe = are_degrees(*axes) if geographic is None else geographic
         rows, bad = _read(table, *labels, on_globe=on_globe)
-    left_out = bad_rows_left_out(bad[:SHOWN_BAD_ROWS], len(bad))
+    left_out = bad_rows_left_out(path, bad[:SHOWN_BAD_ROWS], len(bad))
     if not rows:
         raise ValueError("\n".join([f"{path} has no points", *left_out]))
     found = f"{path}: {plural(len(rows), 'point')} from columns {axes[0]} and {axes[1]}"
     return PointFile(rows, axes, on_globe, [*table.notes, found, *left_out])
 
 
-def bad_rows_left_out(first: Sequence[str], count: int) -> list[str]:
-    """Lines about `count` bad rows, with the first ones; none where `count` is 0."""
+def bad_rows_left_out(name: Path | str, first: Sequence[str], count: int) -> list[str]:
+    """Lines about `count` bad rows of an input, with the first ones; none where `count` is 0."""
     if not count:
         return []
     more = [f"  ... and {count - len(first):,} more"] if count > len(first) else []
-    return [f"{plural(count, 'bad row')} left out:", *(f"  {each}" for each in first), *more]
+    return [f"{name}: {plural(count, 'bad row')} left out:", *(f"  {each}" for each in first), *more]
 
 
 def _read(table: CsvTable, time: int | None, identity: int | None, *, on_globe: bool) -> tuple[list[Row], list[str]]:

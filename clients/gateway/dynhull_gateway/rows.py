@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 
 from dynhull_cli.reading.columns import NOT_AVAILABLE, UNKNOWN_LATITUDE, available, pair_of
 from dynhull_cli.reading.labels import LabelReader, key_of
-from dynhull_cli.reading.values import BadValueError, coordinate, number
+from dynhull_cli.reading.values import LARGEST_EXACT, BadValueError, coordinate, number
 
 from .invalid import detail, path_in
 from .problems import cut, pointer, shown
@@ -106,7 +106,7 @@ class Ndjson:
         for line in lines:
             try:  # the usual rows, without a look at each value
                 if line.startswith(b"["):
-                    found.rows.append(Row(None, POINT(line)))
+                    found.rows.append(Row(None, _exact(POINT(line))))
                     continue
                 given: Any
                 if b'"x"' in line:
@@ -120,7 +120,7 @@ class Ndjson:
                 times: tuple[int | None, ...] = ()
                 if "time" in given or "expires" in given:
                     times = self._labels.times(given.get("time"), given.get("expires"))
-                found.rows.append(Row(given.get("key"), point, *times))
+                found.rows.append(Row(given.get("key"), _exact(point), *times))
                 continue
             except (ValidationError, BadValueError):
                 pass
@@ -320,6 +320,13 @@ def with_keys(found: Found, kind: Literal["str", "int"] | None) -> Found:
                 found.refuse(place, "must be an integer", "key", shown(row.key))
     found.bad.sort(key=lambda error: error.row)
     return found
+
+
+def _exact(point: Sequence[float]) -> Sequence[float]:
+    """The point; BadValueError if it may have been an integer that is no double."""
+    if all(-LARGEST_EXACT < each < LARGEST_EXACT for each in point):
+        return point
+    raise BadValueError("point", "needs a look")
 
 
 def _cells(line: bytes) -> list[str]:

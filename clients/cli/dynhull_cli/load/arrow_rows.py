@@ -1,6 +1,7 @@
 """Points of tables of Arrow, a batch of rows at a time: those of Parquet files and of the layers that GDAL reads."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ import pyarrow.compute as pc
 
 from ..reading.columns import column_index
 from ..reading.labels import Labels
-from ..reading.values import coordinate
+from ..reading.values import LARGEST_EXACT, coordinate
 from .chunks import Chunk, Chunks, Numbers, Position, Rows, picked
 from .geometry_column import GeometryColumn, Value
 from .source import Source
@@ -84,13 +85,14 @@ class ArrowTable:
 
     def _of_numbers(self, arrays: list[Any], names: list[str], labels: OfRow | None, numbers: Numbers) -> Chunk:
         if labels is None and not any(pa.types.is_string(each.type) for each in arrays):
-            points = np.stack([each.cast(pa.float64()).to_numpy(zero_copy_only=False) for each in arrays], axis=1)
-            if np.isfinite(points).all():
-                return Chunk(Rows(points + 0.0, numbers, self.unit))
+            with suppress(pa.ArrowInvalid):  # an integer that is no double
+                points = np.stack([each.cast(pa.float64()).to_numpy(zero_copy_only=False) for each in arrays], axis=1)
+                if (np.abs(points) < LARGEST_EXACT).all():
+                    return Chunk(Rows(points + 0.0, numbers, self.unit))
         rows = list(zip(*(each.to_pylist() for each in arrays), strict=True))
 
         def position(row: int) -> list[Position]:
-            x, y = map(coordinate, (None if value is None else str(value) for value in rows[row]), names)
+            x, y = map(coordinate, rows[row], names)
             return [(x, y)]
 
         return self._picked(numbers, position, lambda row: str(rows[row]), labels)

@@ -20,9 +20,10 @@ ADVICE = (
 
 
 class BadRows:
-    """The bad rows of a load, written to `file` if there is one; ValueError when there are more than `most`."""
+    """The bad rows of an input, written to `file` if there is one; ValueError when there are more than `most`."""
 
-    def __init__(self, file: TextIO | None, most: int | None) -> None:
+    def __init__(self, name: str, file: TextIO | None, most: int | None) -> None:
+        self._name = name
         self.count = 0
         self._first: list[BadRow] = []
         self._too_far = False
@@ -39,7 +40,7 @@ class BadRows:
 
     def report(self) -> list[str]:
         """Lines for the user: how many there are, and the first ones."""
-        left_out = bad_rows_left_out([f"{each.place}: {each.reason}" for each in self._first], self.count)
+        left_out = bad_rows_left_out(self._name, [f"{each.place}: {each.reason}" for each in self._first], self.count)
         return [*left_out, ADVICE] if self._too_far else left_out
 
     def add(self, rows: Sequence[BadRow]) -> None:

@@ -197,7 +197,7 @@ def load(
         ) as opened,
         open_bad_rows(bad_rows, opened) as bad_file,
     ):
-        bad = BadRows(bad_file, max_bad)
+        bad = BadRows(opened.name, bad_file, max_bad)
         known = (lambda: None) if replace else there
         source = dataclasses.replace(opened, asked=geographic, geographic=lambda: _frame(known(), geographic))
 

@@ -69,7 +69,7 @@ def require_readable(source: Source, max_bad: int | None, expected: Callable[[],
     """Read the input to its end and rewind it; ValueError where it is unusable or can be read only once."""
     if source.size is None:
         raise ValueError(f"--replace reads its input twice, and {source.name} is a pipe: write it to a file first")
-    _read_through(source, BadRows(None, max_bad), expected)
+    _read_through(source, BadRows(source.name, None, max_bad), expected)
     source.rewind()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ..csv_table import CsvFormat, CsvTable, UnclearTableError, csv_table, numbered
 from ..reading.columns import column_index, decimal_mark
 from ..reading.labels import Labels
-from ..reading.values import coordinate, plain
+from ..reading.values import LARGEST_EXACT, coordinate, plain
 from .chunks import CHUNK_ROWS, LINE, Chunk, Chunks, Numbers, Points, Position, Rows, cut, picked
 from .geometry_column import GeometryColumn
 from .options import Format
@@ -114,7 +114,7 @@ def _lines(rows: list[list[str]], line: int, following: int) -> Numbers:
 
 
 def _all_points(rows: list[list[str]], places: tuple[int, int], decimal: str, columns: int) -> Points | None:
-    """The points of the rows, which is the usual case; None if a row is not two finite numbers, or is too long."""
+    """The points of the rows, which is the usual case; None if one needs a look: not two numbers, large, too long."""
     if max(map(len, rows)) > columns:
         return None
     try:
@@ -126,4 +126,4 @@ def _all_points(rows: list[list[str]], places: tuple[int, int], decimal: str, co
         points = np.array([[float(text) for text in column] for column in texts]).T
     except (ValueError, IndexError):
         return None
-    return points + 0.0 if np.isfinite(points).all() else None
+    return points + 0.0 if (np.abs(points) < LARGEST_EXACT).all() else None

@@ -6,6 +6,10 @@ from decimal import Decimal
 from typing import Any
 
 LONGEST_TEXT = 200
+LARGEST_EXACT = 2.0**53  # of the numbers up to which doubles are all integers
+
+
+NO_DOUBLE = "which is not a double: integers are exact up to 2**53"
 
 
 class BadValueError(ValueError):
@@ -26,7 +30,10 @@ class BadValueError(ValueError):
 
 
 def coordinate(value: Any, name: str, decimal: str = ".") -> float:
-    """A finite number, or a text that is one, with this decimal mark; BadValueError says what is wrong with it."""
+    """A finite number, or a text that is one, with this decimal mark; BadValueError says what is wrong with it.
+
+    Decimals become the nearest double; integers that are none are bad.
+    """
     if not isinstance(value, str) or value == "":
         return number(value, name)
     try:
@@ -36,6 +43,8 @@ def coordinate(value: Any, name: str, decimal: str = ".") -> float:
         raise BadValueError(name, f"not a number{mark}", value) from None
     if not math.isfinite(found):
         raise BadValueError(name, "not finite", value)
+    if abs(found) >= LARGEST_EXACT and value.strip().lstrip("+-").isdecimal() and int(value) != found:
+        raise BadValueError(name, NO_DOUBLE, int(value))
     return found + 0.0
 
 
@@ -51,7 +60,16 @@ def number(value: Any, name: str) -> float:
         rounded = math.inf
     if not math.isfinite(rounded):
         raise BadValueError(name, "not finite", value)
+    if abs(rounded) >= LARGEST_EXACT and rounded != value and _is_integer(value):
+        raise BadValueError(name, NO_DOUBLE, value)
     return rounded + 0.0
+
+
+def _is_integer(value: int | float | Decimal) -> bool:
+    """Whether it is written as an integer, perhaps with a fraction of zeros; 1e300 is not."""
+    if isinstance(value, Decimal):
+        return value == value.to_integral_value() and int(value.as_tuple().exponent) <= 0
+    return isinstance(value, int)
 
 
 def is_number(text: str) -> bool:
