@@ -34,6 +34,12 @@ def build(folder: Path) -> Path:
 
 
 @pytest.fixture
+def take_text(site: Path) -> Callable[[str], str]:
+    """The code blocks of the page of that name, as text."""
+    return lambda page: "".join(block.shown for block in blocks((site / page / "index.html").read_text()))
+
+
+@pytest.fixture
 def take_program(site: Path, tmp_path: Path) -> Callable[[str, str], Path]:
     """Saves the code block of that title, from the page of that name, as a reader would."""
 

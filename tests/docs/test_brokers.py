@@ -20,12 +20,15 @@ QUERY = "dynhull query brokers/fleet vertices --keys"
 
 
 def test_positions_from_an_empty_folder(
-    take_program: Callable[[str, str], Path], site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    take_program: Callable[[str, str], Path],
+    take_text: Callable[[str], str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     program = take_program("how-to/brokers", "vehicles.py")
-    text = (site / "how-to" / "brokers" / "index.html").read_text()
+    text = take_text("how-to/brokers")
     for line in (INGEST, QUERY):
-        assert line.replace("'", "&#39;") in text or line in text
+        assert line in text
     port = free_port()
     monkeypatch.setenv("NATS_URL", f"nats://127.0.0.1:{port}")
     with server_process() as server, broker(nats_server(tmp_path, port), port):

@@ -17,10 +17,10 @@ def run(program: Path, *options: str) -> str:
 
 
 def test_a_fleet_has_named_corners(
-    take_program: Callable[[str, str], Path], site: Path, monkeypatch: pytest.MonkeyPatch
+    take_program: Callable[[str, str], Path], take_text: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     positions, corners = (take_program("how-to/fleets", title) for title in ("positions.py", "corners.py"))
-    text = (site / "how-to" / "fleets" / "index.html").read_text()
+    text = take_text("how-to/fleets")
     with server_process() as server:
         monkeypatch.setenv("DYNHULL_ADDRESS", server.address)
         commands = [line.split()[1:] for line in COMMANDS.splitlines()]
