@@ -220,6 +220,14 @@ def test_what_is_not_there_is_not_found(gateway: Gateway, name: str) -> None:
         assert gateway.get(path).status == 404
 
 
+def test_a_hull_that_is_not_there_yet_is_awaited(gateway: Gateway, name: str) -> None:
+    """A 404 would end an EventSource for good."""
+    events = Events(gateway, f"/hulls/{name}/events?wait=true")
+    gateway.post("/hulls", {"name": name})
+    assert events.next()[0] == "snapshot"
+    events.close()
+
+
 def test_a_fence_from_any_place(gateway: Gateway, name: str) -> None:
     gateway.post("/hulls", {"name": name, "keyed": "str"})
     gateway.post("/fences", {"name": name, "area": {"exterior": SQUARE}, "subjects": name, "initial": "none"})

@@ -7,12 +7,13 @@ from typing import Any
 from fastapi import Depends, FastAPI, Request, Response
 from fastapi.middleware.cors import CORSMiddleware
 from pydantic import BaseModel
+from starlette.responses import HTMLResponse
 from starlette.routing import Route
 
 import dynhull_client
 from dynhull_client import AsyncHullClient
 
-from . import fences, handlers, health, hulls, points, questions, uploads
+from . import fences, handlers, health, hulls, people, points, questions, uploads
 from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
 from .events import routes as events
@@ -57,7 +58,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         version=dynhull_client.__version__,
         description=DESCRIPTION,
         openapi_url=None,  # below, with a newline at its end
-        docs_url=None,  # their pages load scripts from elsewhere
+        docs_url=None,  # the framework's pages load scripts from elsewhere
         redoc_url=None,
         responses=RESPONSES,
         dependencies=[Depends(require_known), Depends(require_one_number)],
@@ -76,9 +77,12 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     for router in routers:
         app.include_router(router)
     app.openapi = partial(_description, app)  # type: ignore[method-assign]  # the framework's way to have one's own
-    description = Route("/openapi.json", _answer_description, include_in_schema=False)
-    app.router.routes.append(description)
-    app.state.routes = [description, *(route for router in routers for route in router.routes)]
+    described = [
+        Route("/openapi.json", _answer_description, include_in_schema=False),
+        Route("/docs", _answer_people, include_in_schema=False),
+    ]
+    app.router.routes.extend(described)
+    app.state.routes = [*described, *(route for router in routers for route in router.routes)]
     handlers.install(app)
     app.add_middleware(SmallChanges, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
@@ -100,9 +104,13 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
 
 
 async def _answer_description(request: Request) -> Response:
-    root = request.scope.get("root_path")
-    servers = {"servers": [{"url": root}]} if root else {}
+    servers = {"servers": [{"url": request.scope.get("root_path") or "/"}]}
     return Response(f"{json.dumps(request.app.openapi() | servers)}\n", media_type=JSON)
+
+
+async def _answer_people(request: Request) -> Response:
+    page = people.page_of(request.app.openapi(), request.scope.get("root_path", ""))
+    return HTMLResponse(page, headers={"Content-Security-Policy": people.POLICY})
 
 
 def _description(app: FastAPI) -> dict[str, Any]:
@@ -119,8 +127,7 @@ def _description(app: FastAPI) -> dict[str, Any]:
                 for content in operation["responses"].get("200", {}).get("content", {}).values():
                     if "$ref" in content["schema"]:
                         content["schema"].pop("type", None)  # "string", the framework's guess
-                if "security" in operation:
-                    operation["security"].append({})  # a server without tokens needs none
+                operation.setdefault("security", []).append({})  # a server without tokens needs none
         for unused in ("HTTPValidationError", "ValidationError"):
             schemas.pop(unused, None)
         app.openapi_schema = made

@@ -79,13 +79,27 @@ def _not_found(request: Request) -> Response:
     path = cut(_path(request))
     near = get_close_matches(path, _paths_like(path, request.app.state.routes), NEAR)
     what = f"near it {'is' if len(near) == 1 else 'are'} {', '.join(near)}; " if near else ""
-    detail = f"there is no {path}: {what}/openapi.json lists what there is"
+    if meant := _with_slashes(_path(request), request.app.state.routes):
+        what += f"a slash in a name is written %2F, as in {cut(meant)}; "
+    detail = f"there is no {path}: {what}/docs lists what there is, and /openapi.json for programs"
     return problem(HTTPStatus.NOT_FOUND, detail, reason="PATH_NOT_FOUND", value=path)
 
 
 def _path(request: Request) -> str:
     """The path as it was sent, below the path that a proxy shows."""
     return str(request.scope["path"]).removeprefix(request.scope.get("root_path", "")) or "/"
+
+
+def _with_slashes(path: str, routes: Iterable[Route]) -> str | None:
+    """The path of a route that is meant if slashes behind /hulls/ or /fences/ are part of a name; None if none is."""
+    _, kind, *parts = path.split("/")
+    if kind not in ("hulls", "fences") or not all(parts):
+        return None
+    for end in range(2, len(parts) + 1):
+        meant = "/".join(["", kind, "%2F".join(parts[:end]), *parts[end:]])
+        if any(route.path_regex.fullmatch(meant) for route in routes):
+            return meant
+    return None
 
 
 def _paths_like(path: str, routes: Iterable[Route]) -> list[str]:

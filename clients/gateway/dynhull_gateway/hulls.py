@@ -1,21 +1,26 @@
 """Hulls: create, list, read, delete."""
 
+import re
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Response, status
+from fastapi import APIRouter, Query, Request, Response, status
 
 from dynhull_client import HeldPosition, Hull, Quarantine
 
 from . import examples, schemas
-from .bodies import GEOJSON, JsonRoute
+from .bodies import GEOJSON, JSON, JsonRoute
 from .callers import Caller
 from .pages import page
 from .problems import ProblemError
 from .schemas import After, DividedPath, GlobePath, HullPath, Limit, MinRevision, Prefix, ProducerPath
 
 router = APIRouter(tags=["hulls"], route_class=JsonRoute)
-Format = Annotated[Literal["json", "geojson"], Query(description="json, or a GeoJSON Feature.")]
+WEIGHT = re.compile(r"[01](\.\d{0,3})?")
+Format = Annotated[
+    Literal["json", "geojson"] | None,
+    Query(description="json, or a GeoJSON Feature. Without it the header Accept decides; json is usual."),
+]
 
 
 @router.get("/hulls")
@@ -42,16 +47,31 @@ AS_FEATURE: dict[int | str, dict[str, Any]] = {
 
 @router.get("/hulls/{name}", response_model=schemas.Hull, responses=AS_FEATURE)
 async def get_hull(
+    request: Request,
     client: Caller,
     name: HullPath,
+    response: Response,
     min_revision: MinRevision = 0,
-    f: Format = "json",
+    f: Format = None,
 ) -> Any:
     """The vertices with their keys, the size and the measures of a hull."""
     hull = await client.get_hull(name, min_revision=min_revision)
-    if f == "geojson":
-        return Response(schemas.Feature.model_validate(feature(hull)).model_dump_json(), media_type=GEOJSON)
+    vary = {"Vary": "Accept"}
+    if f == "geojson" or (f is None and _prefers_geojson(request)):
+        shown = schemas.Feature.model_validate(feature(hull)).model_dump_json()
+        return Response(shown, headers=vary, media_type=GEOJSON)
+    response.headers.update(vary)
     return schemas.Hull.model_validate(hull)
+
+
+def _prefers_geojson(request: Request) -> bool:
+    """Whether the header Accept names GeoJSON, and JSON not before it (RFC 9110, 12.5.1)."""
+    weights = {}
+    for each in request.headers.get("accept", "").lower().split(","):
+        kind, *parameters = (part.strip() for part in each.split(";"))
+        weight = next((part.removeprefix("q=") for part in parameters if part.startswith("q=")), "1")
+        weights[kind] = float(weight) if WEIGHT.fullmatch(weight) else 0.0
+    return weights.get(GEOJSON, 0.0) > weights.get(JSON, 0.0)
 
 
 @router.delete("/hulls/{name}", status_code=status.HTTP_204_NO_CONTENT)

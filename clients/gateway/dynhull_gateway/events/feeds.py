@@ -16,7 +16,18 @@ from typing import Any, Literal
 
 import grpc
 
-from dynhull_client import AsyncHullClient, Deleted, DynhullError, Event, HullCopy, Measures, Progress, Sketch, Snapshot
+from dynhull_client import (
+    AsyncHullClient,
+    Deleted,
+    DynhullError,
+    Event,
+    HullCopy,
+    HullNotFoundError,
+    Measures,
+    Progress,
+    Sketch,
+    Snapshot,
+)
 
 from ..figures import Figures
 from ..refusals import of_refusal
@@ -138,7 +149,7 @@ class Feed:
                     async for event in watch:
                         self._add(event)
             except DynhullError as error:
-                if error.code == grpc.StatusCode.UNAVAILABLE:
+                if error.code == grpc.StatusCode.UNAVAILABLE or isinstance(error, HullNotFoundError):
                     await asyncio.sleep(RETRY_SECONDS)
                     continue
                 self._fail(error)

@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
 from pydantic import Field
 
-from dynhull_client import AsyncHullClient, UnavailableError
+from dynhull_client import AsyncHullClient, HullNotFoundError, UnavailableError
 
 from ..callers import Caller, token_of
 from ..problems import ProblemError
@@ -40,6 +40,7 @@ FormOf = Annotated[
 ]
 WithKeys = Annotated[bool, Query(description="Whether to name the vertices, in a keyed hull.")]
 WithMeasures = Annotated[bool, Query(description="Whether events include measures.")]
+Wait = Annotated[bool, Query(description="Whether to wait for a hull that is not there yet, in place of 404.")]
 Layer = Annotated[int, Query(ge=1, le=1000, description="The convex layer to follow; 1 is the hull.")]
 MaxVertices = Annotated[
     int | None,
@@ -91,6 +92,7 @@ async def hull_events(
     measures: WithMeasures = False,
     layer: Layer = 1,
     max_vertices: MaxVertices = None,
+    wait: Wait = False,
     last_event_id: LastEventId = None,
 ) -> Response:
     """Follow a hull: events "snapshot", "change", "progress" and "deleted", with ids UID:REVISION.
@@ -110,7 +112,8 @@ async def hull_events(
     if f is not None and form is not None:
         raise ProblemError(400, f"form: {OLD_NAME}: give f alone", "INVALID_FIELD", field="form", value=form)
     _admit(request)
-    with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
+    awaited = (UnavailableError, HullNotFoundError) if wait else (UnavailableError,)
+    with suppress(*awaited):  # an answer of 503 or 404 would end an EventSource for good
         await client.count(name, np.empty((0, 2)))  # whether it is there, and may be read
         if keys:
             await _require_keys(client, name)
