@@ -14,7 +14,7 @@ import sys
 import time
 from pathlib import Path
 
-from dynhull_server.engine import engine, supervisor
+from dynhull_server.engine import driver, supervisor
 from dynhull_server.storage.sqlite import storage
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
@@ -55,7 +55,7 @@ if __name__ == "__main__":
 
     app.SQLiteStorage = Faulty
     supervisor.PATIENCE = 1.0
-    engine.STUCK = 0.5
+    driver.STUCK = 0.5
     storage.CHECKPOINT_BYTES, storage.LONGEST_LOG_BYTES = 2**17, 2**18
     sys.argv = sys.argv[2:]
     runpy.run_path(sys.argv[0], run_name="__main__")

@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-from dynhull_server.engine import engine
+from dynhull_server.engine import driver
 from dynhull_server.engine.server_time import MICROSECONDS, ServerTime
 from dynhull_server.engine.threads import Clock
 
@@ -63,7 +63,7 @@ class _Ahead(Clock):
 
 def _install(file: str) -> None:
     ahead = _Ahead(file)
-    engine.ServerTime = lambda _, latest: ServerTime(ahead, latest)
+    driver.ServerTime = lambda _, latest: ServerTime(ahead, latest)
 
 
 if __name__ == "__main__":
