@@ -12,6 +12,7 @@ from prometheus_client.registry import Collector
 from dynhull_server.rpc.call_counts import CallCounts
 
 from .child_process import METRICS_SECONDS, ChildProcess
+from .merged_metrics import merged
 
 LABEL = "process"
 SUPERVISOR = "supervisor"
@@ -60,14 +61,3 @@ class _Collector(Collector):
         pages = await asyncio.gather(*(each.metrics() for each in self._processes))
         found = {each.name: page for each, page in zip(self._processes, pages, strict=True) if page is not None}
         return found, self._calls.families()
-
-
-def merged(found: dict[str, Iterable[Metric]], label: str) -> list[Metric]:
-    """The metrics of several registries as those of one, with a label that tells them apart."""
-    families: dict[str, Metric] = {}
-    for process, own in found.items():
-        for family in own:
-            one = families.setdefault(family.name, Metric(family.name, family.documentation, family.type))
-            for sample in family.samples:
-                one.samples.append(sample._replace(labels={**sample.labels, label: process}))
-    return list(families.values())

@@ -22,9 +22,10 @@ from dynhull_server.state.events import (
     WriteBatch,
 )
 from dynhull_server.state.fences.events import log
+from dynhull_server.state.fences.events.block import AppendEvents
 from dynhull_server.state.fences.model import tallies
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea
-from dynhull_server.state.fences.model.records import AppendEvents, Cause
+from dynhull_server.state.fences.model.records import Cause
 from dynhull_server.state.fences.model.requests import CreateFence
 from dynhull_server.state.records import HullSettings
 

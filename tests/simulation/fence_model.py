@@ -14,10 +14,10 @@ from support.sides import Disk, Point, Rings, Shape, apart, shape_of_hull
 
 from dynhull.keys import as_keys, key_list
 from dynhull_server.engine.watch_fence import Sent
+from dynhull_server.state.fences.events.block import AppendEvents
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.model.records import (
     AddFence,
-    AppendEvents,
     Cause,
     ChangeFence,
     Consumer,

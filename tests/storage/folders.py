@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.fences.events.block import block_of
+from dynhull_server.state.fences.events.block import AppendEvents, block_of
 from dynhull_server.state.fences.model.config import FenceConfig, PolygonArea
 from dynhull_server.state.fences.model.records import (
     AddFence,
-    AppendEvents,
     Cause,
     Consumer,
     Delay,

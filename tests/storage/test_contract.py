@@ -14,11 +14,10 @@ from folders import appended, event, events, fence_row, fill_fence, read_fence, 
 from dynhull.keys import PackedKeys
 from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
-from dynhull_server.state.fences.events.block import block_of
+from dynhull_server.state.fences.events.block import AppendEvents, block_of
 from dynhull_server.state.fences.model.records import (
     NO_WAITS,
     AddFence,
-    AppendEvents,
     ChangeFence,
     Consumer,
     Delay,

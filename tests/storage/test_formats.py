@@ -16,8 +16,8 @@ from server_process import server_process
 from dynhull.keys import PackedKeys
 from dynhull_client import HullClient
 from dynhull_server.state.contents import replayed
-from dynhull_server.state.fences.events.block import block_of
-from dynhull_server.state.fences.model.records import AppendEvents, Delay, DropEvents, PutDelays
+from dynhull_server.state.fences.events.block import AppendEvents, block_of
+from dynhull_server.state.fences.model.records import Delay, DropEvents, PutDelays
 from dynhull_server.state.fences.recovery.restored import members_after
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
 from dynhull_server.storage.port import StorageError

@@ -28,8 +28,8 @@ from folders import (
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
-from dynhull_server.state.fences.events.block import block_of
-from dynhull_server.state.fences.model.records import AddFence, AppendEvents, DropEvents, DropFence, Inside, Members
+from dynhull_server.state.fences.events.block import AppendEvents, block_of
+from dynhull_server.state.fences.model.records import AddFence, DropEvents, DropFence, Inside, Members
 from dynhull_server.state.fences.recovery.restored import members_after
 from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept, Window
 from dynhull_server.storage.durability import Durability

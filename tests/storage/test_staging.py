@@ -8,8 +8,8 @@ import pytest
 from faulty_disk import FaultyDisk, failure
 from folders import DATABASE, event, fence_row, fill, killed, opened, record
 
-from dynhull_server.state.fences.events.block import block_of
-from dynhull_server.state.fences.model.records import AddFence, AppendEvents, DropEvents, DropFence, Inside
+from dynhull_server.state.fences.events.block import AppendEvents, block_of
+from dynhull_server.state.fences.model.records import AddFence, DropEvents, DropFence, Inside
 from dynhull_server.state.records import Append
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import DamagedError, NotCommittedError, StorageError

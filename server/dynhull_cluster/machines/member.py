@@ -30,7 +30,7 @@ from dynhull_server.storage.port import LockedError, StorageError, TakenOverErro
 from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
 from ..journal import database_of
-from ..metrics import merged
+from ..merged_metrics import merged
 from ..postgres.ownership import Leases
 from ..postgres.processes import is_known_dead
 from ..postgres.storage import PostgresStorage

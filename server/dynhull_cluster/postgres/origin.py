@@ -8,8 +8,8 @@ and notes the new place with its next commit. If there is no such owner, the nex
 import logging
 from itertools import chain
 
+from dynhull_server.storage.rows.group import Group
 from dynhull_server.storage.rows.incarnation import anew, new_incarnation
-from dynhull_server.storage.rows.ledger import Group
 
 from .database import Connection, Database
 from .examination import examined

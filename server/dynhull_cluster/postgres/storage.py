@@ -32,7 +32,7 @@ from dynhull_server.storage.port import (
 )
 from dynhull_server.storage.refusals import Meaning
 from dynhull_server.storage.rows.examine import Findings
-from dynhull_server.storage.rows.ledger import Group
+from dynhull_server.storage.rows.group import Group
 from dynhull_server.storage.rows.storage import RowStorage
 from dynhull_server.storage.rows.totals import COPIES
 

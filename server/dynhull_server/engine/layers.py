@@ -8,7 +8,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +20,6 @@ from ..state.contents.live import AnyHull, AnyKeyedHull
 from ..state.errors import LimitExceededError
 from ..state.hull_state import Counts, HullState, VertexKeys, key_array
 from .steps import BLOCK, Run
-
-if TYPE_CHECKING:
-    from .live_hull import LiveHull
 
 T = TypeVar("T")
 
@@ -56,6 +53,31 @@ class Layers:
         return self.layers[number - 1], None if self.keys is None else self.keys[number - 1]
 
 
+class Readable(Protocol):
+    """A hull as far as its layers ask it."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def counts(self) -> Counts:
+        """The counts at the latest committed revision."""
+
+    @property
+    def geographic(self) -> bool:
+        """Whether the points are places on the globe."""
+
+    async def reached(self, revision: int) -> None:
+        """Wait until the hull has this revision or a later one."""
+
+    async def vertices(self, min_revision: int = 0) -> tuple[Counts, Points]:
+        """The vertices."""
+
+    async def read(self, function: Callable[[HullState], T], rows: int = 0) -> tuple[Counts, T]:
+        """The value of a function of the state at one revision."""
+
+
 class Peeling:
     """The layers of one hull, computed once for all who ask about the same revision.
 
@@ -65,7 +87,7 @@ class Peeling:
         copies: limits the number of copies.
     """
 
-    def __init__(self, hull: "LiveHull", run: Run, copies: asyncio.Semaphore) -> None:
+    def __init__(self, hull: Readable, run: Run, copies: asyncio.Semaphore) -> None:
         self._hull = hull
         self._run = run
         self._copies = copies

@@ -1,15 +1,7 @@
 """What is committed."""
 
-from .fences.model.records import (
-    AddFence,
-    AppendEvents,
-    ChangeFence,
-    DropConsumer,
-    DropEvents,
-    DropFence,
-    PutConsumer,
-    PutDelays,
-)
+from .fences.events.block import AppendEvents
+from .fences.model.records import AddFence, ChangeFence, DropConsumer, DropEvents, DropFence, PutConsumer, PutDelays
 from .records import Append, Create, Delete
 
 HullChange = Create | Append | Delete

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from threading import Lock
 
 from ..state.changes import Change
+from ..state.fences.events.block import AppendEvents
 from ..state.fences.model.records import (
     AddFence,
-    AppendEvents,
     ChangeFence,
     DropConsumer,
     DropEvents,

@@ -27,11 +27,10 @@ from typing import Any
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.fences.events.block import block_of
+from dynhull_server.state.fences.events.block import AppendEvents, block_of
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.records import (
     AddFence,
-    AppendEvents,
     Consumer,
     EventType,
     FenceEvent,

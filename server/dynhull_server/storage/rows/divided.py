@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from ...state.records import EPOCHS, STEPS, HullRow, Record
 from ..port import DamagedError, StorageError
 from .encoding import weight
-from .ledger import DropNewest, DropSnapshot, HullRows, Ledger
+from .group import DropNewest, DropSnapshot
+from .ledger import HullRows, Ledger
 from .reading import batch_rows, read_hull, snapshot_state, whole_records
 from .tables import Reader
 

@@ -14,8 +14,9 @@ from ..port import Progress
 from .batch_rows import commit_columns, is_whole
 from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
+from .group import AnyStep, Cut, DropSnapshot
 from .hull_rows import found_hulls, values
-from .ledger import AnyStep, Cut, DropSnapshot, HullRows, Ledger, Snapshot
+from .ledger import HullRows, Ledger, Snapshot
 from .tables import COLUMNS, FENCES_SINCE, Reader
 from .totals import Totals, totals_from
 

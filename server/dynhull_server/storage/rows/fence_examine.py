@@ -14,9 +14,9 @@ from ...state.fences.model.records import Consumer
 from .encoding import checksum, weight
 from .event_blocks import Runs, decode_runs
 from .event_rows import decode_delay
-from .fence_ledger import DropInside, DropStaged, FenceStep, Staged
+from .fence_ledger import DropInside, DropStaged, FenceStep
 from .fence_rows import consumer_values, found_fences
-from .fence_runs import FenceRows, Start
+from .fence_runs import FenceRows, Staged, Start
 from .tables import DELAYS_SINCE, STARTS_SINCE, Reader
 
 if TYPE_CHECKING:

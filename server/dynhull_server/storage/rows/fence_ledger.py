@@ -5,17 +5,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from ...compiled import numbers
 from ...state.changes import FenceChange
-from ...state.fences.events.block import EventBlock, joined
+from ...state.fences.events.block import AppendEvents, EventBlock, joined
 from ...state.fences.model.records import (
     AddFence,
-    AppendEvents,
     ChangeFence,
     Consumer,
     DropConsumer,
@@ -33,13 +32,12 @@ from .encoding import checksum, weight
 from .event_blocks import Runs, encode_block
 from .event_rows import encode_delay, encode_inside
 from .fence_rows import consumer_values, values
-from .fence_runs import FenceRows, Start
+from .fence_runs import FenceRows, Staged, Start
+from .ledger import Ledger
 from .tables import MANY, Insert, Remove, Replace, Statement
 
 if TYPE_CHECKING:
     from array import array
-
-    from .ledger import Ledger
 
 # Keys in a row of those who are inside: about half a megabyte, a commit that delays later ones only briefly.
 KEYS_A_ROW = 16_384
@@ -47,30 +45,6 @@ KEYS_A_ROW = 16_384
 EVENTS_A_ROW = 1024
 # Rows of events that are deleted in the commit that drops them; of more, `sweep` deletes some at a time.
 DROPPED_AT_ONCE = 64
-
-
-class Staged(NamedTuple):
-    """A row of events of one fence that follow others which are not yet committed. It is not counted among the rows.
-
-    Attributes:
-        runs: its runs.
-        place: the row number.
-        weight: the weight of the row.
-    """
-
-    runs: Runs
-    place: int
-    weight: int
-
-    @property
-    def first(self) -> int:
-        """The sequence of the first event."""
-        return int(self.runs.firsts[0])
-
-    @property
-    def last(self) -> int:
-        """The sequence of the last event."""
-        return int(self.runs.firsts[-1] + self.runs.counts[-1]) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +162,7 @@ class FenceChanges:
         next_number: a number greater than those of new fences.
     """
 
-    def __init__(self, ledger: "Ledger", statements: list[Statement], effects: list[Callable[[], object]]) -> None:
+    def __init__(self, ledger: Ledger, statements: list[Statement], effects: list[Callable[[], object]]) -> None:
         self._ledger = ledger
         self._statements = statements
         self._effects = effects

@@ -329,3 +329,27 @@ class FenceRuns:
                 fence.last = lasts[fence.at]
             self.table.columns[SEEN] = 0
             self._end = 0
+
+
+class Staged(NamedTuple):
+    """A row of events of one fence that follow others which are not yet committed. It is not counted among the rows.
+
+    Attributes:
+        runs: its runs.
+        place: the row number.
+        weight: the weight of the row.
+    """
+
+    runs: Runs
+    place: int
+    weight: int
+
+    @property
+    def first(self) -> int:
+        """The sequence of the first event."""
+        return int(self.runs.firsts[0])
+
+    @property
+    def last(self) -> int:
+        """The sequence of the last event."""
+        return int(self.runs.firsts[-1] + self.runs.counts[-1]) - 1

@@ -14,11 +14,10 @@ import numpy as np
 from dynhull.keys import Keys, PackedKeys
 
 from ...state.changes import Change
-from ...state.fences.events.block import block_of
+from ...state.fences.events.block import AppendEvents, block_of
 from ...state.fences.model.dwell import Dwelling
 from ...state.fences.model.records import (
     AddFence,
-    AppendEvents,
     Cause,
     ChangeFence,
     Consumer,
@@ -37,7 +36,8 @@ from ...state.fences.recovery.restored import members_after
 from ...state.records import INCARNATION, NO_TIME
 from .fence_ledger import DropInside, inside_steps
 from .fence_reading import read_fences
-from .ledger import AnyStep, ChangeHull, HullRows, Ledger
+from .group import AnyStep, ChangeHull
+from .ledger import HullRows, Ledger
 from .tables import Reader
 
 MICROSECONDS = 10**6

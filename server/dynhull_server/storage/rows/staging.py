@@ -9,8 +9,8 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import pairwise, takewhile
 
 from ...state.changes import Change
-from ...state.fences.events.block import EventBlock, joined
-from ...state.fences.model.records import AddFence, AppendEvents, DropFence
+from ...state.fences.events.block import AppendEvents, EventBlock, joined
+from ...state.fences.model.records import AddFence, DropFence
 from ..port import Step
 from .fence_ledger import EVENTS_A_ROW, AppendFirst, CountStaged, StageEvents
 

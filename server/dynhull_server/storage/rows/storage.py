@@ -19,19 +19,8 @@ from .encoding import weight
 from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
-from .ledger import (
-    DROPPED,
-    KEPT,
-    Chunk,
-    DropBatches,
-    DropDead,
-    DropSnapshot,
-    Finish,
-    Group,
-    HullRows,
-    Ledger,
-    Snapshot,
-)
+from .group import Chunk, DropBatches, DropDead, DropSnapshot, Finish, Group
+from .ledger import DROPPED, KEPT, HullRows, Ledger, Snapshot
 from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader

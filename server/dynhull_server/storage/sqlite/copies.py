@@ -12,8 +12,9 @@ from ..rows import divided
 from ..rows.divided import NoLongerKeptError, Part, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
+from ..rows.group import AnyStep
 from ..rows.incarnation import new_incarnation, renewing
-from ..rows.ledger import AnyStep, Ledger
+from ..rows.ledger import Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals

@@ -5,9 +5,10 @@ from collections.abc import Iterable, Mapping
 
 from ...state.changes import Change
 from ..rows.fence_runs import Start
+from ..rows.group import AnyStep, Group
 from ..rows.hull_rows import values
 from ..rows.incarnation import anew
-from ..rows.ledger import AnyStep, Group, Ledger
+from ..rows.ledger import Ledger
 from ..rows.totals import Totals
 from .readers import SQLiteReader
 from .schema import ADD_COMMITS, FENCE_TABLES, INSERT, SCHEMAS, TABLES, carry_out, renew_totals, stamp

@@ -22,8 +22,9 @@ from ..durability import Durability
 from ..port import Contents, DamagedError, LockedError, NotCommittedError, Progress, Step, StorageError
 from ..refusals import Meaning
 from ..rows.examine import Findings
+from ..rows.group import Group
 from ..rows.incarnation import new_incarnation
-from ..rows.ledger import Group, Ledger
+from ..rows.ledger import Ledger
 from ..rows.storage import RowStorage
 from ..rows.tables import FORMAT
 from ..rows.totals import MODES, STOPPED, Totals, totals_from

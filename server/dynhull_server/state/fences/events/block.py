@@ -179,6 +179,13 @@ class EventBlock:
         return self._places
 
 
+@dataclass(frozen=True, slots=True)
+class AppendEvents:
+    """Events of fences; those of each fence have the sequences after its last event."""
+
+    block: EventBlock
+
+
 def joined(blocks: Sequence[EventBlock]) -> EventBlock:
     """Blocks as one. O(size of them)."""
     if len(blocks) == 1:

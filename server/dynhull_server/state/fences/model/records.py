@@ -2,13 +2,10 @@
 
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ...records import NO_TIME, Keys, Times
 from .config import FenceConfig
-
-if TYPE_CHECKING:
-    from ..events.block import EventBlock
 
 Key = str | int
 Subject = tuple[str, Key]  # the name of its hull, and its key
@@ -236,13 +233,6 @@ class DropFence:
     """The deletion of a fence with its events and consumers."""
 
     number: int
-
-
-@dataclass(frozen=True, slots=True)
-class AppendEvents:
-    """Events of fences; those of each fence have the sequences after its last event."""
-
-    block: "EventBlock"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,12 @@ from ...errors import FenceNotFoundError, HullFencedError, HullUnsuitableError
 from ...events import Request
 from ...hull import Hull
 from ...trip import Leg
-from ..events.block import EventBlock, block_of, joined
+from ..events.block import AppendEvents, EventBlock, block_of, joined
 from ..events.sequences import Told
 from ..index.keys_changed import of_batch, of_expiry
 from ..index.line import Line
 from ..index.subjects import Subjects
-from ..model.records import AppendEvents, Cause, KeptFence, Key
+from ..model.records import Cause, KeptFence, Key
 from ..model.requests import (
     STRUCTURAL,
     CreateFence,

@@ -1,0 +1,310 @@
+"""Changes that are committed together: what they do to the rows, and to the ledger."""
+
+from bisect import insort
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ...state.changes import Change
+from ...state.records import Append, Committed, Create, Delete, HullRow
+from ..port import NotCommittedError
+from .batch_rows import batch_checksum
+from .encoding import checksum, encode, weight
+from .fence_ledger import FenceChanges, FenceStep
+from .hull_rows import values
+from .ledger import HullRows, Ledger, Snapshot
+from .tables import Insert, Remove, Statement
+
+if TYPE_CHECKING:
+    from array import array
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Step: a piece of a snapshot."""
+
+    id: int
+    snapshot: int
+    number: int
+    points: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Step: makes a snapshot valid."""
+
+    number: int
+    snapshot: Snapshot
+    state: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class DropSnapshot:
+    """Step: deletes a snapshot; its chunks become dead."""
+
+    number: int
+    snapshot: Snapshot
+
+
+@dataclass(frozen=True, slots=True)
+class DropBatches:
+    """Step: deletes the oldest rows of batches of a hull; `weights` is the sum of their weights."""
+
+    number: int
+    ids: "array[int]"
+    weights: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Step: deletes the newest row of batches of a hull, which is damaged; the hull ends at revision `last`."""
+
+    number: int
+    last: int
+    weight: int
+
+
+@dataclass(frozen=True, slots=True)
+class DropNewest:
+    """Step: deletes the newest rows of batches of a shard, which did not happen; it ends at revision `last`."""
+
+    number: int
+    last: int
+    ids: "array[int]"
+    weights: int
+
+
+@dataclass(frozen=True, slots=True)
+class DropDead:
+    """Step: deletes the first dead rows of a table."""
+
+    table: str
+    ids: "array[int]"
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeHull:
+    """Step: another row of a hull, with the same number."""
+
+    row: HullRow
+
+
+AnyStep = Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull | FenceStep
+
+
+class Group:
+    """Changes that are committed together: the statements for the database, and the updates of the ledger.
+
+    The ledger does not change before `adopt`, so no reader sees uncommitted rows.
+
+    Args:
+        ledger: the rows so far.
+        changes: the changes, in order.
+        now: the time in microseconds since 1970; one before the last commit counts as the time of that.
+
+    Attributes:
+        statements: the changes of rows.
+        before, totals: the totals before and after them.
+        commit: the commit that they are.
+    """
+
+    def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep], now: int = 0) -> None:
+        self._ledger = ledger
+        self.before = self.totals = ledger.totals
+        self.commit = Committed(self.before.commits + 1, max(self.before.committed, now))
+        # The hulls it concerns, after the changes so far.
+        self._now: dict[int, _Now] = {}
+        self._effects: list[Callable[[], object]] = []
+        self.statements: list[Statement] = []
+        self._fences = FenceChanges(ledger, self.statements, self._effects)
+        for change in changes:
+            self._take(change)
+        fences = self._fences
+        fences.finish()
+        next_number = max(self.totals.next_number, fences.next_number)
+        self.totals = self.totals.plus(0, 0, fences.sum, fences.rows)
+        number, time = self.commit
+        self.totals = self.totals._replace(commits=number, next_number=next_number, committed=time)
+
+    def adopt(self) -> None:
+        """Update the ledger, after the commit."""
+        for effect in self._effects:
+            effect()
+        self._effects.clear()  # they refer to what refers to them: it would wait for the garbage collector
+        self._ledger.totals = self.totals
+
+    def _take(self, change: Change | AnyStep) -> None:
+        match change:
+            case Append():
+                self._append(change)
+            case Create():
+                self._create(change.row)
+            case Delete():
+                self._delete(change.number)
+            case Chunk():
+                stored = checksum(change.points, change.snapshot, change.number)
+                values = change.id, change.snapshot, change.number, stored, change.points
+                self.statements.append(Insert("chunks", values))
+            case Finish():
+                self._finish(change)
+            case DropSnapshot():
+                self._drop_snapshot(change)
+            case DropBatches():
+                self._drop_batches(change)
+            case DropNewest():
+                self._drop_newest(change)
+            case Cut():
+                self._cut(change)
+            case DropDead():
+                self._drop_dead(change)
+            case ChangeHull():
+                self._change(change.row)
+            case _:
+                self._fences.take(change)
+
+    def _hull(self, number: int) -> "_Now | None":
+        """A hull after the changes so far, None if it does not exist."""
+        now = self._now.get(number)
+        if now is None and (rows := self._ledger.hulls.get(number)):
+            now = self._now[number] = _Now(rows, len(rows.ids), rows.sum, rows.last)
+        return None if now is None or now.deleted else now
+
+    def _create(self, row: HullRow) -> None:
+        if self._hull(row.number):
+            raise NotCommittedError(f"hull {row.number} already exists")
+        *columns, stored = values(row)
+        rows = HullRows(row, stored)
+        self._now[row.number] = _Now(rows, 0, stored, 0)
+        next_number = max(self.totals.next_number, row.number + 1)
+        self.totals = self.totals.plus(1, 0, stored)._replace(next_number=next_number)
+        self.statements.append(Insert("hulls", (*columns, stored)))
+        self._effects.append(lambda: self._ledger.hulls.__setitem__(row.number, rows))
+
+    def _change(self, row: HullRow) -> None:
+        now = self._hull(row.number)
+        if now is None:
+            raise NotCommittedError(f"there is no hull {row.number}")
+        *columns, stored = values(row)
+        more = stored - values(now.rows.row)[-1]
+        now.sum += more
+        self.totals = self.totals.plus(0, 0, more)
+        self.statements += [Remove("hulls", (row.number,)), Insert("hulls", (*columns, stored))]
+        self._effects.append(lambda: now.rows.change(row, more))
+
+    def _append(self, change: Append) -> None:
+        now = self._hull(change.number)
+        if now is None:
+            raise NotCommittedError(f"there is no hull {change.number}")
+        first, last = change.records[0].revision, change.records[-1].revision
+        if first != now.last + 1 or last - first + 1 != len(change.records):
+            raise NotCommittedError(
+                f"revisions {first} to {last} of hull {now.rows.row.name} do not follow revision {now.last}"
+            )
+        payload = encode(change.records)
+        keys = change.number, first, last
+        stored = batch_checksum(payload, *keys, *self.commit)
+        each = weight(stored, *keys)
+        place = next(self._ledger.batch_ids)
+        now.batches, now.sum, now.last = now.batches + 1, now.sum + each, last
+        self.totals = self.totals.plus(0, 1, each)
+        self.statements.append(Insert("batches", (place, *keys, stored, payload, *self.commit)))
+        self._effects.append(lambda: now.rows.append(first, last, place, each))
+
+    def _delete(self, number: int) -> None:
+        """Delete the row of the hull. `sweep` drops the rest, which for a large hull would delay other commits."""
+        now = self._hull(number)
+        if now is None:
+            raise NotCommittedError(f"there is no hull {number}")
+        now.deleted = True
+        self.totals = self.totals.plus(-1, -now.batches, -now.sum)
+        self.statements.append(Remove("hulls", (number,)))
+
+        def bury() -> None:
+            rows, dead = self._ledger.hulls.pop(number), self._ledger.dead
+            dead["batches"] += rows.ids
+            dead["snapshots"].extend(snapshot.id for snapshot in rows.snapshots)
+            for snapshot in rows.snapshots:
+                dead["chunks"].extend(snapshot.chunks)
+
+        self._effects.append(bury)
+
+    def _finish(self, step: Finish) -> None:
+        now = self._hull(step.number)
+        snapshot = step.snapshot
+        if now is None:  # deleted meanwhile
+            self._effects.append(lambda: self._ledger.dead["chunks"].extend(snapshot.chunks))
+            return
+        keys = snapshot.id, step.number, snapshot.revision, len(snapshot.chunks)
+        self.statements.append(Insert("snapshots", (*keys, step.state, checksum(step.state, *keys))))
+        self._effects.append(lambda: insort(now.rows.snapshots, snapshot, key=lambda each: each.revision))
+
+    def _drop_snapshot(self, step: DropSnapshot) -> None:
+        now = self._hull(step.number)
+        if now is None or step.snapshot not in now.rows.snapshots:
+            return
+
+        def drop() -> None:
+            now.rows.snapshots.remove(step.snapshot)
+            self._ledger.dead["chunks"].extend(step.snapshot.chunks)
+
+        self.statements.append(Remove("snapshots", (step.snapshot.id,)))
+        self._effects.append(drop)
+
+    def _drop_batches(self, step: DropBatches) -> None:
+        now = self._hull(step.number)
+        count = len(step.ids)
+        if now is None or now.rows.ids[:count] != step.ids:
+            return
+        now.batches, now.sum = now.batches - count, now.sum - step.weights
+        self.totals = self.totals.plus(0, -count, -step.weights)
+        self.statements.append(Remove("batches", step.ids))
+        self._effects.append(lambda: now.rows.drop(count, step.weights))
+
+    def _drop_newest(self, step: DropNewest) -> None:
+        now = self._hull(step.number)
+        count = len(step.ids)
+        if now is None:  # deleted meanwhile
+            return
+        if now.rows.ids[-count:] != step.ids:
+            raise NotCommittedError(f"hull {step.number} has other batches at its end")
+        now.batches, now.sum, now.last = now.batches - count, now.sum - step.weights, step.last
+        self.totals = self.totals.plus(0, -count, -step.weights)
+        self.statements.append(Remove("batches", step.ids))
+        self._effects.append(lambda: now.rows.drop_newest(count, step.weights, step.last))
+
+    def _cut(self, step: Cut) -> None:
+        rows = self._ledger.hulls[step.number]
+
+        def cut() -> None:
+            rows.last = step.last
+            rows.firsts.pop()
+            rows.ids.pop()
+            rows.sum -= step.weight
+
+        self.totals = self.totals.plus(0, -1, -step.weight)
+        self.statements.append(Remove("batches", rows.ids[-1:]))
+        self._effects.append(cut)
+
+    def _drop_dead(self, step: DropDead) -> None:
+        dead = self._ledger.dead[step.table]
+        count = len(step.ids)
+        if dead[:count] != step.ids:
+            return
+        self.statements.append(Remove(step.table, step.ids))
+
+        def drop() -> None:
+            if dead[:count] == step.ids:
+                del dead[:count]
+
+        self._effects.append(drop)
+
+
+@dataclass(slots=True)
+class _Now:
+    """A hull after a part of the changes; `rows` is its present state in the ledger."""
+
+    rows: HullRows
+    batches: int
+    sum: int
+    last: int
+    deleted: bool = False
