@@ -15,11 +15,13 @@ class Name(NamedTuple):
         json: the way to it in a body over HTTP; as the last part of its path unless given, empty for the whole body.
         option: the option of commands; the last part of `json` as an option unless given.
         row: what commands call one of its rows, if it has rows.
+        argument: the argument of the SDK; the way to it in a body unless given.
     """
 
     json: tuple[str, ...] | None = None
     option: str | None = None
     row: str = ""
+    argument: str | None = None
 
 
 # Fields below one that is named here belong to it.
@@ -30,31 +32,31 @@ NAMES: Mapping[str, Name] = {
         for each in described(settings)
     },
     "config": Name((), ""),
-    "config.window": Name((), "--max-age or --max-points"),
+    "config.window": Name((), "--max-age or --max-points", argument="max_age"),
     "config.quarantine": Name(option=""),
     "config.quarantine.max_speed": Name(("quarantine", "max_speed")),
     "config.quarantine.max_growth": Name(("quarantine", "max_growth")),
     "config.quarantine.confirmations": Name(("quarantine", "confirmations")),
     "config.hull_area": Name(("area",)),
-    "config.hull_area.name": Name(("area", "hull"), "--area"),
+    "config.hull_area.name": Name(("area", "hull"), "--area", argument="area"),
     "config.area": Name(("area",), "the area"),
     "config.polygon_area": Name(("area",), "--polygon"),
     "config.circle_area": Name(("area",), "--circle"),
     "config.subject_hull": Name(("subjects",)),
-    "config.subject_prefix": Name(),
+    "config.subject_prefix": Name(argument="subjects"),
     "config.other_hull": Name(),
     "quarantine": Name((), ""),
-    "quarantine.max_speed": Name(),
-    "quarantine.max_growth": Name(),
-    "quarantine.confirmations": Name(),
+    "quarantine.max_speed": Name(argument="quarantine.max_speed"),
+    "quarantine.max_growth": Name(argument="quarantine.max_growth"),
+    "quarantine.confirmations": Name(argument="quarantine.confirmations"),
     "shards": Name(option="SHARDS"),
     "batch": Name((), ""),
     "batch.inserts": Name(("insert",), row="point"),
     "batch.insert_times": Name(("times",), "--time", "time"),
     "batch.deletes": Name(("delete",), row="point"),
     "batch.moves": Name(("move",)),
-    "batch.moves.origins": Name(("move", "origins"), row="point"),
-    "batch.moves.destinations": Name(("move", "destinations"), row="point"),
+    "batch.moves.origins": Name(("move", "origins"), row="point", argument="move[0]"),
+    "batch.moves.destinations": Name(("move", "destinations"), row="point", argument="move[1]"),
     "batch.puts": Name((), ""),
     "batch.puts.keys": Name(row="key"),
     "batch.puts.points": Name(row="position"),
@@ -67,13 +69,13 @@ NAMES: Mapping[str, Name] = {
     "batch.drops": Name(("drop",), row="key"),
     "batch.missing_points": Name(("missing",), "--missing-ok"),
     "batch.missing_keys": Name(("missing",), "--missing-ok"),
-    "producer": Name(("Idempotency-Key",), "--producer"),
-    "sequence": Name(("Idempotency-Key",), ""),
+    "producer": Name(("Idempotency-Key",), "--producer", argument="producer"),
+    "sequence": Name(("Idempotency-Key",), "", argument="sequence"),
     "consumer": Name(),
     "after_sequence": Name(("after",)),
     "other_name": Name(("other",), "the other hull"),
     "include_keys": Name(("keys",)),
-    "layer_count": Name(("count",)),
+    "layer_count": Name(("count",), argument="k"),
     "sample_size": Name(("size",)),
 }
 # What is below an area, as a body over HTTP has it; other fields, such as the encodings of points, are in no body.
@@ -94,6 +96,14 @@ class Found(NamedTuple):
         way = self.name.json if self.name.json is not None else (self.path.rpartition(".")[2],)
         below = (int(each[1:-1]) if each.startswith("[") else IN_AREA.get(each) for each in self.below)
         return (*way, *(each for each in below if each is not None))
+
+    @property
+    def argument(self) -> str:
+        """The argument of the SDK, and what is below it; the path for none."""
+        way = self.name.json if self.name.json is not None else (self.path.rpartition(".")[2],)
+        name = ".".join(way) if self.name.argument is None else self.name.argument
+        below = "".join(each if each.startswith("[") else f".{each}" for each in self.below)
+        return f"{name or self.path}{below}"
 
     @property
     def option(self) -> str:

@@ -32,15 +32,12 @@ def of_row(error: "InvalidRequestError") -> str:
 
 
 def _named(error: "InvalidRequestError", words: str) -> str:
-    field = error.field or ""
-    named = field if error.row is None else f"{field}[{error.row}]"
     message = str(error)
-    shown = next(
-        (each for each in (error.value, repr(error.value)) if message.startswith(f"{named} is {each}: ")), None
-    )
-    if shown is None:
+    if error.problem == message:
         return message
-    problem = ROW.sub(lambda row: f"key {int(row[1]) + 1}", message.removeprefix(f"{named} is {shown}: "))
+    quoted = f" is {error.value!r}: " in message
+    shown = repr(error.value) if quoted else error.value or ""
+    problem = ROW.sub(lambda row: f"key {int(row[1]) + 1}", error.problem)
     problem = re.sub("|".join(WORDS), lambda word: WORDS[word[0]], problem)
     return f"{words} is {WORDS.get(shown, shown)}: {problem}"
 

@@ -88,7 +88,7 @@ def of_refused_rows(error: DynhullError | ValueError, applied: int) -> Response:
     column = COLUMNS.get(batch[2])
     value = value_of(error)
     place = f"row {row}, {column}" if column else f"row {row}"
-    detail = f"{place}: {problem_of(error)}"
+    detail = f"{place}: {error.problem}"
     if error.reason == "KEY_REPEATED":
         first = applied + int(error.metadata["first_row"])
         detail = f"{place}: a batch names a key once, and row {first} has the same"
@@ -103,17 +103,6 @@ def status_of(error: DynhullError) -> int:
     return http_of(error.reason, error.code.name)
 
 
-def problem_of(error: DynhullError) -> str:
-    """What the server finds wrong, without the field, the row and the value before it."""
-    text = str(error)
-    if error.field is None:
-        return text
-    place = error.field if error.row is None else f"{error.field}[{error.row}]"
-    for value in (error.value, repr(error.value)):
-        text = text.removeprefix(f"{place} is {value}: ")
-    return text
-
-
 def value_of(error: DynhullError) -> str | None:
     """The value of a row at fault, as JSON; None if no row is."""
     return None if error.row is None or error.value is None else _as_json(error.value)
@@ -121,7 +110,7 @@ def value_of(error: DynhullError) -> str | None:
 
 def _cause(error: DynhullError, path: list[str | int], body: Any) -> Cause:
     """What is wrong with the body at a path, to which the row is added."""
-    detail = problem_of(error)
+    detail = error.problem
     if error.reason == "KEY_REPEATED":
         first = _path(error.metadata["first_field"], body) or []
         detail = f"a batch names a key once, and {pointer([*first, error.metadata['first_row']])} is the same"

@@ -14,7 +14,7 @@ from dynhull_cli.reading.times import as_times
 from dynhull_client import Applied, AsyncHullClient, DynhullError, InvalidRequestError
 
 from .problems import ProblemError
-from .refusals import COLUMNS, problem_of, value_of
+from .refusals import COLUMNS, value_of
 from .rows import LABELS, Found, Row, RowError
 from .schemas import BadRow, Uploaded
 
@@ -212,7 +212,7 @@ class Upload:
                 if not isinstance(error, InvalidRequestError) or self._bad_count == self._max_bad:
                     raise
                 column = COLUMNS.get((error.field or "").removeprefix("batch."))
-                self._leave_out([RowError(place, problem_of(error), column, value_of(error))], begin)
+                self._leave_out([RowError(place, error.problem, column, value_of(error))], begin)
                 rows[place] = None
 
     async def _send_rows(self, rows: list[Row], numbered: dict[str, Any]) -> Applied | None:

@@ -1,5 +1,6 @@
 """The errors a call may end with, one class for each cause."""
 
+import re
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -44,6 +45,8 @@ __all__ = [
 ]
 
 DOMAIN = "dynhull.v1"
+OF_SEVERAL = re.compile(r"batches\[\d+\]\.")
+ROWS = re.compile(r"\b(puts\.keys|removes|releases|drops) row")
 
 
 class DynhullError(Exception):
@@ -53,7 +56,8 @@ class DynhullError(Exception):
         code: the gRPC status code.
         reason: the server's machine-readable reason, such as "POINT_MISSING"; empty if the server gave none.
         metadata: what else the server reports, as text.
-        field: the field of the request at fault; None if no single field is.
+        problem: the message without the argument, its row and its value at the beginning, if these are there.
+        field: the field of the request at fault, by its name on the wire; None if no single field is.
         row: the row of that field at fault; None if no single row is.
         value: the value at fault as text, or the limit that was exceeded; None if there is none.
         expected: after a gap in a producer's numbers, the next number.
@@ -64,6 +68,7 @@ class DynhullError(Exception):
     code: grpc.StatusCode
     reason: str
     metadata: Mapping[str, str]
+    problem: str
     field: str | None
     row: int | None
     value: str | None
@@ -72,7 +77,8 @@ class DynhullError(Exception):
     batch: int | None
 
     def __init__(self, message: str, code: grpc.StatusCode, reason: str, metadata: Mapping[str, str]) -> None:
-        super().__init__(message)
+        self.problem = _problem(message, metadata)
+        super().__init__(message if self.problem == message else _in_arguments(message, self.problem, metadata))
         self.code = code
         self.reason = reason
         self.metadata = MappingProxyType(dict(metadata))
@@ -301,6 +307,35 @@ def _error(code: grpc.StatusCode, message: str | None, details: Iterable[Any]) -
     if info.reason:
         return BY_REASON.get(info.reason, DynhullError)(message or code.name, code, info.reason, info.metadata)
     return BY_CODE.get(code.name, DynhullError)(message or code.name, code, "", {})
+
+
+def _problem(message: str, metadata: Mapping[str, str]) -> str:
+    """A message of the server without the field, the row and the value before it."""
+    place, value = metadata.get("field", ""), metadata.get("value", "")
+    if "row" in metadata:
+        place += f"[{metadata['row']}]"
+    for shown in (value, repr(value)):
+        if message.startswith(start := f"{place} is {shown}: "):
+            return message.removeprefix(start)
+    return message
+
+
+def _in_arguments(message: str, problem: str, metadata: Mapping[str, str]) -> str:
+    """A message with arguments of the SDK in place of the fields of the request."""
+    field, row = metadata["field"], metadata.get("row")
+    start = len(field) if row is None else len(f"{field}[{row}]")
+    shown = message[start : len(message) - len(problem)]
+    problem = ROWS.sub(lambda each: f"{_argument(f'batch.{each[1]}')} row", problem)
+    return f"{_argument(field)}{'' if row is None else f' row {row}'}{shown}{problem}"
+
+
+def _argument(field: str) -> str:
+    from dynhull_surface.names import find  # seldom needed
+
+    of_several = OF_SEVERAL.match(field)
+    above = of_several[0] if of_several else ""
+    found = find(field.removeprefix(above))
+    return field if found is None else f"{above}{found.argument}"
 
 
 def _error_info(details: Iterable[Any]) -> ErrorInfo:
