@@ -1,17 +1,15 @@
 """`dynhull list`, `dynhull create` and `dynhull delete`: the hulls of a server."""
 
-import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynhull_surface.reasons import Exit
 from dynhull_surface.settings import HullSettings
 
-from .connected import AsJson, connected, fail
+from .connected import AsJson, connected
 from .durations import shown
 from .json_lines import json_line
-from .listing import below, listed
+from .listing import below, confirm_deletion, existing, listed, print_list
 from .lon_lat import lon_lat
 from .plural import plural
 from .quarantine import Confirmations, MaxGrowth, MaxSpeed, given_rules, rule_members, shown_rules
@@ -38,22 +36,7 @@ def list_hulls(
 
     A terminal shows a table; a pipe receives one line per hull with tabs between the columns.
     """
-    from rich.console import Console
-
-    hulls = listed(client.list_hulls(prefix), below("hulls", prefix))
-    console = Console(highlight=False)
-    if console.is_terminal and not as_json:
-        if rows := list(hulls):
-            console.print(_table(rows))
-        return
-    for info in hulls:
-        if as_json:
-            typer.echo(json_line(**_members(info)))
-        else:
-            counts = f"{info.points}\t{info.distinct}\t{info.revision}"
-            frame = f"\tglobe {_shown_place(info)}".rstrip(" ") if info.geographic else ""
-            held = f"\tquarantine {_quarantine(info)}" if _quarantine(info) else ""
-            typer.echo(f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}{frame}{held}")
+    print_list(listed(client.list_hulls(prefix), below("hulls", prefix)), as_json, _members, _line, _table)
 
 
 @connected
@@ -164,15 +147,9 @@ def delete(
     """
     from dynhull_client import HullNotFoundError
 
-    found = []
-    for name in dict.fromkeys(names):
-        try:
-            found.append(client.get_hull(name).info)
-        except HullNotFoundError:
-            if not missing_ok:
-                raise
-    if found and not yes:
-        _confirm(found)
+    found = existing(names, lambda name: client.get_hull(name).info, HullNotFoundError if missing_ok else None)
+    if not yes:
+        confirm_deletion([f"{info.name} ({plural(info.points, 'point')})" for info in found])
     for info in found:
         client.delete_hull(info.name)
         typer.echo(
@@ -182,12 +159,11 @@ def delete(
         )
 
 
-def _confirm(found: "list[HullInfo]") -> None:
-    what = ", ".join(f"{info.name} ({plural(info.points, 'point')})" for info in found)
-    if not sys.stdin.isatty():
-        fail(Exit.UNUSABLE, f"nothing was deleted: without a terminal to ask on, add --yes to delete {what}")
-    if not typer.confirm(f"Delete {what}?", err=True):
-        fail(Exit.FAILED, "nothing was deleted")
+def _line(info: "HullInfo") -> str:
+    counts = f"{info.points}\t{info.distinct}\t{info.revision}"
+    frame = f"\tglobe {_shown_place(info)}".rstrip(" ") if info.geographic else ""
+    held = f"\tquarantine {_quarantine(info)}" if _quarantine(info) else ""
+    return f"{info.name}\t{counts}\t{info.keyed or '-'}\t{_window(info) or '-'}{frame}{held}"
 
 
 def _members(info: "HullInfo") -> dict[str, Any]:

@@ -7,7 +7,7 @@ import typer
 from .connected import AsJson, HullName, connected
 from .groups import group
 from .json_lines import json_line
-from .listing import listed
+from .listing import listed, print_list
 from .plural import plural
 from .tab_lines import printable, tab_line
 
@@ -39,16 +39,8 @@ def list_held(client: "HullClient", name: HullName, as_json: AsJson = False) -> 
     A terminal shows a table; a pipe receives one line per key with tabs between the columns, and - for a rule that is
     not broken.
     """
-    from rich.console import Console
-
-    console = Console(highlight=False, markup=False)
     held = listed(client.list_held(name), f"{name} has no keys in quarantine")
-    if console.is_terminal and not as_json:
-        if rows := list(held):
-            console.print(_table(rows))
-        return
-    for each in held:
-        typer.echo(json_line(**_members(each)) if as_json else tab_line(*_columns(each)))
+    print_list(held, as_json, _members, lambda each: tab_line(*_columns(each)), _table)
 
 
 @connected

@@ -1,15 +1,12 @@
 """`dynhull fences list`, `show`, `inside` and `delete`."""
 
-import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynhull_surface.reasons import Exit
-
-from ..connected import AsJson, connected, fail
+from ..connected import AsJson, connected
 from ..json_lines import json_line
-from ..listing import below, listed
+from ..listing import below, confirm_deletion, existing, listed, print_list
 from ..plural import plural
 from ..tab_lines import tab_line
 from .settings import FenceName
@@ -32,22 +29,9 @@ def list_fences(
 
     A terminal shows a table; a pipe receives one line per fence with tabs between the columns.
     """
-    from rich.console import Console
+    from .shown import fence_members
 
-    from .shown import area_text, fence_members, subjects_text
-
-    fences = listed(client.list_fences(prefix), below("fences", prefix))
-    console = Console(highlight=False)
-    if console.is_terminal and not as_json:
-        if rows := list(fences):
-            console.print(_table(rows))
-        return
-    for fence in fences:
-        if as_json:
-            typer.echo(json_line(**fence_members(fence)))
-        else:
-            counts = f"{fence.inside}\t{fence.last_sequence}\t{_backlog(fence)}"
-            typer.echo(f"{fence.name}\t{area_text(fence)}\t{subjects_text(fence)}\t{counts}")
+    print_list(listed(client.list_fences(prefix), below("fences", prefix)), as_json, fence_members, _line, _table)
 
 
 @connected
@@ -112,26 +96,19 @@ def delete(
     """
     from dynhull_client import FenceNotFoundError
 
-    found = []
-    for name in dict.fromkeys(names):
-        try:
-            found.append(client.get_fence(name))
-        except FenceNotFoundError:
-            if not missing_ok:
-                raise
-    if found and not yes:
-        _confirm(found)
+    found = existing(names, client.get_fence, FenceNotFoundError if missing_ok else None)
+    if not yes:
+        confirm_deletion([f"{fence.name} (last event {fence.last_sequence})" for fence in found])
     for fence in found:
         client.delete_fence(fence.name)
         typer.echo(json_line(name=fence.name, deleted=True) if as_json else f"{fence.name}: deleted")
 
 
-def _confirm(found: "list[Fence]") -> None:
-    what = ", ".join(f"{fence.name} (last event {fence.last_sequence})" for fence in found)
-    if not sys.stdin.isatty():
-        fail(Exit.UNUSABLE, f"nothing was deleted: without a terminal to ask on, add --yes to delete {what}")
-    if not typer.confirm(f"Delete {what}?", err=True):
-        fail(Exit.FAILED, "nothing was deleted")
+def _line(fence: "Fence") -> str:
+    from .shown import area_text, subjects_text
+
+    counts = f"{fence.inside}\t{fence.last_sequence}\t{_backlog(fence)}"
+    return f"{fence.name}\t{area_text(fence)}\t{subjects_text(fence)}\t{counts}"
 
 
 def _backlog(fence: "Fence") -> int:
