@@ -64,6 +64,7 @@ WRONG = {
     ("--ambiguous", "later"): "--ambiguous is given with --time-zone",
     ("--time-format", "%H:%M"): "does not say year, month and day",
     ("--time-format", "%s"): "not a form of times",
+    ("--time-format", "%d/%m/%Y %d"): "not a form of times",
     ("--time-format", "%d/%m/%Y %Z"): "names of time zones (%Z) cannot be read",
     ("--time-format", "%d/%m/%Y", "--time-unit", "s"): "--time-format is given without --time-unit",
 }

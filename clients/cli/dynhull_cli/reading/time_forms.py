@@ -119,7 +119,7 @@ def _check_format(form: str, option: str) -> None:
         raise BadValueError(option, "names of time zones (%Z) cannot be read: %z reads offsets", form)
     try:
         found = datetime.strptime(SAMPLE.strftime(form), form)
-    except ValueError as error:
+    except (ValueError, re.error) as error:  # the latter where a directive comes twice
         raise BadValueError(option, f"not a form of times: {error}", form) from None
     if found.date() != SAMPLE.date():
         raise BadValueError(option, "does not say year, month and day of a time, as %d/%m/%Y does", form)
