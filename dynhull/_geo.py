@@ -208,7 +208,7 @@ class Globe(Live):
         """West, south, east and north in degrees, as the `bbox` of GeoJSON (RFC 7946). O(h log n).
 
         West is greater than east across the antimeridian. With a pole inside, from -180 to 180, and to the pole. An
-        edge that reaches beyond its ends is within 1e-12 degrees; all else is exact. NaN without points.
+        edge that reaches beyond its ends is within 1e-13 degrees; all else is exact. NaN without points.
         """
         return self._measure(_globe_extent.bounds)
 

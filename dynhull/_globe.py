@@ -127,7 +127,7 @@ class Gnomonic:
         up, level = self._sin[0] + y * self._cos[0], self._cos[0] - y * self._sin[0]
         lon = self.center[0] + np.degrees(np.arctan2(x, level))
         lat = np.degrees(np.arctan2(up, np.hypot(level, x)))
-        places: Points = np.column_stack([_wrapped(lon), lat])
+        places: Points = np.column_stack([wrapped(lon), lat])
         return places
 
     def angle(self, place: Point) -> float:
@@ -147,7 +147,7 @@ class Gnomonic:
         up is small, and it divides: what is subtracted there are sums of two doubles.
         """
         lon, lat = lonlat.T
-        across, across_rest = _difference(_wrapped(lon), self.center[0])
+        across, across_rest = _difference(wrapped(lon), self.center[0])
         along, along_rest = _difference(lat, self.center[1])
         sin_half, cos_half = sin_cos(across / 2, across_rest / 2)
         sin_along, cos_along = sin_cos(along, along_rest)
@@ -234,7 +234,7 @@ def as_center(center: Any) -> Point:
     place = as_coordinate(lon, "longitude of center"), as_coordinate(lat, "latitude of center")
     if abs(place[0]) > 360 or abs(place[1]) > 90:
         _refuse_outside(place, "center")
-    return float(_wrapped(np.array([place[0]]))[0]), place[1]
+    return float(wrapped(np.array([place[0]]))[0]), place[1]
 
 
 def _refuse_outside(place: Point, where: str) -> None:
@@ -291,7 +291,7 @@ def _difference(a: Floats, b: float) -> Sum:
     return rounded, (a - (rounded + taken)) + (taken - b)
 
 
-def _wrapped(lon: Floats) -> Floats:
+def wrapped(lon: Floats) -> Floats:
     """Longitudes from -180 to below 180. Exact (Sterbenz 1974)."""
     wrapped: Floats = (lon - np.where(lon >= 180, 360.0, 0.0)) + np.where(lon < -180, 360.0, 0.0)
     return wrapped
