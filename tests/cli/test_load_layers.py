@@ -185,10 +185,18 @@ def test_a_file_that_is_cut(tmp_path, name, suffix):
         file.write_bytes(other)
         code, said = read(name, file)
         assert (code, said.startswith(f"error: {file}"), said.count("\n")) == (2, True, 1), said
-    file.write_text(
-        '<OGRVRTDataSource><OGRVRTLayer name="x"><SrcDataSource>/etc</SrcDataSource></OGRVRTLayer></OGRVRTDataSource>'
-    )
-    assert read(name, file)[0] == 2
+
+
+@pytest.mark.parametrize("suffix", ["gpkg", "fgb", "gpx", "kml", "xlsx"])
+def test_what_is_called_otherwise_is_not_read(tmp_path, name, suffix):
+    """GDAL would read it, and with it what it names: files of this machine, or of the network."""
+    write(tmp_path / "places.shp", shapely.points(PLACES))
+    source = f"<SrcDataSource>{tmp_path / 'places.shp'}</SrcDataSource>"
+    file = tmp_path / f"other.{suffix}"
+    file.write_text(f'<OGRVRTDataSource><OGRVRTLayer name="places">{source}</OGRVRTLayer></OGRVRTDataSource>')
+    code, said = read(name, file)
+    assert (code, said.partition(":")[0]) == (2, "error")
+    assert f" is not {suffix}" in said
 
 
 def test_coordinates_that_are_no_numbers(tmp_path, name):

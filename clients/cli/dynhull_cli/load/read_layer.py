@@ -9,6 +9,7 @@ from typing import Any
 
 import pyogrio
 
+from ..peek import peek
 from ..plural import plural
 from ..reading.columns import coordinate_columns, geometry_column
 from .arrow_rows import ArrowTable
@@ -19,6 +20,8 @@ from .source import Source
 from .xml_numbers import require_numbers
 
 # GDAL chooses a driver by what is in a file, and some drivers read what the file names, of this machine or the network.
+# So the file is looked at first.
+MARKS = {Format.GPKG: b"SQLite format 3\0", Format.FGB: b"fgb", Format.XLSX: b"PK"}
 DRIVERS = {
     Format.GPKG: {"GPKG"},
     Format.SHP: {"ESRI Shapefile"},
@@ -68,7 +71,7 @@ def read_layer(source: Source) -> Chunks:
             for batch in reader:
                 read += len(batch)
                 yield batch
-        if read < info["features"]:
+        if source.format is Format.FGB and read < info["features"]:  # cut within its index, it seems to have none
             raise ValueError(f"{source.name} is cut: it has {read:,} of {plural(info['features'], 'feature')}")
 
     unit = "row" if source.format is Format.XLSX else "feature"
@@ -123,6 +126,10 @@ def _explained(source: Source) -> Iterator[None]:
 
 
 def _path(source: Source) -> str:
+    """The path; ValueError where the file does not begin as those of its format."""
+    mark = MARKS.get(source.format, b"")
+    if peek(source.file, len(mark)) != mark:
+        raise ValueError(f"{source.name} is not {source.format}")
     return str(Path(source.name).resolve())
 
 
@@ -153,16 +160,16 @@ def _shapefile(source: Source) -> str:
 
 
 def _xml(source: Source) -> str:
-    """The path; ValueError where a document is no XML to its end, or a coordinate in it is no number."""
+    """The path; ValueError where a document is no GPX or KML to its end, or a coordinate in it is no number."""
     path = _path(source)
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as archive:
             for name in archive.namelist():
                 if name.lower().endswith(".kml"):
                     with archive.open(name) as document:
-                        require_numbers(f"{source.name}, {name}", document)
+                        require_numbers(f"{source.name}, {name}", document, source.format)
     else:
-        require_numbers(source.name, source.file)
+        require_numbers(source.name, source.file, source.format)
     return path
 
 

@@ -10,14 +10,21 @@ AXES = "lat", "lon"
 COORDINATES = "coordinates"  # of KML
 
 
-def require_numbers(name: str, file: IO[bytes]) -> None:
-    """Read a document to its end; ValueError where it is no XML, or a coordinate is no number."""
-    _Document(name).read(file)
+def require_numbers(name: str, file: IO[bytes], root: str) -> None:
+    """Read a document to its end; ValueError where it is no XML of this kind, or a coordinate is no number.
+
+    Args:
+        name: of the document, for messages.
+        file: its bytes.
+        root: the name of its first element.
+    """
+    _Document(name, root).read(file)
 
 
 class _Document:
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, root: str) -> None:
         self._name = name
+        self._root: str | None = root  # None once it is there
         self._parts: list[str] | None = None
         self._parser = expat.ParserCreate()
         self._parser.StartElementHandler = self._start
@@ -32,6 +39,9 @@ class _Document:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         local = tag.rpartition(":")[2]
+        if self._root not in (None, local.lower()):
+            raise ValueError(f"{self._name} is not {self._root}: its first element is {local}")
+        self._root = None
         if local in POINTS:
             for axis in AXES:
                 if axis in attributes:
