@@ -25,11 +25,11 @@ from dynhull_server.rpc.access import EVERYTHING, Rights
 from dynhull_server.rpc.fence_service import FenceService
 from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.state.batch import KeyedBatch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.records import EventType
 from dynhull_server.state.limits import FenceLimits
 from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.sqlite.storage import Durability, SQLiteStorage
 
 CIRCLE = FenceConfig(CircleArea(0.0, 0.0, 5.0), "hull", "fleet")

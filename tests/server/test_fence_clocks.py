@@ -13,10 +13,10 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.state.batch import KeyedBatch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.records import EventType
 from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.memory import MemoryStorage
 
 HOUR, WAIT = 3600, 300_000

@@ -13,21 +13,12 @@ from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import KeyedBatch
 from dynhull_server.state.contents import keyed as keyed_contents
 from dynhull_server.state.core import Core
-from dynhull_server.state.events import (
-    Birth,
-    Commit,
-    Committed,
-    Compute,
-    Computed,
-    CreateHull,
-    Event,
-    Tick,
-    WriteBatch,
-)
+from dynhull_server.state.events import Commit, Committed, Compute, Computed, Event, Tick
 from dynhull_server.state.fences.index.subjects import keyed
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.requests import CreateFence, DeleteFence
 from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import Birth, CreateHull, WriteBatch
 
 KEYS = PackedKeys.pack(f"k{row:02}" for row in range(64))
 FAR, NEAR = (np.random.default_rng(seed).random((64, 2)) + 10 * seed for seed in (1, 0))

@@ -10,17 +10,7 @@ from live_engine import LIMITS
 from dynhull_server.compiled import native
 from dynhull_server.state.batch import KeyedBatch
 from dynhull_server.state.core import Core
-from dynhull_server.state.events import (
-    Arrived,
-    Birth,
-    Commit,
-    Committed,
-    Compute,
-    Computed,
-    CreateHull,
-    Tick,
-    WriteBatch,
-)
+from dynhull_server.state.events import Arrived, Commit, Committed, Compute, Computed, Tick
 from dynhull_server.state.fences.events import log
 from dynhull_server.state.fences.events.block import AppendEvents
 from dynhull_server.state.fences.model import tallies
@@ -28,6 +18,7 @@ from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, Hu
 from dynhull_server.state.fences.model.records import Cause
 from dynhull_server.state.fences.model.requests import CreateFence
 from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import Birth, CreateHull, WriteBatch
 
 KEYS = 30
 NO_KEYS = np.empty(0, np.uint64)

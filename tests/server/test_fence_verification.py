@@ -21,13 +21,13 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.fence_verification import verify_events
 from dynhull_server.engine.fences import LiveFence
 from dynhull_server.state.batch import KeyedBatch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.fences.events.block import AppendEvents, block_of
 from dynhull_server.state.fences.events.recent import RecentEvents
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.faults import FenceFault
 from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME, HullSettings
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.sqlite.origin import NOTE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 

@@ -17,10 +17,10 @@ from dynhull_server.state.errors import (
     LimitExceededError,
     RefusedError,
 )
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import FOREVER, NO_TIME, HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.rows import chunks
 from dynhull_server.storage.rows.encoding import decode, encode
 

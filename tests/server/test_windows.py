@@ -23,8 +23,8 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.rpc.decode_batch import decode_batch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.records import HullSettings, Window
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.memory import MemoryStorage
 
 INVALID, FAILED = grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.FAILED_PRECONDITION

@@ -23,9 +23,9 @@ from dynhull_cluster.shards.logs import FencedError
 from dynhull_cluster.shards.messages import Open, SampleOf, StaticHull
 from dynhull_cluster.shards.placement import Place
 from dynhull_cluster.shards.requests import Expire, Read, Request, Reshard, Write
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Kept
+from dynhull_server.state.requests import WriteBatch
 
 from .memory_logs import Decisions, MemoryRootLog, MemoryShardLog
 from .workload import KINDS, LIMITS, Workload, same_effect

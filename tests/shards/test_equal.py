@@ -13,9 +13,9 @@ from dynhull_cluster.shards.requests import Expire, Read, Reshard, Write
 from dynhull_server.rpc.encode import CAUSES
 from dynhull_server.state.batch import NO_POINTS, KeyedBatch
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.state.sample import sample
 
 ROUNDS = 80

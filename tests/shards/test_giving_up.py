@@ -8,8 +8,8 @@ from dynhull_cluster.shards.messages import SampleOf
 from dynhull_cluster.shards.requests import Read, Reshard, Write
 from dynhull_server.state.batch import NO_POINTS, Batch
 from dynhull_server.state.errors import ShardAwayError
-from dynhull_server.state.events import Stream, WriteBatch
 from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import Stream, WriteBatch
 
 POINTS = np.array([(x, y) for x in range(4) for y in range(4)], float)
 

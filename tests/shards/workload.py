@@ -7,9 +7,9 @@ import numpy as np
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import Applied, Batch, KeyedBatch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings, Window
+from dynhull_server.state.requests import WriteBatch
 
 SECOND = 1_000_000
 START = 10**9 * SECOND

@@ -39,12 +39,12 @@ from dynhull_server.state.errors import (
     SequenceGapError,
     StoppingError,
 )
-from dynhull_server.state.events import WriteBatch, WriteTogether
 from dynhull_server.state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.records import Center, HullSettings, Identity, QuarantineRules, Times, Window
+from dynhull_server.state.requests import WriteBatch, WriteTogether
 
 from .entities import Key
 from .fence_model import PREFIX

@@ -29,13 +29,10 @@ from dynhull_server.state.errors import (
     StoppingError,
 )
 from dynhull_server.state.events import (
-    Birth,
     Commit,
     Committed,
     Compute,
     Computed,
-    CreateHull,
-    DeleteHull,
     Effect,
     Event,
     Examine,
@@ -43,17 +40,12 @@ from dynhull_server.state.events import (
     Failed,
     Gone,
     NotExamined,
-    ReadHull,
-    Recenter,
     Reply,
-    Request,
     Retried,
     Retry,
     Stir,
     Stopping,
     Tick,
-    WriteBatch,
-    WriteTogether,
 )
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.fence import Fence
@@ -70,6 +62,16 @@ from dynhull_server.state.fences.model.requests import (
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import NO_TIME, Center, HullSettings, QuarantineRules
+from dynhull_server.state.requests import (
+    Birth,
+    CreateHull,
+    DeleteHull,
+    ReadHull,
+    Recenter,
+    Request,
+    WriteBatch,
+    WriteTogether,
+)
 from dynhull_server.state.schedule import LOOK_AGAIN
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage

@@ -28,7 +28,7 @@ from dynhull_server.rpc.places import Places, Unread
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
 from dynhull_server.state.batch import Applied, Batch
 from dynhull_server.state.errors import HullNotFoundError, NotStoredError, OutcomeUnknownError, SequenceGapError
-from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.requests import WriteBatch
 
 from .clients import Client, Outline
 from .network import TO_GATEWAY, TO_WORKER, NetworkLoop

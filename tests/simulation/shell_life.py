@@ -17,13 +17,13 @@ from dynhull_server.rpc.writing import gap_explained, require_present
 from dynhull_server.state.admission import TICK
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import HullNotFoundError
-from dynhull_server.state.events import WriteBatch, WriteTogether
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import Center, HullSettings
+from dynhull_server.state.requests import WriteBatch, WriteTogether
 
 from .clients import Client, Outline, outline
 from .core_life import compare

@@ -12,8 +12,8 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.state.batch import Batch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.limits import Limits
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.memory import MemoryStorage
 
 LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, max_producers_per_caller=10, history_bytes=10**6)

@@ -3,7 +3,7 @@
 import asyncio
 from typing import Any, Protocol
 
-from dynhull_server.state import events
+from dynhull_server.state import requests
 from dynhull_server.state.hull import Hull
 from dynhull_server.state.trip import refuse
 
@@ -21,7 +21,7 @@ class Told(Protocol):
 class AskedWrite(Write):
     """A batch of a caller. Its stream stops with it, in the thread of the root, before another one begins."""
 
-    def __init__(self, request: events.WriteBatch, hull: Hull, now: float, answered: list[Told]) -> None:
+    def __init__(self, request: requests.WriteBatch, hull: Hull, now: float, answered: list[Told]) -> None:
         super().__init__(request, now)
         self._hull = hull
         self._answered = answered
@@ -52,7 +52,7 @@ class AskedWrite(Write):
 class AskedExpiry(Expire):
     """Points that leave by the clock, as the core has noticed."""
 
-    def __init__(self, request: events.Expire, answered: list[Told]) -> None:
+    def __init__(self, request: requests.Expire, answered: list[Told]) -> None:
         super().__init__(request.time)
         self._request = request
         self._answered = answered

@@ -11,9 +11,9 @@ from dynhull_server.engine.driver import Driver
 from dynhull_server.engine.shard_store import ShardStore
 from dynhull_server.settings import Settings
 from dynhull_server.state.errors import HullNotFoundError
-from dynhull_server.state.events import Expire, WriteBatch
 from dynhull_server.state.hull import Hull
 from dynhull_server.state.records import HullRow, HullSettings
+from dynhull_server.state.requests import Expire, WriteBatch
 
 from ..placement import worker_of, worker_of_shard
 from ..shards import messages as say

@@ -11,7 +11,6 @@ from dynhull_server.engine.driver import Driver
 from dynhull_server.engine.shard_store import ShardStore
 from dynhull_server.engine.waiter import Waiter
 from dynhull_server.state.batch import NO_POINTS
-from dynhull_server.state.events import Follow, ReadHull
 from dynhull_server.state.hull import Hull
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import (
@@ -29,6 +28,7 @@ from dynhull_server.state.records import (
     Shares,
     Tally,
 )
+from dynhull_server.state.requests import Follow, ReadHull
 from dynhull_server.state.root_state import RootState
 from dynhull_server.storage.port import DamagedError
 

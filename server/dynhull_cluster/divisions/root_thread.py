@@ -11,7 +11,6 @@ import numpy as np
 
 from dynhull_server.engine.driver import Driver
 from dynhull_server.engine.waiter import Waiter
-from dynhull_server.state import events
 from dynhull_server.state.errors import (
     HullNotFoundError,
     NotStoredError,
@@ -21,6 +20,7 @@ from dynhull_server.state.errors import (
     words,
 )
 from dynhull_server.state.hull import Hull
+from dynhull_server.state.requests import ReadHull
 from dynhull_server.storage.port import StorageError
 
 from ..shards import messages as say
@@ -188,7 +188,7 @@ class RootThread:
         if root is None or stored is None or root.hull is None:
             return
         if not self._opened:
-            read = events.ReadHull(Waiter(), self._hull, lambda state: state.hull.points())
+            read = ReadHull(Waiter(), self._hull, lambda state: state.hull.points())
             _, seen = self._driver.ask_from_thread(read)
             if not np.array_equal(seen, root.hull.points()):
                 raise ShardsDifferError("the shards have other vertices than those that were decided")

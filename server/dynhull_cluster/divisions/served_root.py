@@ -14,13 +14,13 @@ from dynhull.static.trace import Round, Rounds
 from dynhull_server.engine.driver import Driver
 from dynhull_server.engine.verification import Verification, first_difference
 from dynhull_server.engine.waiter import Waiter
-from dynhull_server.state import events
 from dynhull_server.state.contents.joining import joined
 from dynhull_server.state.contents.keyed import Found
 from dynhull_server.state.errors import HullNotFoundError, ShardAwayError, StoppingError
 from dynhull_server.state.hull import Hull
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.records import Contents, Division, Keys
+from dynhull_server.state.requests import Expire, ReadHull, WriteBatch
 from dynhull_server.state.root_state import RootState
 from dynhull_server.storage.port import DamagedError
 
@@ -76,12 +76,12 @@ class ServedRoot:
 
     # Requests
 
-    def carry_out(self, requests: Sequence[events.WriteBatch | events.Expire]) -> None:
+    def carry_out(self, requests: Sequence[WriteBatch | Expire]) -> None:
         """Carry out requests in this order, and answer them."""
         now, answered = self._clock.monotonic(), self._thread.answered
         made: list[Asked] = []
         for request in requests:
-            if isinstance(request, events.Expire):
+            if isinstance(request, Expire):
                 made.append(AskedExpiry(request, answered))
                 continue
             batch = AskedWrite(request, self._hull, now, answered)
@@ -206,7 +206,7 @@ class ServedRoot:
     async def _begin(self) -> Exception | None:
         """Greet the shards, and make a root. Returns what prevents that."""
         try:
-            read = events.ReadHull(Waiter(), self._hull, _division)
+            read = ReadHull(Waiter(), self._hull, _division)
             _, division = await self._driver.ask(read)
         except Exception as error:  # the storage may have failed
             return error

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from dynhull_server.state.batch import Batch, KeyedBatch
 from dynhull_server.state.contents import keyed, replayed
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError, MisfitError, RefusedError
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.producers import Producers
 from dynhull_server.state.records import HullSettings, Kept
+from dynhull_server.state.requests import WriteBatch
 from dynhull_server.state.taking import TRIP_ROWS
 
 from .messages import Effect, Step

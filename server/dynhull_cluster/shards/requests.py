@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from dynhull_server.state.events import WriteBatch
+from dynhull_server.state.requests import WriteBatch
 
 from .messages import Question
 

@@ -4,8 +4,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..state.events import Arrived, Gone, Request, Stream, WriteBatch
+from ..state.events import Arrived, Gone
 from ..state.hull import Hull
+from ..state.requests import Request, Stream, WriteBatch
 
 if TYPE_CHECKING:
     from ..state.batch import Applied

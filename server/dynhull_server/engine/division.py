@@ -9,10 +9,10 @@ import numpy.typing as npt
 from dynhull.arrays import Points
 
 from ..state.contents.keyed import Found
-from ..state.events import Expire, WriteBatch
 from ..state.hull import Hull
 from ..state.hull_state import Counts
 from ..state.records import Contents, HullRow, HullSettings, Kept, Keys
+from ..state.requests import Expire, WriteBatch
 
 if TYPE_CHECKING:
     from .driver import Driver

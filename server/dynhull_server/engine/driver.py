@@ -11,7 +11,6 @@ from ..state import events
 from ..state.core import Core
 from ..state.errors import StoppingError
 from ..state.events import (
-    Birth,
     Commit,
     Compute,
     Computed,
@@ -20,18 +19,15 @@ from ..state.events import (
     Event,
     Examine,
     Examined,
-    Expire,
     Failed,
     Gone,
     NotExamined,
     Reply,
-    Request,
     Retried,
     Retry,
     Stir,
     Stopping,
     Tick,
-    WriteBatch,
 )
 from ..state.fences.events.block import EventBlock
 from ..state.fences.model.fence import Fence
@@ -39,6 +35,7 @@ from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
 from ..state.records import Committed, Kept
+from ..state.requests import Birth, Expire, Request, WriteBatch
 from ..state.trip import Trip
 from ..storage.port import Storage
 from .group_commit import GroupCommit

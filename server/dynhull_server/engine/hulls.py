@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 
 from ..state.batch import Applied
 from ..state.errors import HullUnsuitableError
-from ..state.events import CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 from ..state.hull import Hull
 from ..state.records import DEFAULT, HullSettings
+from ..state.requests import CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 from ..storage.port import Storage
 from .batch_stream import BatchStream
 from .divided_hull import DividedHull

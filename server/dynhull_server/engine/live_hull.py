@@ -26,13 +26,13 @@ from ..state.errors import (
     HullUnsuitableError,
     RevisionForgottenError,
 )
-from ..state.events import ReadHull, ReadTogether, Recenter, WriteBatch
 from ..state.fences.model.fence import Fence
 from ..state.fences.recovery.sides import Sides, sides_of
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.outline import GlobeOutline, Outline
 from ..state.records import Center, Committed, Contents, HullSettings, Keys, QuarantineRules
+from ..state.requests import ReadHull, ReadTogether, Recenter, WriteBatch
 from ..state.sample import sample
 from .difference import Differences
 from .driver import Driver

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from ..state.events import Request
+from ..state.requests import Request
 
 if TYPE_CHECKING:
     import asyncio

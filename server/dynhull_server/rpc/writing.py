@@ -14,7 +14,7 @@ from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..state.batch import Applied
 from ..state.errors import HullNotFoundError, RestoredError, SequenceGapError
-from ..state.events import WriteBatch, WriteTogether
+from ..state.requests import WriteBatch, WriteTogether
 from . import decode
 from .calls import Call
 from .decode_batch import decode_batch

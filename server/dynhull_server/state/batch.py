@@ -1,8 +1,8 @@
 """A batch: changes that are applied together or not at all."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -74,6 +74,22 @@ class KeyedBatch:
     def of_quarantine(self) -> bool:
         """Whether it is about the quarantine, and not about positions."""
         return self.releases is not None or self.drops is not None or self.rules is not None
+
+
+class Write(Protocol):
+    """A batch as it was sent to a hull. `WriteBatch` describes the attributes."""
+
+    name: str
+    producer: str
+    sequence: int
+    owner: str
+    may_skip: bool
+    after: int | None
+    arrived: int
+
+    @property
+    def make(self) -> Callable[[], Batch | KeyedBatch]:
+        """What decodes it."""
 
 
 @dataclass(slots=True)

@@ -29,30 +29,19 @@ from .events import (
     Committed,
     Compute,
     Computed,
-    CreateHull,
-    DeleteHull,
     Divide,
     Effect,
     Event,
     Examine,
     Examined,
-    Expire,
     Failed,
-    Follow,
     Gone,
     NotExamined,
-    ReadHull,
-    ReadTogether,
-    Recenter,
     Reply,
-    Request,
     Retried,
     Retry,
     Stopping,
     Tick,
-    Together,
-    WriteBatch,
-    WriteTogether,
 )
 from .fences.core import FenceCore
 from .fences.index.components import SPANNING
@@ -62,14 +51,28 @@ from .fences.model.requests import FENCE_REQUESTS, CreateFence, FenceRequest, Pa
 from .fences.model.tallies import Tallies
 from .hull import Hull
 from .hull_state import HullState
+from .leg import Leg
 from .limits import Limits
 from .queues import Queue, Queues, names_of
 from .records import DEFAULT, Append, HullRow, Kept, Record
 from .registry import Registry
+from .requests import (
+    CreateHull,
+    DeleteHull,
+    Expire,
+    Follow,
+    ReadHull,
+    ReadTogether,
+    Recenter,
+    Request,
+    Together,
+    WriteBatch,
+    WriteTogether,
+)
 from .root_state import state_of
 from .schedule import Schedule
 from .taking import take
-from .trip import Leg, Trip, refuse, write
+from .trip import Trip, refuse, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

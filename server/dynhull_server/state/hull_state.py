@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynhull.arrays import Points
 
-from .batch import NO_POINTS, Applied
+from .batch import NO_POINTS, Applied, Write
 from .contents import replayed
 from .contents.keyed import Keyed
 from .contents.live import AnyKeyedHull, layer_of
@@ -24,7 +24,6 @@ from .records import Cause, Center, Contents, Expiry, HullSettings, Kept, Quaran
 
 if TYPE_CHECKING:
     from .contents.live import AnyHull
-    from .events import WriteBatch
 
 
 @dataclass(slots=True)
@@ -139,7 +138,7 @@ class HullState:
 
     def apply(
         self,
-        write: "WriteBatch",
+        write: Write,
         now: float,
         records: list[Record] | None,
         expired: Callable[[], None] | None = None,
@@ -156,7 +155,7 @@ class HullState:
             return self.duplicate()
         return self.apply_decoded(write, self.decoded(write), now, records, expired)
 
-    def is_new(self, write: "WriteBatch", now: float) -> bool:
+    def is_new(self, write: Write, now: float) -> bool:
         """Whether a batch is the next one of its producer, or not numbered; False where it has already been applied.
 
         Raises:
@@ -176,14 +175,14 @@ class HullState:
         counts = self.counts
         return Applied(counts.revision, 0, 0, 0, False, counts.points, duplicate=True, clock=counts.clock)
 
-    def decoded(self, write: "WriteBatch") -> Any:
+    def decoded(self, write: Write) -> Any:
         """The batch, admitted; raises the error that refuses it, unless that depends on the points of the hull."""
         try:
             return self.contents.admit(write.make(), write.arrived)
         except MisfitError as misfit:
             raise HullUnsuitableError(write.name, str(misfit), field=f"batch.{misfit.field}") from None
 
-    def checked(self, write: "WriteBatch") -> Any:
+    def checked(self, write: Write) -> Any:
         """The batch, if it can be applied; raises the error that refuses it. O(k log n)."""
         batch = self.decoded(write)
         self.contents.check(batch)
@@ -191,7 +190,7 @@ class HullState:
 
     def apply_decoded(
         self,
-        write: "WriteBatch",
+        write: Write,
         batch: Any,
         now: float,
         records: list[Record] | None,

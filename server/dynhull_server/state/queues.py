@@ -11,7 +11,6 @@ next change of any. Creating and deleting a fence joins and parts queues, in a s
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from .events import ReadHull, ReadTogether, Request, WriteTogether
 from .fences.index.components import SPANNING, components, depends_on, merged
 from .fences.index.line import Line
 from .fences.model.fence import Fence
@@ -19,6 +18,7 @@ from .fences.model.requests import PREFIX, CreateFence, FenceRequest, ReplaceFen
 from .fences.trip.part import FencePart
 from .hull import Hull
 from .registry import Registry
+from .requests import ReadHull, ReadTogether, Request, WriteTogether
 from .trip import Trip
 
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 
-from .events import DeleteHull, Request, Together, WriteBatch
 from .fences.index.components import SPANNING
 from .fences.model.requests import STRUCTURAL, CreateFence, DeleteFence, FenceRequest
 from .queues import Queue, Queues, names_of
+from .requests import DeleteHull, Request, Together, WriteBatch
 
 # The most points that the requests of one trip read or write together, unless a single request exceeds it.
 TRIP_ROWS = 2**18

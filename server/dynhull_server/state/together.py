@@ -6,10 +6,10 @@ from typing import TypeVar
 
 from .batch import Applied
 from .errors import SequencesDifferError
-from .events import WriteBatch, WriteTogether
 from .hull import Hull
 from .hull_state import HullState
 from .records import Record
+from .requests import WriteBatch, WriteTogether
 
 T = TypeVar("T")
 

@@ -23,12 +23,10 @@ from world import FENCES, HULLS, KEYED, TICK, Chance, World
 
 from dynhull_server.state.core import Core
 from dynhull_server.state.events import (
-    Birth,
     Commit,
     Committed,
     Compute,
     Computed,
-    CreateHull,
     Examine,
     Examined,
     Failed,
@@ -47,6 +45,7 @@ from dynhull_server.state.fences.trip.leg import members
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import NO_TIME, HullSettings
+from dynhull_server.state.requests import Birth, CreateHull
 from dynhull_server.storage.memory import MemoryStorage
 
 LIMITS = Limits(max_hulls=99, max_points=10**6, max_producers=9, max_producers_per_caller=9, history_bytes=10**5)

@@ -39,9 +39,9 @@ from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.rpc.encode_fence import encode_config
 from dynhull_server.state.batch import KeyedBatch
-from dynhull_server.state.events import CreateHull, DeleteHull, WriteBatch, WriteTogether
 from dynhull_server.state.fences.model.config import FenceConfig, HullArea
 from dynhull_server.state.fences.model.requests import CreateFence, DeleteFence, PutConsumer, ReplaceFence
+from dynhull_server.state.requests import CreateHull, DeleteHull, WriteBatch, WriteTogether
 
 KEYS = [f"é{i}" for i in range(32)]
 BEGINNING = 10**15  # of the time of the data

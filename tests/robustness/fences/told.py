@@ -14,9 +14,9 @@ from world import GUEST, FenceModel, World, exact
 
 from dynhull_proto.v1 import fence_pb2
 from dynhull_server.state.batch import KeyedBatch
-from dynhull_server.state.events import WriteBatch
 from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent, Key, Origin
 from dynhull_server.state.records import NO_TIME
+from dynhull_server.state.requests import WriteBatch
 
 # Microseconds after which a subject that stays must have made its event, also on a busy machine.
 PATIENT = 30_000_000

@@ -11,11 +11,11 @@ from sides import Disk, Point, Rings, Shape, apart, hull, shape_of_hull
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import Batch, KeyedBatch
-from dynhull_server.state.events import Birth, CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent, Origin
 from dynhull_server.state.fences.model.requests import CreateFence, DeleteFence, PassTime, PutConsumer, ReplaceFence
 from dynhull_server.state.records import NO_TIME, HullSettings
+from dynhull_server.state.requests import Birth, CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 
 KEYED, ZONE = ("k/a", "k/b", "k/c"), "zone"
 GUEST = "k/c"  # it comes and goes

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 
-from ..events import CreateHull, Effect, Examine, Request, Stir, Tick, WriteBatch
+from ..events import Effect, Examine, Stir, Tick
+from ..leg import Leg
 from ..queues import Queue, Queues, names_of
 from ..registry import Registry
+from ..requests import CreateHull, Request, WriteBatch
 from ..schedule import Schedule
-from ..trip import Leg, Trip
+from ..trip import Trip
 from .model.fence import Fence
 from .model.records import KeptFence
 from .model.requests import CreateFence, FenceRequest, PassTime

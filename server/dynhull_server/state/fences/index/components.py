@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from ...events import Request, Together
+from ...requests import Request, Together
 from ..model.fence import Fence
 from ..model.requests import PREFIX, FenceRequest
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ...events import Birth, Request
+from ...requests import Birth, Request
 from ..index.checked import CheckedArea
 from .config import FenceConfig
 

@@ -11,8 +11,8 @@ from dynhull import Crossings
 from dynhull.keys import key_list, take_keys
 
 from ...hull import Hull
+from ...leg import Leg
 from ...limits import FenceLimits
-from ...trip import Leg
 from ..events.log import EventLog
 from ..events.sequences import Swap, first_rows
 from ..index.keys_changed import KeysChanged, with_expiries

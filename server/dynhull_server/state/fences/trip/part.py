@@ -6,9 +6,9 @@ from ...batch import Applied
 from ...changes import Change
 from ...contents.keyed import Keyed
 from ...errors import FenceNotFoundError, HullFencedError, HullUnsuitableError
-from ...events import Request
 from ...hull import Hull
-from ...trip import Leg
+from ...leg import Leg
+from ...requests import Request
 from ..events.block import AppendEvents, EventBlock, block_of, joined
 from ..events.sequences import Told
 from ..index.keys_changed import of_batch, of_expiry
