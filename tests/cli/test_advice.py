@@ -44,7 +44,7 @@ LOADS = [
     ("load {name} latin.csv", "--bad-rows FILE", "load {name} latin.csv --bad-rows bad.csv"),
     ("load {name} points.csv --decimal ;", "neither . nor ,", "load {name} points.csv --decimal ."),
     ("load {name} points.csv --delimiter ab", "--delimiter 'ab' is not", "load {name} commas.csv --delimiter ,"),
-    ("load {name} points.csv --vertices", "--vertices is for parquet", "load {name} line.ndjson --vertices"),
+    ("load {name} points.csv --format nmea --vertices", "--vertices is for csv", "load {name} line.ndjson --vertices"),
     ("load loaded points.csv", "--resume loads", "load loaded points.csv --resume"),
     ("load loaded points.csv", "--again all", "load loaded points.csv --again"),
     (
@@ -107,6 +107,9 @@ FOLLOWED_ELSEWHERE = {
     "--client-key": "test_commands.py: test_tls",
     "dynhull serve": "every test with a server",
     "--config": "ogrinfo of GDAL",
+    "--help": "test_main.py: test_help_lists_the_commands",
+    "--prefix": "test_commands.py: test_watch_of_many",
+    "--speed": "test_demo.py: test_the_flights_live_until_ctrl_c",
     "--id": "test_table.py: the columns of the demo",
     "--time": "test_table.py: the columns of the demo",
     "--keys-of": "test_keyed.py: test_integer_keys_and_another_hull",
