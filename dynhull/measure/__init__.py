@@ -10,8 +10,10 @@ from ._circle import min_circle
 from ._extent import bounds, diameter, width
 from ._label import label_point
 from ._lines import distance, intersect_lines
+from ._summary import Summary, summary
 
 __all__ = [
+    "Summary",
     "area",
     "bounds",
     "centroid",
@@ -23,5 +25,6 @@ __all__ = [
     "min_circle",
     "min_perimeter_box",
     "perimeter",
+    "summary",
     "width",
 ]
