@@ -40,9 +40,9 @@ from dynhull_cluster.shards.placement import point_hashes, shards_of
 from dynhull_cluster.shards.requests import Write
 from dynhull_cluster.shards.root import Root
 from dynhull_server.state.batch import NO_POINTS, Applied, Batch
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import WriteBatch
 
 random = np.random.default_rng(1)
 Draw = Callable[[int], np.ndarray]

@@ -10,9 +10,10 @@ from ._circle import min_circle
 from ._extent import bounds, diameter, width
 from ._label import label_point
 from ._lines import distance, intersect_lines
-from ._summary import Summary, summary
+from ._summary import FEW, Summary, summary
 
 __all__ = [
+    "FEW",
     "Summary",
     "area",
     "bounds",

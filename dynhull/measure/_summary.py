@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 from itertools import pairwise
-from math import frexp, ldexp, nan
+from math import frexp, ldexp
 from typing import NamedTuple
 
 from .._exact import MANTISSA, root, rounded
@@ -33,7 +33,14 @@ def summary(vertices: Points) -> Summary:
     O(h log h). Of up to 64 vertices in exact integers, with one turn of the calipers (Shamos, 1978): O(h).
     """
     if not 2 < len(vertices) <= FEW:
-        return Summary(*(each(vertices) for each in (area, perimeter, centroid, bounds, diameter, width)))  # type: ignore[arg-type]
+        return Summary(
+            area(vertices),
+            perimeter(vertices),
+            centroid(vertices),
+            bounds(vertices),
+            diameter(vertices),
+            width(vertices),
+        )
     corners, unit = _integers(vertices)
     doubled, x, y = _moments(corners)
     longest, (height, length) = _calipers(corners)
@@ -74,8 +81,8 @@ def _moments(corners: list[Corner]) -> tuple[int, int, int]:
 def _calipers(corners: list[Corner]) -> tuple[int, tuple[int, int]]:
     """The greatest squared distance, and the least squared height over an edge as a fraction.
 
-    For each edge, the farthest vertex; the greatest distance is from an end of an edge to that vertex or, where an edge is
-    parallel, to the next one.
+    For each edge, the farthest vertex; the greatest distance is from an end of an edge to that vertex or, where an edge
+    is parallel, to the next one.
     """
     count = len(corners)
     longest = 0

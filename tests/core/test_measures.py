@@ -12,7 +12,7 @@ from hypothesis import example, given
 from inputs import any_points, grid_points, questions
 from oracle import assert_rounded, exact, nearest, root, segment_distance
 
-from dynhull import DynamicHull
+from dynhull import DynamicHull, measure
 
 both = pytest.mark.parametrize("make", HULLS.values(), ids=HULLS.keys())
 
@@ -42,6 +42,18 @@ def test_diameter(rows):
 def test_width(rows):
     widths = [Fraction(max(cross(a, b, exact(p)) for p in rows)) ** 2 / squared(a, b) for a, b in edges(rows)]
     assert_rounded(DynamicHull(rows).width(), root(min(widths, default=Fraction(0))))
+
+
+@given(any_points)
+@example([])
+@example([(1.0, 2.0)])
+@example([(0.0, 0.0), (1e300, 1e-300), (-1e-300, 1e300), (5e-324, 0.0)])
+@example([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 6, 80).tolist()])
+def test_the_summary_has_the_same_numbers(rows):
+    vertices = DynamicHull(rows).vertices()
+    found = measure.summary(vertices)
+    for name in measure.Summary._fields:
+        np.testing.assert_equal(getattr(found, name), getattr(measure, name)(vertices), name)
 
 
 @given(grid_points)

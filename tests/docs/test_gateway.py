@@ -73,7 +73,9 @@ def served(folder: Path) -> Iterator[str]:
 def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], site: Path, tmp_path: Path) -> None:
     page = take_program("how-to/browser", "index.html")
     create, put, upload, show, wrong, more, fence = commands(site, "browser", "(curl(?! -N)|printf) ")
-    follow, follow_many, follow_fence = (line.split()[-1].strip("'") for line in commands(site, "browser", "curl -N .*http"))
+    follow, follow_many, follow_fence = (
+        line.split()[-1].strip("'") for line in commands(site, "browser", "curl -N .*http")
+    )
     answers = iter(commands(site, "browser", r'\{"\w+":\S.*\}$'))
     assert commands(site, "browser", "dynhull gateway") == [f"dynhull gateway --origin {ORIGIN}"]
     with (

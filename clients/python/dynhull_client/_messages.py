@@ -113,7 +113,7 @@ class Measures(Value):
     degrees, west greater than east across the antimeridian, NaN from servers before 1.1.
 
     `diameter` is the greatest distance of two points, and `width` the least one of parallel lines with all points
-    between; on the globe it is NaN. `watch_many` has both; of a single hull both are NaN: `get_measures` has them.
+    between, on the globe NaN; both are NaN from servers before 1.1.
     """
 
     area: float

@@ -227,33 +227,43 @@ def encode_held(
 
 
 async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
-    """The measures of the hull with these vertices, one step per measure."""
-    area, perimeter, bounds = measure.area, measure.perimeter, measure.bounds
+    """The measures of the hull with these vertices: of many, one step per measure."""
     if geographic:
-        area, perimeter, bounds = globe.area, globe.perimeter, globe.bounds
-    x = y = math.nan
-    if not geographic:
-        x, y = await run(partial(measure.centroid, vertices))
-    min_x, min_y, max_x, max_y = await run(partial(bounds, vertices))
+        return await _encode_measures_on_globe(vertices, run)
+    if len(vertices) <= measure.FEW:
+        found = measure.summary(vertices)
+    else:
+        found = measure.Summary(
+            *[await run(partial(getattr(measure, each), vertices)) for each in measure.Summary._fields]
+        )
+    min_x, min_y, max_x, max_y = found.bounds
     return hull_pb2.Measures(
-        area=await run(partial(area, vertices)),
-        perimeter=await run(partial(perimeter, vertices)),
-        centroid_x=x,
-        centroid_y=y,
+        area=found.area,
+        perimeter=found.perimeter,
+        centroid_x=found.centroid[0],
+        centroid_y=found.centroid[1],
         min_x=min_x,
         min_y=min_y,
         max_x=max_x,
         max_y=max_y,
+        diameter=found.diameter,
+        width=found.width,
     )
 
 
-async def encode_all_lengths(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
-    """The measures with diameter and width, which take longer than all others."""
-    measures = await encode_measures(vertices, run, geographic=geographic)
-    measures.diameter = await run(partial(globe.diameter if geographic else measure.diameter, vertices))
-    if not geographic:
-        measures.width = await run(partial(measure.width, vertices))
-    return measures
+async def _encode_measures_on_globe(vertices: Points, run: Run) -> hull_pb2.Measures:
+    min_x, min_y, max_x, max_y = await run(partial(globe.bounds, vertices))
+    return hull_pb2.Measures(
+        area=await run(partial(globe.area, vertices)),
+        perimeter=await run(partial(globe.perimeter, vertices)),
+        centroid_x=math.nan,
+        centroid_y=math.nan,
+        min_x=min_x,
+        min_y=min_y,
+        max_x=max_x,
+        max_y=max_y,
+        diameter=await run(partial(globe.diameter, vertices)),
+    )
 
 
 def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:

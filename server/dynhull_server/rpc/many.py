@@ -16,7 +16,7 @@ from ..engine.watch_many import Part, Picture
 from ..state.errors import HullNotFoundError
 from ..state.hull_state import Counts
 from .access import Rights
-from .encode import FRAMES, encode_all_lengths, encode_points
+from .encode import FRAMES, encode_measures, encode_points
 
 # Seconds between two states of a hull, where the watcher does not say.
 MANY_INTERVAL = 0.1
@@ -73,7 +73,7 @@ class HullStates:
         run = at_once if len(vertices) <= FEW_ROWS else self._aside
         if len(vertices):
             measures: hull_pb2.Measures = await hull.measured(
-                vertices, partial(encode_all_lengths, vertices, run, geographic=hull.geographic)
+                vertices, partial(encode_measures, vertices, run, geographic=hull.geographic)
             )
             now.measures.CopyFrom(measures)
         if self._outline:
