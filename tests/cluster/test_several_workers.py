@@ -127,7 +127,7 @@ def test_what_needs_one_worker_says_so(client: HullClient) -> None:
     assert client.get_hull(ZERO).info.points == 4
     with pytest.raises(HullUnsuitableError, match=apart):
         client.locate(ZERO, keys=["a"], keys_of=ONE)
-    with pytest.raises(HullUnsuitableError, match=r"config\.subject_hull is 'fleet/a'"):
+    with pytest.raises(HullUnsuitableError, match=r"^subjects is 'fleet/a'"):
         client.create_fence("north/fence", SQUARE, ONE)
     with pytest.raises(InvalidRequestError, match='with several workers, a prefix has a "/"'):
         client.create_fence("north/fence", SQUARE, Prefix("north"))
