@@ -95,18 +95,18 @@ class Utf8(io.RawIOBase):
         return bytes(self._file.read1(PART))  # type: ignore[attr-defined]
 
     def _encoded(self, text: str) -> bytes:
-        found = None if text.isascii() else KEPT.search(text)
-        if found is None:
-            self._pass(text)
-            return text.encode()
-        self.kept = True
-        if not self._keep:
-            self._pass(text[: found.start()])
-            byte = ord(found[0]) - 0xDC00
-            place = f"{self._name}, line {self._line}, character {self._character + 1}"
-            raise UndecodableError(f"{place}: the byte 0x{byte:02x} is not {self.encoding.upper()}")
+        try:
+            encoded = text.encode()
+        except UnicodeEncodeError as error:  # a kept byte
+            self.kept = True
+            if not self._keep:
+                self._pass(text[: error.start])
+                place = f"{self._name}, line {self._line}, character {self._character + 1}"
+                byte = ord(text[error.start]) & 0xFF
+                raise UndecodableError(f"{place}: the byte 0x{byte:02x} is not {self.encoding.upper()}") from None
+            encoded = text.encode(errors=KEPT_BYTES)
         self._pass(text)
-        return text.encode(errors=KEPT_BYTES)
+        return encoded
 
     def _pass(self, text: str) -> None:
         """Count the lines, which end in any of three ways."""
