@@ -54,17 +54,25 @@ def geographic(name):
         (json.dumps({"type": "Point", "coordinates": [1, 2]}), True),
     ],
 )
-@pytest.mark.parametrize("kind", ["geojson", "gz", "pipe"])
-def test_geojson(tmp_path, name, text, on_globe, kind):
-    path = tmp_path / ("a.geojson.gz" if kind == "gz" else "a.geojson")
-    path.write_bytes(gzip.compress(text.encode()) if kind == "gz" else text.encode())
-    if kind == "pipe":
-        done = dynhull("load", name, "-", "--format", "geojson", input=text)
-    else:
-        done = dynhull("load", name, path)
+def test_geojson(tmp_path, name, text, on_globe):
+    path = tmp_path / "a.geojson"
+    path.write_text(text)
+    done = dynhull("load", name, path)
     assert done.exit_code == 0, done.stderr
     assert geographic(name) is on_globe
     assert on_globe or UTM in done.stderr or "names no coordinate reference system" in done.stderr
+
+
+@pytest.mark.usefixtures("served")
+def test_compressed_geojson_and_pipes(tmp_path, name):
+    path = tmp_path / "a.geojson.gz"
+    text = collection(METRES, last=True, properties={"crs": None})
+    path.write_bytes(gzip.compress(text.encode()))
+    assert dynhull("load", f"{name}-a", path).exit_code == 0
+    assert dynhull("load", f"{name}-b", "-", "--format", "geojson", input=text).exit_code == 0
+    text = collection(properties={"crs": {"properties": {"name": METRES}}})
+    assert dynhull("load", f"{name}-c", "-", "--format", "geojson", input=text).exit_code == 0
+    assert [geographic(name + end) for end in ("-a", "-b", "-c")] == [False, False, True]
 
 
 @pytest.mark.usefixtures("served")
