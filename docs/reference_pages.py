@@ -8,6 +8,7 @@ import mkdocs_gen_files
 from pydantic_core import PydanticUndefined
 
 import dynhull_client
+from dynhull_client import _errors
 from dynhull_server.settings import PREFIX, Settings
 from dynhull_surface.described import LARGEST, Setting, described, option_of
 from dynhull_surface.reasons import REASONS, Code, Exit, exit_of, http_of, repeat_of
@@ -93,6 +94,13 @@ def in_cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|")
 
 
-for page, lines in (("errors", errors()), ("settings", settings())):
+def error_classes() -> Iterator[str]:
+    yield "# Classes of errors\n"
+    for name in _errors.__all__:
+        yield f"::: dynhull_client.{name}\n    options:\n      show_root_heading: true\n      heading_level: 2"
+        yield "      force_inspection: true\n"
+
+
+for page, lines in (("errors", errors()), ("sdk/errors", error_classes()), ("settings", settings())):
     with mkdocs_gen_files.open(f"reference/{page}.md", "w") as file:
         file.write("\n".join(lines))
