@@ -457,6 +457,29 @@ def test_what_gRPC_would_not_explain(tmp_path, monkeypatch, options, words):  # 
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("measure {name}/v", ["{name}/vans"]),
+        ("delete {name}/", ["{name}/trucks", "{name}/vans"]),
+        ("measure --address {address} {name}/t", ["{name}/trucks"]),
+        ("fences show {name}", ["{name}/depot"]),
+        ("create {name}/", []),
+        ("measure --address 127.0.0.1:1 {name}", []),
+        ("measure --address :: {name}", []),
+    ],
+)
+def test_completion_knows_the_names_on_the_server(served, name, words, offered):
+    for hull in ("vans", "trucks"):
+        assert dynhull("create", f"{name}/{hull}", "--keyed", "str").exit_code == 0
+    fenced = dynhull("fences", "create", f"{name}/depot", "--circle", 0, 0, 1, "--subjects", f"{name}/vans")
+    assert fenced.exit_code == 0
+    words = ["dynhull", *words.format(name=name, address=served).split()]
+    completing = {"COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
+    done = dynhull(prog_name="dynhull", env={"_DYNHULL_COMPLETE": "complete_bash", **completing})
+    assert (done.stdout.split(), done.stderr) == ([each.format(name=name) for each in offered], "")
+
+
 def test_completion_knows_the_commands(tmp_path):
     environment = {
         "_DYNHULL_COMPLETE": "complete_bash",

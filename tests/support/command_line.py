@@ -2,6 +2,7 @@
 
 import os
 import pty
+from typing import Any
 
 from forked import COMMAND, Process
 from patience import PATIENCE
@@ -10,9 +11,12 @@ from typer.testing import CliRunner, Result
 from dynhull_cli.commands import app
 
 
-def dynhull(*arguments: object, input: str | bytes | None = None) -> Result:  # noqa: A002
-    """Run a command to its end: in this process, because another one takes half a second to start."""
-    return CliRunner().invoke(app, [str(each) for each in arguments], input=input)
+def dynhull(*arguments: object, input: str | bytes | None = None, **more: Any) -> Result:  # noqa: A002
+    """Run a command to its end: in this process, because another one takes half a second to start.
+
+    `more`: further arguments of the runner, such as the environment.
+    """
+    return CliRunner().invoke(app, [str(each) for each in arguments], input=input, **more)
 
 
 def on_a_terminal(*arguments: str, answer: bytes = b"") -> tuple[int, str]:

@@ -13,6 +13,7 @@ import typer
 
 from dynhull_surface.reasons import Exit, exit_of
 
+from .completion import hulls
 from .durations import more_than_0
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ PingInterval = Annotated[
     ),
 ]
 
-HullName = Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")]
+HullName = Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.", autocompletion=hulls)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")]
 
 

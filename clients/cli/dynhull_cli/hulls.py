@@ -6,6 +6,7 @@ import typer
 
 from dynhull_surface.settings import HullSettings
 
+from . import completion
 from .connected import AsJson, connected
 from .durations import shown
 from .json_lines import json_line
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
     from dynhull_client import HullClient, HullInfo
 
 
-Names = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the hulls.")]
+NewNames = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the hulls.")]
+Names = Annotated[
+    list[str], typer.Argument(metavar="HULL", help="Names of the hulls.", autocompletion=completion.hulls)
+]
 
 
 @connected
@@ -43,7 +47,7 @@ def list_hulls(
 @choosing(settings_options(HullSettings, "Settings, fixed from then on"))
 def create(
     client: "HullClient",
-    names: Names,
+    names: NewNames,
     chosen: dict[str, Any],
     max_speed: MaxSpeed = None,
     max_growth: MaxGrowth = None,
@@ -84,7 +88,7 @@ def create(
 @connected
 def recenter(
     client: "HullClient",
-    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")],
+    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.", autocompletion=completion.hulls)],
     center: Annotated[
         str | None,
         typer.Argument(metavar="LON,LAT", help="New centre, in degrees. Default: the mean direction of the points."),
@@ -107,7 +111,7 @@ def recenter(
 @connected
 def reshard(
     client: "HullClient",
-    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.")],
+    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the hull.", autocompletion=completion.hulls)],
     shards: Annotated[
         int, typer.Argument(metavar="SHARDS", help="The number of shards from now on, 1 to 1024.", min=1)
     ],

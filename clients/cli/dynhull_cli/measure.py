@@ -10,6 +10,7 @@ import typer
 if TYPE_CHECKING:
     from dynhull_client import HullClient
 
+from .completion import hulls
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line
 from .tab_lines import flat, tab_line
@@ -71,8 +72,8 @@ def _shown(value: Any, unit: str) -> str:
 @connected
 def separate(
     client: "HullClient",
-    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the first hull.")],
-    other: Annotated[str, typer.Argument(metavar="OTHER", help="Name of the second hull.")],
+    name: Annotated[str, typer.Argument(metavar="HULL", help="Name of the first hull.", autocompletion=hulls)],
+    other: Annotated[str, typer.Argument(metavar="OTHER", help="Name of the second hull.", autocompletion=hulls)],
     as_json: AsJson = False,
 ) -> None:
     """Measure the gap or the overlap of two hulls: one line per number, its name first, tabs between.

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 from dynhull_surface.reasons import Exit
 
+from .completion import hulls
 from .connected import AsJson, connected
 from .json_lines import json_line
 from .listing import listed
@@ -20,7 +21,9 @@ from .plural import plural
 @connected
 def verify(
     client: "HullClient",
-    names: Annotated[list[str] | None, typer.Argument(metavar="HULL", help="Names of the hulls. Default: all.")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="HULL", help="Names of the hulls. Default: all.", autocompletion=hulls)
+    ] = None,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds that each hull may take.")] = 600.0,
     as_json: AsJson = False,
 ) -> None:

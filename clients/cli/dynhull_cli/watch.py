@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from .completion import hulls
 from .connected import AsJson, connected
 
 if TYPE_CHECKING:
@@ -14,7 +15,9 @@ if TYPE_CHECKING:
 @connected
 def watch(
     client: "HullClient",
-    name: Annotated[str | None, typer.Argument(metavar="[HULL]", help="Name of the hull.", show_default=False)] = None,
+    name: Annotated[
+        str | None, typer.Argument(metavar="[HULL]", help="Name of the hull.", show_default=False, autocompletion=hulls)
+    ] = None,
     prefix: Annotated[
         str | None,
         typer.Option(help='In place of HULL: all hulls whose names begin with this; "" for all.', show_default=False),

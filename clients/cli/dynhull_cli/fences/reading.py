@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..completion import fences
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..listing import below, confirm_deletion, existing, listed, print_list
@@ -83,7 +84,7 @@ def inside(client: "HullClient", name: FenceName, as_json: AsJson = False) -> No
 @connected
 def delete(
     client: "HullClient",
-    names: Annotated[list[str], typer.Argument(metavar="FENCE", help="Names of the fences.")],
+    names: Annotated[list[str], typer.Argument(metavar="FENCE", help="Names of the fences.", autocompletion=fences)],
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Delete without asking.")] = False,
     missing_ok: Annotated[bool, typer.Option("--missing-ok", help="Skip a fence that does not exist.")] = False,
     as_json: AsJson = False,

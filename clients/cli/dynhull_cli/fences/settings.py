@@ -6,6 +6,7 @@ import typer
 
 from dynhull_surface.settings import FenceSettings
 
+from ..completion import fences
 from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..setting_options import choosing, settings_options
@@ -22,7 +23,7 @@ def _subjects(text: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, help=text, rich_help_panel="Subjects: one of", **more)
 
 
-FenceName = Annotated[str, typer.Argument(metavar="FENCE", help="Name of the fence.")]
+FenceName = Annotated[str, typer.Argument(metavar="FENCE", help="Name of the fence.", autocompletion=fences)]
 Area = Annotated[str | None, _area("A hull. The area moves as its points do.", "--area", metavar="HULL")]
 PolygonText = Annotated[
     str | None,
