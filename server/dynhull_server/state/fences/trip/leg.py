@@ -10,6 +10,7 @@ from dynhull import Crossings
 from dynhull.keys import PackedKeys, key_list, take_keys
 
 from ...changes import FenceChange
+from ...hull import Hull
 from ...records import NO_TIME, Keys
 from ..events.sequences import Swap, caused
 from ..index.pair import Pair
@@ -33,6 +34,7 @@ from ..model.records import (
     Key,
     Members,
     Origin,
+    Position,
     PutConsumer,
     PutDelays,
     Subject,
@@ -111,11 +113,8 @@ class FenceLeg:
             now: the time.
             origins: where subjects of this fence come from.
         """
-        sequence, time = self.last, self.time(now)
-        hull, area_revision = subjects.hull, self.area_revision
-        revision = hull.state.counts.revision
+        time = self.time(now)
         keys = crossings.keys[rows] if isinstance(rows, slice) else take_keys(crossings.keys, rows)
-        times = subjects.times(keys)
         columns = zip(
             crossings.changes[rows].tolist(),
             crossings.causes[rows].tolist(),
@@ -123,90 +122,34 @@ class FenceLeg:
             crossings.points[rows].tolist(),
             crossings.previous[rows].tolist(),
             crossings.distances[rows].tolist(),
-            [NO_TIME] * len(keys) if times is None else times.tolist(),
+            _event_times(subjects, keys),
             strict=True,
         )
-        append = self.events.append
         for change, causes, key, (x, y), (before_x, before_y), distance, event_time in columns:
-            sequence += 1
             gone = x != x  # NaN
-            append(
-                FenceEvent(
-                    sequence,
-                    TYPES[change],
-                    caused(causes, swap),
-                    hull.name,
-                    key,
-                    revision,
-                    area_revision,
-                    None if gone else (x, y),
-                    None if before_x != before_x else (before_x, before_y),
-                    None if gone else distance,
-                    event_time,
-                    time,
-                    origin=origins.get(key),
-                )
-            )
+            here, before = None if gone else (x, y), None if before_x != before_x else (before_x, before_y)
+            far, origin = None if gone else distance, origins.get(key)
+            why = caused(causes, swap)
+            self._add(TYPES[change], why, time, subjects.hull, key, here, before, far, event_time, origin=origin)
 
     def entered(self, subjects: Subjects, now: int) -> None:
         """Make an event of each subject that is inside of a new fence."""
-        sequence, time = self.last, self.time(now)
-        keys = subjects.index.inside(self.fence.number)
-        times = subjects.times(keys)
-        event_times = [NO_TIME] * len(keys) if times is None else times.tolist()
+        time, keys = self.time(now), subjects.index.inside(self.fence.number)
         points = keyed(subjects.hull.state).positions(keys).tolist()
-        hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
-        for key, (x, y), event_time in zip(key_list(keys), points, event_times, strict=True):
-            sequence += 1
-            self.events.append(
-                FenceEvent(
-                    sequence,
-                    EventType.ENTER,
-                    Cause.CREATED,
-                    hull,
-                    key,
-                    revision,
-                    self.area_revision,
-                    (x, y),
-                    None,
-                    0.0,
-                    event_time,
-                    time,
-                )
-            )
+        for key, (x, y), event_time in zip(key_list(keys), points, _event_times(subjects, keys), strict=True):
+            self._add(EventType.ENTER, Cause.CREATED, time, subjects.hull, key, (x, y), None, 0.0, event_time)
 
     def report(self, subjects: Subjects, found: Mapping[Key, tuple[EventType, int, int]], now: int) -> None:
         """Make an event of each of some keys that are there, given its type, why, and its first time."""
-        keys = subjects.keys(found)
-        sequence, time = self.last, self.time(now)
-        times = subjects.times(keys)
-        event_times = [NO_TIME] * len(keys) if times is None else times.tolist()
+        time, keys = self.time(now), subjects.keys(found)
         points = keyed(subjects.hull.state).positions(keys)
         delays = {} if self.fence.delays is None else self.fence.delays.of(subjects.hull.name)
         outside = np.array([found[key][0] is EventType.EXIT or key in delays for key in key_list(keys)], np.bool_)
         distances = subjects.distances(self, keys, points, outside)
-        hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
-        columns = zip(key_list(keys), points.tolist(), distances, event_times, strict=True)
+        columns = zip(key_list(keys), points.tolist(), distances, _event_times(subjects, keys), strict=True)
         for key, (x, y), distance, event_time in columns:
-            sequence += 1
             kind, causes, first_time = found[key]
-            self.events.append(
-                FenceEvent(
-                    sequence,
-                    kind,
-                    causes,
-                    hull,
-                    key,
-                    revision,
-                    self.area_revision,
-                    (x, y),
-                    None,
-                    distance,
-                    event_time,
-                    time,
-                    first_time,
-                )
-            )
+            self._add(kind, causes, time, subjects.hull, key, (x, y), None, distance, event_time, first_time)
 
     def paired(self, pair: Pair, causes: int, now: int) -> None:
         """Make the event that two hulls begin or cease to be near."""
@@ -229,27 +172,11 @@ class FenceLeg:
 
     def left(self, subjects: Subjects, keys: Keys, cause: Mapping[Key, int] | int, now: int) -> None:
         """Make an exit of each of some keys of a hull that are gone, given why; with the positions they still have."""
-        sequence, time = self.last, self.time(now)
+        time = self.time(now)
         points = keyed(subjects.hull.state).positions(keys).tolist()
-        hull, revision = subjects.hull.name, subjects.hull.state.counts.revision
         for key, (x, y) in zip(key_list(keys), points, strict=True):
-            sequence += 1
-            self.events.append(
-                FenceEvent(
-                    sequence,
-                    EventType.EXIT,
-                    cause if isinstance(cause, int) else cause[key],
-                    hull,
-                    key,
-                    revision,
-                    self.area_revision,
-                    None,
-                    None if x != x else (x, y),
-                    None,
-                    NO_TIME,
-                    time,
-                )
-            )
+            why, before = cause if isinstance(cause, int) else cause[key], None if x != x else (x, y)
+            self._add(EventType.EXIT, why, time, subjects.hull, key, None, before)
 
     def put_delay(self, subject: Subject, delay: Delay | None) -> None:
         """Put the delay of a subject in the place of the one before."""
@@ -262,20 +189,41 @@ class FenceLeg:
 
     def summed_up(self, kind: EventType, cause: int, now: int) -> None:
         """Make one event of all subjects that are inside."""
+        self._add(kind, cause, self.time(now), inside=tuple(members(self.fence)))
+
+    def _add(
+        self,
+        kind: EventType,
+        causes: int,
+        time: int,
+        hull: Hull | None = None,
+        key: Key | None = None,
+        position: Position | None = None,
+        previous: Position | None = None,
+        distance: float | None = None,
+        event_time: int = NO_TIME,
+        first_time: int = NO_TIME,
+        inside: tuple[Members, ...] = (),
+        origin: Origin | None = None,
+    ) -> None:
+        """Make the next event; `hull` is that of the subject."""
+        name, revision = ("", 0) if hull is None else (hull.name, hull.state.counts.revision)
         event = FenceEvent(
             self.last + 1,
             kind,
-            cause,
-            "",
-            None,
-            0,
+            causes,
+            name,
+            key,
+            revision,
             self.area_revision,
-            None,
-            None,
-            None,
-            NO_TIME,
-            self.time(now),
-            inside=tuple(members(self.fence)),
+            position,
+            previous,
+            distance,
+            event_time,
+            time,
+            first_time,
+            inside,
+            origin,
         )
         self.events.append(event)
 
@@ -343,3 +291,9 @@ def members(fence: Fence, dwelling: Dwelling | None = None) -> Iterator[Members]
         if len(keys):
             since = None if dwelling is None else dwelling.times(subjects.hull.name, keys)
             yield Members(subjects.hull.name, keys, subjects.hull.state.counts.revision, since)
+
+
+def _event_times(subjects: Subjects, keys: Keys) -> list[int]:
+    """The time of the position of each key."""
+    times = subjects.times(keys)
+    return [NO_TIME] * len(keys) if times is None else times.tolist()
