@@ -97,22 +97,23 @@ def send(
     import asyncio
 
     from .dead_letters import StateFolder
-    from .relay import send_again, target_of
+    from .relay import send_again
     from .signatures import read_secret
+    from .targets import TargetOptions, target_of
 
     async def run() -> tuple[int, str | None]:
         found = StateFolder(state).dead_letters()
         unknown = set(ids or ()) - {each.letter.id for each in found}
         if unknown:
             raise ValueError(f"{state} has no dead letter {', '.join(sorted(unknown))}")
-        target = target_of(
-            to,
+        options = TargetOptions(
             keys=[read_secret(each) for each in secret or ()],
             unsigned=unsigned,
             batch=1,
             timeout=more_than_0(timeout, "--timeout"),
             allow_private=allow_private,
         )
+        target = target_of(to, options)
         return await send_again([each for each in found if not ids or each.letter.id in ids], target)
 
     try:
@@ -178,8 +179,9 @@ def relay(
     from . import logs
     from .dead_letters import StateFolder
     from .lane import Patience
-    from .relay import run, target_of
+    from .relay import run
     from .signatures import read_secret
+    from .targets import TargetOptions, target_of
     from .urls import without_secrets
 
     keys = [read_secret(each) for each in secret or ()]
@@ -190,14 +192,14 @@ def relay(
     logs.configure(log_format.value)
 
     async def serve() -> bool:
-        target = target_of(
-            to,
+        options = TargetOptions(
             keys=keys,
             unsigned=unsigned,
             batch=batch,
             timeout=more_than_0(timeout, "--timeout"),
             allow_private=allow_private,
         )
+        target = target_of(to, options)
         page = None if metrics_port is None else (metrics_host, metrics_port)
         try:
             async with connect(AsyncHullClient) as client:

@@ -1,13 +1,10 @@
 """A relay: a durable consumer of fences that delivers their events to one kind of receiver."""
 
 import asyncio
-import re
 import signal
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
-from urllib.parse import urlsplit
 
 import structlog
 
@@ -17,56 +14,10 @@ from dynhull_client import AsyncHullClient, FenceNotFoundError
 from .dead_letters import DeadLetter, StateFolder, gone_key
 from .figures import Figures
 from .lane import FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER, PASSING, Lane, Patience
-from .target import GoneError, NotDeliveredError, ReaderGoneError, Target, check_places
+from .target import GoneError, NotDeliveredError, ReaderGoneError, Target
 from .waiting import SERVER_AWAY, Absence, growing_pauses, unless
 
 log = structlog.get_logger("dynhull_relay")
-WITHOUT_SCHEME = re.compile(r"[^/@\s]+:\d+(/.*)?")  # HOST:PORT
-
-
-def target_of(
-    to: str, *, keys: Sequence[bytes], unsigned: bool, batch: int, timeout: float, allow_private: bool
-) -> Target:
-    """The target that a URL, a path or a dash stands for. Call it in a running event loop.
-
-    Raises:
-        ValueError: there is no such target, or an option does not suit it.
-        OSError: the file cannot be opened.
-    """
-    if WITHOUT_SCHEME.fullmatch(to):
-        raise ValueError(f"--to {to}: did you mean http://{to}? A file of that name is ./{to}")
-    scheme = urlsplit(to).scheme
-    if scheme not in ("", "file"):
-        check_places(urlsplit(to)._replace(netloc="").geturl())  # a password is nothing to show
-    elif "{fence}" in to or "{type}" in to:
-        raise ValueError(
-            f"--to {to}: {{fence}} and {{type}} are filled in in URLs; one file has the events of all fences"
-        )
-    if scheme in ("http", "https"):
-        from .webhook import Webhook
-
-        if not keys and not unsigned:
-            raise ValueError("webhooks are signed: give --secret or DYNHULL_WEBHOOK_SECRET, or --unsigned")
-        return Webhook(to, keys, batch=batch, timeout=timeout, allow_private=allow_private)
-    if batch > 1:
-        raise ValueError("--batch is for webhooks (http and https)")
-    match scheme:
-        case "mqtt" | "mqtts":
-            from .mqtt import Mqtt
-
-            return Mqtt(to, timeout)
-        case "nats" | "tls":
-            from .jetstream import JetStream
-
-            return JetStream(to, timeout)
-        case "" if not to:
-            raise ValueError("--to is empty: give a URL, a file or -")
-        case "" | "file":
-            from .lines import LinesFile, StandardOutput
-
-            return StandardOutput() if to == "-" else LinesFile(Path(to.removeprefix("file://")))
-        case _:
-            raise ValueError(f"--to {scheme}: must be a URL of http, https, mqtt, mqtts, nats or tls, a file or -")
 
 
 async def run(

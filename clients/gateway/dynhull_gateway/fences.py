@@ -98,8 +98,10 @@ def _area(area: Any) -> Any:
             return area.model_dump()
         case schemas.PolygonArea():
             return Polygon(np.array(area.exterior), tuple(map(np.array, area.holes)))
+        case [*parts]:
+            return [_area(each) for each in parts]
         case _:
-            return [_area(each) for each in area]
+            raise TypeError(f"not an area: {area!r}")
 
 
 def _shown(fence: Fence) -> schemas.Fence:
@@ -120,5 +122,7 @@ def _shown_area(area: Any) -> Any:
             return schemas.CircleArea(center=[area.x, area.y], radius=area.r)
         case Polygon():
             return schemas.PolygonArea(exterior=area.exterior.tolist(), holes=[hole.tolist() for hole in area.holes])
+        case [*parts]:
+            return [_shown_area(each) for each in parts]
         case _:
-            return [_shown_area(each) for each in area]
+            raise TypeError(f"not an area: {area!r}")

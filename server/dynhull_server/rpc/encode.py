@@ -3,6 +3,7 @@
 import math
 from functools import partial
 from operator import attrgetter
+from typing import assert_never
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ from ..engine.layers import Layers
 from ..engine.live_hull import LiveHull
 from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
-from ..engine.views import Change, Event, Progress, Snapshot
+from ..engine.views import Change, Event, Progress, Sketch, Snapshot
 from ..state.batch import NO_POINTS, Applied
 from ..state.contents.keyed import Found
 from ..state.fences.model.faults import FenceFault
@@ -335,12 +336,14 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
             message.change.CopyFrom(change)
         case Progress():
             message.progress.SetInParent()
-        case _:
+        case Sketch():
             message.sketch.uid = event.uid
             message.sketch.vertices.CopyFrom(encode_points(event.extremes, encoding))
             message.sketch.error = event.error
             if event.keys is not None:
                 message.sketch.keys.CopyFrom(encode_key_array(event.keys, encoding))
+        case _:
+            assert_never(event)
     return message
 
 
@@ -370,8 +373,10 @@ def _rows(event: Event) -> int:
             return len(event.removed) + event.difference.added.size + event.difference.renamed.size
         case Progress():
             return 0
-        case _:
+        case Sketch():
             return len(event.extremes)
+        case _:
+            assert_never(event)
 
 
 def encode_layers(

@@ -148,7 +148,8 @@ def ingest(
     from ..urls import without_secrets
     from .bad import BadMessages
     from .feed import DoubtfulError, FeedError
-    from .ingest import IngestError, feeds_of, run
+    from .feeds import FeedOptions, feeds_of
+    from .ingest import IngestError, run
     from .mapping import Mapping
     from .pump import Settings
 
@@ -176,7 +177,10 @@ def ingest(
         )
 
     async def serve() -> bool:
-        find = feeds_of(source, hull, producer, mapping, to_end=to_end, ping_interval=connect.ping_interval)
+        options = FeedOptions(
+            hull=hull, producer=producer, mapping=mapping, to_end=to_end, ping_interval=connect.ping_interval
+        )
+        find = feeds_of(source, options)
         async with connect(AsyncHullClient) as client:
             return await run(
                 client,

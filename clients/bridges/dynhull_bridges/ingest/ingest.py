@@ -2,9 +2,8 @@
 
 import asyncio
 import signal
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Sequence
 from time import monotonic
-from urllib.parse import urlsplit
 
 import structlog
 
@@ -13,66 +12,17 @@ from dynhull_surface.counts import COUNTS
 
 from ..waiting import SERVER_AWAY, Absence, growing_pauses, unless
 from .bad import BadMessages, TooManyBadError
-from .feed import DoubtfulError, Feed, FeedError, check_producer
+from .feed import DoubtfulError, Feed, FeedError
+from .feeds import Find
 from .figures import Figures
 from .lane import NotCreatedError
-from .mapping import Mapping
 from .pump import BROKER_AWAY, DOUBT, FIRST_PAUSE, LONGEST_PAUSE, GapError, Pump, Settings
 
 log = structlog.get_logger("dynhull_ingest")
-Find = Callable[[], Awaitable[Sequence[Feed]]]
 
 
 class IngestError(Exception):
     """The ingest cannot go on; the message says why."""
-
-
-def feeds_of(
-    url: str, hull: str, producer: str | None, mapping: Mapping, *, to_end: bool, ping_interval: float
-) -> Find:
-    """Finds the feeds that a URL stands for; it raises FeedError if the broker, which has to be asked, does not answer.
-
-    `ping_interval` is the number of seconds between questions whether the broker is still there.
-
-    Raises:
-        ValueError: there are none, or an option does not suit them.
-    """
-    if producer is not None:
-        check_producer(producer)
-    match urlsplit(url).scheme:
-        case "mqtt" | "mqtts":
-            from .mqtt import Mqtt
-
-            if not mapping.keyed:
-                raise ValueError(
-                    "MQTT has no numbers: a message that comes twice would be two points. Give --key, whose point it "
-                    "moves to the same place again"
-                )
-            if producer is not None:
-                raise ValueError("--producer is for NATS and Kafka, which number their messages")
-            if to_end:
-                raise ValueError("--to-end is for NATS and Kafka: a subscription of MQTT has no end")
-            return _known([Mqtt(url, hull, ping_interval)])
-        case "nats" | "tls":
-            from .jetstream import JetStream
-
-            return _known([JetStream(url, producer, mapping.digest, ping_interval)])
-        case "kafka":
-            from .kafka import Topic
-
-            return Topic(url, producer, mapping.digest, ping_interval).partitions
-        case scheme:
-            raise ValueError(
-                f"the URL begins with {f'{scheme}:' if scheme else 'no scheme'}; there are mqtt(s)://HOST/FILTER, "
-                "nats://HOST/STREAM[/SUBJECT] (tls:// encrypts) and kafka://HOST:PORT/TOPIC"
-            )
-
-
-def _known(feeds: Sequence[Feed]) -> Find:
-    async def found() -> Sequence[Feed]:
-        return feeds
-
-    return found
 
 
 async def run(

@@ -1,0 +1,91 @@
+"""The kinds of receivers by the scheme of their URL. A new kind is a module with a Target and a line in TARGETS."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from .target import Target, check_places
+
+WITHOUT_SCHEME = re.compile(r"[^/@\s]+:\d+(/.*)?")  # HOST:PORT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TargetOptions:
+    """What may be said of a receiver beside its URL.
+
+    Attributes:
+        keys: those that sign webhooks.
+        unsigned: whether webhooks are not signed.
+        batch: the most letters in a delivery.
+        timeout: the seconds for a delivery.
+        allow_private: whether webhooks may go to private networks.
+    """
+
+    keys: Sequence[bytes]
+    unsigned: bool
+    batch: int
+    timeout: float
+    allow_private: bool
+
+
+Open = Callable[[str, TargetOptions], Target]
+
+
+def target_of(to: str, options: TargetOptions) -> Target:
+    """The target that a URL, a path or a dash stands for. Call it in a running event loop.
+
+    Raises:
+        ValueError: there is no such target, or an option does not suit it.
+        OSError: the file cannot be opened.
+    """
+    if WITHOUT_SCHEME.fullmatch(to):
+        raise ValueError(f"--to {to}: did you mean http://{to}? A file of that name is ./{to}")
+    scheme = urlsplit(to).scheme
+    if scheme not in LINES:
+        check_places(urlsplit(to)._replace(netloc="").geturl())  # a password is nothing to show
+    elif "{fence}" in to or "{type}" in to:
+        raise ValueError(
+            f"--to {to}: {{fence}} and {{type}} are filled in in URLs; one file has the events of all fences"
+        )
+    if scheme not in WEBHOOKS and options.batch > 1:
+        raise ValueError("--batch is for webhooks (http and https)")
+    if scheme not in TARGETS:
+        *others, last = (each for each in TARGETS if each not in LINES)
+        raise ValueError(f"--to {scheme}: must be a URL of {', '.join(others)} or {last}, a file or -")
+    return TARGETS[scheme](to, options)
+
+
+def _webhook(to: str, options: TargetOptions) -> Target:
+    from .webhook import Webhook
+
+    if not options.keys and not options.unsigned:
+        raise ValueError("webhooks are signed: give --secret or DYNHULL_WEBHOOK_SECRET, or --unsigned")
+    return Webhook(to, options.keys, batch=options.batch, timeout=options.timeout, allow_private=options.allow_private)
+
+
+def _mqtt(to: str, options: TargetOptions) -> Target:
+    from .mqtt import Mqtt
+
+    return Mqtt(to, options.timeout)
+
+
+def _jetstream(to: str, options: TargetOptions) -> Target:
+    from .jetstream import JetStream
+
+    return JetStream(to, options.timeout)
+
+
+def _lines(to: str, _: TargetOptions) -> Target:
+    from .lines import LinesFile, StandardOutput
+
+    if not to:
+        raise ValueError("--to is empty: give a URL, a file or -")
+    return StandardOutput() if to == "-" else LinesFile(Path(to.removeprefix("file://")))
+
+
+WEBHOOKS: dict[str, Open] = {"http": _webhook, "https": _webhook}
+LINES: dict[str, Open] = {"": _lines, "file": _lines}
+# Each imports what it needs, which takes long, only when it is asked for.
+TARGETS = {**WEBHOOKS, "mqtt": _mqtt, "mqtts": _mqtt, "nats": _jetstream, "tls": _jetstream, **LINES}
