@@ -13,7 +13,7 @@ from dynhull_cluster.divisions.wire import VERSION, WireError, pack, unpack
 from dynhull_cluster.shards import messages as say
 from dynhull_cluster.sockets import Sockets
 from dynhull_server.state.batch import NO_POINTS, Applied, Batch
-from dynhull_server.state.contents import keyed, windowed
+from dynhull_server.state.contents import gate, keyed, windowed
 from dynhull_server.state.errors import KeyMissingError, PointMissingError
 from dynhull_server.state.records import Contents, HullSettings, KeyRows, Window
 
@@ -33,7 +33,7 @@ MESSAGES = [
     Letter("0a", 0, 0, say.Undo(1, 2, 9)),
     Letter("0a", 0, 0, say.Apply(1, 2, (say.Step(1, Batch(POINTS, NO_POINTS, 0, count_missing=True), None, True),))),
     say.Step(2, windowed.Admitted(Batch(POINTS, NO_POINTS, 0, count_missing=False), TIMES, 5, 0, 0), 5, False),
-    say.Step(3, keyed.Admitted(ROWS, None, 1, 0, refuse_missing=True), None, False),
+    say.Step(3, gate.Admitted(ROWS, None, 1, 0, refuse_missing=True), None, False),
     say.Ask(1, 3, say.FoundOf(NUMBERS)),
     say.Ask(1, 3, say.CountOf(POINTS)),
     say.Ask(1, 3, say.SlotsOf(5, 1024)),

@@ -15,7 +15,7 @@ from dynhull.keys import PackedKeys
 from dynhull.static.trace import Round
 from dynhull_server.state import errors
 from dynhull_server.state.batch import Applied, Batch
-from dynhull_server.state.contents import keyed, windowed
+from dynhull_server.state.contents import gate, keyed, windowed
 from dynhull_server.state.records import Contents, HullSettings, KeyRows, QuarantineRules, Window
 
 from ..shards import messages
@@ -60,7 +60,7 @@ CLASSES: tuple[type, ...] = (
     Applied,
     Batch,
     windowed.Admitted,
-    keyed.Admitted,
+    gate.Admitted,
     keyed.Found,
     KeyRows,
     Contents,

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from dynhull_server.state.batch import NO_POINTS, Batch
-from dynhull_server.state.contents import keyed, replayed
+from dynhull_server.state.contents import gate, keyed, replayed
+from dynhull_server.state.contents.key_rows import select_keys
 from dynhull_server.state.contents.live import LiveContents
 from dynhull_server.state.contents.multiset import Multiset
 from dynhull_server.state.records import NO_TIME, HullSettings, Kept, KeyRows
@@ -23,7 +24,7 @@ def inverse_of(admitted: Admitted | None, contents: LiveContents, settings: Hull
     """
     if isinstance(contents, Multiset) and isinstance(admitted, Batch):
         return _of_points(admitted, contents)
-    if isinstance(contents, keyed.Keyed) and isinstance(admitted, keyed.Admitted) and admitted.clock is None:
+    if isinstance(contents, keyed.Keyed) and isinstance(admitted, gate.Admitted) and admitted.clock is None:
         return _of_keys(admitted.rows, contents)
     copy = Kept(0, contents.stored(), clock=contents.clock)
     return lambda: replayed(copy, settings)
@@ -46,7 +47,7 @@ def _of_keys(rows: KeyRows, contents: keyed.Keyed) -> Inverse:
     before = [(keys, contents.find(keys)) for keys in (rows.keys, rows.removes)]
 
     def undo() -> LiveContents:
-        nothing = keyed.select_keys(rows.keys, np.zeros(len(rows.keys), np.bool_))
+        nothing = select_keys(rows.keys, np.zeros(len(rows.keys), np.bool_))
         for keys, _ in before:
             _apply(contents, KeyRows(nothing, NO_POINTS, keys))
         for keys, found in before:
@@ -54,7 +55,7 @@ def _of_keys(rows: KeyRows, contents: keyed.Keyed) -> Inverse:
             for dated in (False, True):  # a put gives all of its keys a time, or none
                 which = found.present & ((times != NO_TIME) == dated)
                 if which.any():
-                    put = keyed.select_keys(keys, which)
+                    put = select_keys(keys, which)
                     _apply(contents, KeyRows(put, found.points[which], nothing, times[which] if dated else None))
         return contents
 
@@ -62,4 +63,4 @@ def _of_keys(rows: KeyRows, contents: keyed.Keyed) -> Inverse:
 
 
 def _apply(contents: keyed.Keyed, rows: KeyRows) -> None:
-    contents.apply(keyed.Admitted(rows, None, 0, 0, refuse_missing=False), 0)
+    contents.apply(gate.Admitted(rows, None, 0, 0, refuse_missing=False), 0)

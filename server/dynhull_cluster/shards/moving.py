@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dynhull_server.state.batch import NO_POINTS, Batch
-from dynhull_server.state.contents import keyed, windowed
+from dynhull_server.state.contents import gate, windowed
 from dynhull_server.state.records import NO_TIME, Contents, KeyRows
 
 from .parts import Admitted, keys_at
@@ -54,4 +54,4 @@ def puts(contents: Contents, clock: int | None) -> Iterator[Admitted]:
                 times[rows] if have_times and times is not None else None,
                 None if contents.deadlines is None else contents.deadlines[rows],
             )
-            yield keyed.Admitted(put, clock, 0, 0, refuse_missing=False)
+            yield gate.Admitted(put, clock, 0, 0, refuse_missing=False)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import Applied, Batch
-from dynhull_server.state.contents import keyed, windowed
+from dynhull_server.state.contents import gate, key_rows, windowed
 from dynhull_server.state.contents.multiset import missing_point
 from dynhull_server.state.errors import KeyMissingError, PointMissingError, RefusedError
 from dynhull_server.state.records import KeyRows, Keys
@@ -17,7 +17,7 @@ from dynhull_surface.counts import COUNTS
 
 from .placement import Hashes, key_hashes, point_hashes, shards_of
 
-Admitted = Batch | windowed.Admitted | keyed.Admitted
+Admitted = Batch | windowed.Admitted | gate.Admitted
 RowNumbers = npt.NDArray[np.intp]
 NO_ROWS: RowNumbers = np.empty(0, np.intp)
 
@@ -37,7 +37,7 @@ class Part:
 
 def refusable(admitted: Admitted) -> bool:
     """Whether it depends on the points of a shard whether it refuses the batch."""
-    if isinstance(admitted, keyed.Admitted):
+    if isinstance(admitted, gate.Admitted):
         return admitted.refuse_missing and len(admitted.rows.removes) > 0
     batch = _batch(admitted)
     return not batch.count_missing and len(batch.deletes) > 0
@@ -45,19 +45,19 @@ def refusable(admitted: Admitted) -> bool:
 
 def most_growth(admitted: Admitted) -> int:
     """The largest increase in the number of points."""
-    return len(admitted.rows.keys) if isinstance(admitted, keyed.Admitted) else _batch(admitted).growth
+    return len(admitted.rows.keys) if isinstance(admitted, gate.Admitted) else _batch(admitted).growth
 
 
 def refuse_repeated(rows: KeyRows) -> None:
     """Raise KeyRepeatedError if a key comes twice. O(k log k), and O(k) Python objects only where hashes are equal."""
     hashes = np.sort(np.concatenate([key_hashes(rows.keys), key_hashes(rows.removes)]))
     if (hashes[1:] == hashes[:-1]).any():
-        keyed.refuse_repeated(rows)
+        key_rows.refuse_repeated(rows)
 
 
 def divided(admitted: Admitted, count: int) -> dict[int, Part]:
     """The part of each shard that has one. O(k + count)."""
-    if isinstance(admitted, keyed.Admitted):
+    if isinstance(admitted, gate.Admitted):
         rows = admitted.rows
         puts = _by_shard(key_hashes(rows.keys), count)
         removes = _by_shard(key_hashes(rows.removes), count)
@@ -89,7 +89,7 @@ def first_refusal(admitted: Admitted, refusals: Sequence[tuple[Part, RefusedErro
     row, error = min(rows, key=lambda each: each[0])
     if isinstance(error, KeyMissingError):
         return KeyMissingError(row, error.key)
-    assert not isinstance(admitted, keyed.Admitted)  # it has no points to delete
+    assert not isinstance(admitted, gate.Admitted)  # it has no points to delete
     return missing_point(_batch(admitted), row, error.point)
 
 
@@ -118,7 +118,7 @@ def _points_part(admitted: Batch | windowed.Admitted, inserts: RowNumbers, delet
     return Part(windowed.Admitted(part, admitted.times[inserts], admitted.clock, 0, 0), deletes)
 
 
-def _keyed_part(admitted: keyed.Admitted, puts: RowNumbers, removes: RowNumbers) -> Part:
+def _keyed_part(admitted: gate.Admitted, puts: RowNumbers, removes: RowNumbers) -> Part:
     rows = admitted.rows
     part = KeyRows(
         keys_at(rows.keys, puts),
@@ -128,7 +128,7 @@ def _keyed_part(admitted: keyed.Admitted, puts: RowNumbers, removes: RowNumbers)
         None if rows.deadlines is None else rows.deadlines[puts],
         rows.condition,
     )
-    return Part(keyed.Admitted(part, admitted.clock, 0, 0, admitted.refuse_missing), removes)
+    return Part(gate.Admitted(part, admitted.clock, 0, 0, admitted.refuse_missing), removes)
 
 
 def keys_at(keys: Keys, rows: RowNumbers) -> Keys:

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from dynhull_server.state.batch import Batch, KeyedBatch
-from dynhull_server.state.contents import keyed, replayed
+from dynhull_server.state.contents import gate, replayed
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError, MisfitError, RefusedError
 from dynhull_server.state.producers import Producers
 from dynhull_server.state.records import HullSettings, Kept
@@ -49,7 +49,7 @@ class Plan:
         if refusals:
             return first_refusal(self.admitted, refusals)
         after, grows = points - sum(effect.expired for effect in effects.values()), True
-        if isinstance(self.admitted, keyed.Admitted):
+        if isinstance(self.admitted, gate.Admitted):
             applied = [effect.applied for effect in effects.values() if effect.applied is not None]
             new = sum(each.inserted for each in applied)
             after += new - sum(each.deleted for each in applied)
@@ -142,6 +142,6 @@ class Planner:
             if self._points + admitted.growth > self._most_points:
                 raise LimitExceededError("max_points", self._most_points)
             return admitted, None
-        if isinstance(admitted, keyed.Admitted):
+        if isinstance(admitted, gate.Admitted):
             refuse_repeated(admitted.rows)
         return admitted, admitted.clock

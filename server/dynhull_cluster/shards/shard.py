@@ -12,7 +12,8 @@ from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 from dynhull_server.state.batch import NO_POINTS
 from dynhull_server.state.contents import replayed
-from dynhull_server.state.contents.keyed import Keyed, keys_match
+from dynhull_server.state.contents.key_rows import keys_match
+from dynhull_server.state.contents.keyed import Keyed
 from dynhull_server.state.contents.live import LiveContents
 from dynhull_server.state.errors import RefusedError
 from dynhull_server.state.numbers import as_numbers

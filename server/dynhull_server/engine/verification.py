@@ -15,7 +15,7 @@ from dynhull.globe import Gnomonic
 from dynhull.static import chan
 from dynhull.static.trace import Round, Rounds
 
-from ..state.contents.keyed import keys_match
+from ..state.contents.key_rows import keys_match
 from ..state.fences.model.faults import FenceFault
 from ..state.numbers import as_numbers
 from ..state.records import Center, Contents

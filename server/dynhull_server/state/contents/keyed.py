@@ -1,29 +1,26 @@
 """Points with keys."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import compress
-from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from dynhull import DuplicateKeyError, GeoKeyedHull, KeyedHull, Put
 from dynhull.arrays import Points
-from dynhull.keys import PackedKeys, key_list
+from dynhull.keys import key_list
 
 from ..admission import GREATEST_TIME, Admission, admit, server_clock, shown, too_old
 from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
 from ..frames import Globe
 from ..records import (
-    FOREVER,
     NO_TIME,
     Cause,
     Center,
     Contents,
     Expiry,
-    HeldChange,
     HullSettings,
     KeyRows,
     Keys,
@@ -32,55 +29,29 @@ from ..records import (
     Times,
 )
 from .deadlines import Deadlines, Key
-from .judging import Plane, Sphere
+from .gate import NOTHING_HELD, Admitted, Gate
+from .key_rows import (
+    key_at,
+    library_times,
+    merged,
+    no_keys,
+    of_kind,
+    refuse_repeated,
+    selected,
+    stored_times,
+    update,
+)
 from .live import REPLAYED_TOGETHER, AnyKeyedHull
 from .mirror import Mirror
 from .places import move_center, require_puts
-from .quarantine import OFF, Quarantine, rows_of
+from .quarantine import Quarantine
 
-REMOVED = -1
 # Keys whose deadline has come are removed in parts of this size: reading a list of keys keeps other threads waiting.
 REMOVED_TOGETHER = 8192
 # Beyond twice the number of keys, deadlines of keys that have left are dropped.
 MOST_SPARE_DEADLINES = 1024
 KINDS = {"str": "strings", "int": "integers"}
 NOTHING_PUT = Put(0, 0, 0, 0, 0)
-
-
-@dataclass(slots=True)
-class Admitted:
-    """A batch without the rows that are too old.
-
-    Attributes:
-        rows: the rows.
-        clock: the clock of the hull after the batch, None for a hull without a clock.
-        late: the number of rows that are too old.
-        clamped: the number of rows whose time was reduced.
-        refuse_missing: whether a missing key among the removes refuses the batch.
-        young: (n,) which puts of the batch are not too old; None if all are not.
-        request: the batch if it is about the quarantine, otherwise None.
-    """
-
-    rows: KeyRows
-    clock: int | None
-    late: int
-    clamped: int
-    refuse_missing: bool
-    young: npt.NDArray[np.bool_] | None = None
-    request: KeyedBatch | None = None
-
-
-class Verdict(NamedTuple):
-    """What the quarantine adds to the result of a batch; `missing` is negative for removes that it knows."""
-
-    held: Sequence[int] = ()
-    released: int = 0
-    dropped: int = 0
-    stale: int = 0
-    missing: int = 0
-
-
-NOTHING_HELD = Verdict()
 
 
 @dataclass(slots=True)
@@ -110,7 +81,6 @@ class Keyed:
         rules: the rules of the quarantine; None for those of the settings.
 
     Attributes:
-        quarantine: the positions that break rules; None for a hull that has never had any rule.
         timed: whether its points have times.
         mirror: the keys of a geographic hull in the plane, while fences compare them.
         ended: the keys whose deadline had come when points last left.
@@ -144,8 +114,12 @@ class Keyed:
         self.timed = settings.window is not None or settings.by_event_time
         if stored.keys is not None:
             self._load(stored.keys, stored)
-        rules = rules or settings.quarantine
-        self.quarantine = None if rules is None else Quarantine(self._kind, rules, stored.held)
+        self._gate = Gate(settings, rules, stored.held)
+
+    @property
+    def quarantine(self) -> Quarantine | None:
+        """The positions that break rules; None for a hull that has never had any rule."""
+        return self._gate.quarantine
 
     @property
     def due(self) -> int | None:
@@ -168,9 +142,9 @@ class Keyed:
             field = "inserts" if len(batch.inserts) else "deletes"
             raise MisfitError(field, f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them")
         else:  # empty
-            batch = KeyedBatch(self._kind, self._no_keys(), NO_POINTS, self._no_keys())
+            batch = KeyedBatch(self._kind, no_keys(self._kind), NO_POINTS, no_keys(self._kind))
         if batch.of_quarantine:
-            batch = self._of_quarantine(batch)
+            batch = self._gate.opened(batch, self.globe)
         quarantine = self.quarantine
         rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
         admission = admit(self._settings, batch.times, len(batch.keys), "puts.times", arrived, self.clock)
@@ -186,7 +160,7 @@ class Keyed:
             refuse_repeated(rows)
             if not batch.of_quarantine:  # a released position that has just become too old is missing
                 late = len(rows.keys) - int(np.count_nonzero(admission.young))
-            rows = _selected(rows, admission.young)
+            rows = selected(rows, admission.young)
         admitted = Admitted(rows, admission.clock, late, admission.clamped, batch.refuse_missing, admission.young)
         if batch.of_quarantine:
             admitted.request = batch
@@ -204,7 +178,7 @@ class Keyed:
                 there |= np.array([key in self.quarantine for key in key_list(admitted.rows.removes)], np.bool_)
             if not there.all():
                 row = int(np.argmin(there))
-                raise KeyMissingError(row, _key(admitted.rows.removes, row))
+                raise KeyMissingError(row, key_at(admitted.rows.removes, row))
 
     def expires_before(self, admitted: Admitted) -> int | None:
         """The clock that the batch leads to, if points leave at that time; None if none do."""
@@ -223,7 +197,7 @@ class Keyed:
         if judged or (len(rows.removes) and (len(rows.keys) or admitted.refuse_missing)):
             self.check(admitted)
         changes = hull.changes
-        verdict = self._judge(admitted, revision) if judged else NOTHING_HELD
+        verdict = self._gate.judge(admitted, revision, hull, self.globe, self._written) if judged else NOTHING_HELD
         rows = admitted.rows
         try:
             put, removed, evicted = self._carry_out(rows)
@@ -232,7 +206,7 @@ class Keyed:
             raise KeyRepeatedError(error.key, (part, error.rows[0]), (part, error.rows[1])) from None
         self.clock = admitted.clock
         if rows.held is not None:
-            self._follow(rows.held)
+            self._gate.follow(rows.held)
         return Applied(
             revision,
             put.new,
@@ -263,7 +237,7 @@ class Keyed:
     def recenter(self, center: Center | None) -> KeyRows:
         """Move the centre of a geographic hull, or raise MisfitError. Returns no rows. O(n log n)."""
         move_center(self.hull, center)
-        return KeyRows(self._no_keys(), NO_POINTS, self._no_keys())
+        return KeyRows(no_keys(self._kind), NO_POINTS, no_keys(self._kind))
 
     def expire(self, clock: int) -> Expiry | None:
         """Advance the clock, and remove the points that leave. If none do, the clock stays."""
@@ -273,8 +247,7 @@ class Keyed:
         if not leaving:
             return None
         self.clock = clock
-        if self.quarantine is not None:
-            self.quarantine.expire(until, clock)
+        self._gate.expire(clock)
         return Expiry(until, leaving)
 
     def replay(self, records: Iterable[Record]) -> None:
@@ -286,7 +259,7 @@ class Keyed:
             assert isinstance(rows, KeyRows | Expiry)
             alone = record.center is not None or size >= REPLAYED_TOGETHER
             if group and (alone or not self._may_follow(group[-1], rows)):
-                self._carry_out(_merged(group))
+                self._carry_out(merged(group))
                 group, size = [], 0
             if record.center is not None:
                 move_center(self.hull, record.center)
@@ -297,12 +270,11 @@ class Keyed:
                 group.append(rows)
                 size += len(rows)
             self.clock = record.clock
-            if self.quarantine is not None:
-                self.quarantine.expire(too_old(self._settings, record.clock), record.clock)
+            self._gate.expire(record.clock)
             if isinstance(rows, KeyRows) and rows.held is not None:
-                self._follow(rows.held)
+                self._gate.follow(rows.held)
         if group:
-            self._carry_out(_merged(group))
+            self._carry_out(merged(group))
 
     def _may_follow(self, before: KeyRows, rows: KeyRows | Expiry) -> bool:
         """Whether two changes have the effect of one that has the last position of each key."""
@@ -335,71 +307,6 @@ class Keyed:
         times = stored_times(self.hull.times(keys)) if self.timed else None
         return Found(points, ~np.isnan(points[:, 0]), times)
 
-    # Quarantine
-
-    def _of_quarantine(self, batch: KeyedBatch) -> KeyedBatch:
-        """A batch about the quarantine, with the positions that it lets in; raises InvalidBatchError."""
-        if len(batch.keys) or len(batch.removes):
-            problem = "a batch that releases or drops keys in quarantine, or sets its rules, has no puts and removes"
-            raise InvalidBatchError(batch.field, f"{len(batch.keys) + len(batch.removes)} keys", problem)
-        named: dict[Key, tuple[str, int]] = {}
-        for field, keys in (("releases", batch.releases), ("drops", batch.drops)):
-            for row, key in enumerate(() if keys is None else key_list(keys)):
-                first = named.setdefault(key, (field, row))
-                if first != (field, row):
-                    raise KeyRepeatedError(key, first, (field, row))
-        if self.quarantine is None or batch.releases is None:
-            return batch
-        found = self.quarantine.of(key for key in key_list(batch.releases) if key in self.quarantine)
-        misplaced = None if self.globe is None else self.globe.refusal(found.points)
-        if misplaced is not None:  # the centre has moved since
-            key = key_list(found.keys)[misplaced.row]
-            held = f"{key!r}, held at {misplaced.place}"
-            raise InvalidBatchError("releases", held, misplaced.problem, key_list(batch.releases).index(key))
-        has_times, has_deadlines = (found.times != NO_TIME).any(), (found.deadlines != FOREVER).any()
-        return replace(
-            batch,
-            keys=found.keys,
-            points=found.points,
-            times=found.times if has_times or self._settings.by_event_time else None,
-            deadlines=found.deadlines if has_deadlines else None,
-        )
-
-    def _judge(self, admitted: Admitted, revision: int) -> Verdict:
-        """Leave in a batch the rows that are let in, and what it changes in the quarantine. Drops what is too old."""
-        rows, request, quarantine = admitted.rows, admitted.request, self.quarantine
-        if quarantine is not None:
-            quarantine.expire(too_old(self._settings, admitted.clock), admitted.clock)
-        if request is not None:
-            return self._carry_out_request(request, rows)
-        assert quarantine is not None  # `apply` has asked
-        if not quarantine.has_rules and not quarantine:
-            return NOTHING_HELD
-        written = self._written(rows)
-        frame = Plane() if self.globe is None else Sphere(self.globe.center)
-        judged = quarantine.judge(rows, written, self.hull, frame, revision)
-        held = judged.held
-        if held and admitted.young is not None:
-            held = np.flatnonzero(admitted.young)[held].tolist()
-        if not judged.let_in.all():
-            rows = admitted.rows = _selected(rows, judged.let_in)
-        rows.held = judged.change
-        return Verdict(held, judged.released, judged.dropped, judged.stale, -judged.only_held)
-
-    def _carry_out_request(self, request: KeyedBatch, rows: KeyRows) -> Verdict:
-        quarantine = self.quarantine
-        wanted = [] if request.releases is None else key_list(request.releases)
-        unwanted = [] if request.drops is None else key_list(request.drops)
-        left = [key for key in (*wanted, *unwanted) if quarantine is not None and key in quarantine]
-        rows.held = HeldChange(rows_of(self._no_keys(), []), _of_kind(left, self._no_keys()), request.rules)
-        released = sum(quarantine is not None and key in quarantine for key in wanted)
-        return Verdict([], released, len(left) - released, 0, len(wanted) + len(unwanted) - len(left))
-
-    def _follow(self, change: HeldChange) -> None:
-        if self.quarantine is None:
-            self.quarantine = Quarantine(self._kind, OFF)
-        self.quarantine.follow(change)
-
     # Changes
 
     def _load(self, keys: Keys, stored: Contents) -> None:
@@ -419,29 +326,24 @@ class Keyed:
 
     def _carry_out(self, rows: KeyRows) -> tuple[Put, int, int]:
         """Apply rows whose keys are all different. Returns the counts of the puts, keys removed, and keys evicted."""
-        hull, times, mirror = self.hull, rows.times, self.mirror
-        if mirror is not None:
-            mirror.note(rows.keys)
-            mirror.note(rows.removes)
-            mirror.plane.remove_many(rows.removes, missing="ignore")
+        hull, times = self.hull, rows.times
+        if self.mirror is not None:
+            self.mirror.change(rows)
         removed = hull.remove_many(rows.removes, missing="ignore") if len(rows.removes) else 0
         written = None
         if rows.deadlines is not None or len(self._deadlines):
             written = self._written(rows)
         put = NOTHING_PUT
         if len(rows.keys):  # otherwise a hull by event time would ask for times
-            put = _update(hull, rows, rows.points)
-            if mirror is not None:
-                _update(mirror.plane, rows, mirror.project(rows.points))
+            put = update(hull, rows, rows.points)
         if times is not None:
             self._note_times(times)
         if written is not None:
             self._set_deadlines(rows, written)
         window = self._settings.window
         surplus = 0 if window is None or not window.max_points else len(hull) - window.max_points
-        if surplus > 0 and mirror is not None:
-            mirror.note_inside()
-            mirror.plane.evict(surplus)
+        if surplus > 0 and self.mirror is not None:
+            self.mirror.evict(surplus)
         return put, removed, hull.evict(surplus) if surplus > 0 else 0
 
     def _note_times(self, times: Times) -> None:
@@ -469,18 +371,18 @@ class Keyed:
         self._deadlines.drop(key_list(rows.removes))
         if len(self._deadlines) > 2 * len(self.hull) + MOST_SPARE_DEADLINES:
             keys = self._deadlines.keys()
-            there = self._has(_of_kind(keys, rows.keys))
+            there = self._has(of_kind(keys, rows.keys))
             self._deadlines.drop(compress(keys, (~there).tolist()))  # evicted, or too old before their deadline
 
     def _expire(self, until: int | None, clock: int) -> int:
         """Remove the points that leave. Returns their number."""
         hull, mirror = self.hull, self.mirror
         leaving = 0
+        if until is not None and until < -GREATEST_TIME:
+            until = None
         if mirror is not None:
-            mirror.note_inside()
-        if until is not None and until >= -GREATEST_TIME:
-            if mirror is not None:
-                mirror.plane.expire(until)
+            mirror.expire(until)
+        if until is not None:
             leaving = hull.expire(until)
             oldest = hull.oldest()
             self._earliest = None if oldest is None else int(oldest)
@@ -488,7 +390,7 @@ class Keyed:
         for first in range(0, len(ended), REMOVED_TOGETHER):
             leaving += hull.remove_many(ended[first : first + REMOVED_TOGETHER], missing="ignore")
             if mirror is not None:
-                mirror.plane.remove_many(ended[first : first + REMOVED_TOGETHER], missing="ignore")
+                mirror.remove(ended[first : first + REMOVED_TOGETHER])
         return leaving
 
     # Rules
@@ -529,7 +431,7 @@ class Keyed:
         if not self.quarantine:
             return set()
         keys = self.quarantine.staying(too_old(self._settings, clock), clock)
-        there = self._there(_of_kind(keys, self._no_keys()), clock)
+        there = self._there(of_kind(keys, no_keys(self._kind)), clock)
         return set(compress(keys, (~there).tolist()))
 
     def _has(self, keys: Keys) -> npt.NDArray[np.bool_]:
@@ -554,103 +456,3 @@ class Keyed:
         if clock is None:
             return len(self.hull)
         return int(np.count_nonzero(self._there(self.hull.entities()[0], clock)))
-
-    def _no_keys(self) -> Keys:
-        return PackedKeys(b"", b"") if self._kind == "str" else np.empty(0, np.uint64)
-
-
-def _update(hull: AnyKeyedHull, rows: KeyRows, points: Points) -> Put:
-    """Put the keys of a change at points."""
-    keys, times, only = rows.keys, rows.times, rows.condition
-    if times is None:
-        return hull.update(keys, points, None, only=only)
-    dated = times != NO_TIME
-    if dated.all():
-        return hull.update(keys, points, library_times(times), only=only)
-    # Released together: some were held with a time, some without.
-    with_time = hull.update(select_keys(keys, dated), points[dated], library_times(times[dated]), only=only)
-    without = hull.update(select_keys(keys, ~dated), points[~dated], None, only=only)
-    return Put(*map(sum, zip(with_time, without, strict=True)))
-
-
-def stored_times(times: npt.NDArray[np.float64]) -> Times:
-    """The library's times as they are stored: NO_TIME instead of NaN."""
-    none = np.isnan(times)
-    stored = np.where(none, 0.0, times).astype(np.int64)
-    stored[none] = NO_TIME
-    return stored
-
-
-def library_times(times: Times) -> npt.NDArray[np.float64]:
-    """The inverse of `stored_times`."""
-    return np.where(times == NO_TIME, np.nan, times.astype(np.float64))
-
-
-def _selected(rows: KeyRows, which: npt.NDArray[np.bool_]) -> KeyRows:
-    """The puts of some rows, and all removes."""
-    times = None if rows.times is None else rows.times[which]
-    deadlines = None if rows.deadlines is None else rows.deadlines[which]
-    return KeyRows(select_keys(rows.keys, which), rows.points[which], rows.removes, times, deadlines, rows.condition)
-
-
-def select_keys(keys: Keys, which: npt.NDArray[np.bool_]) -> Keys:
-    """The keys of some rows."""
-    if not isinstance(keys, PackedKeys):
-        return keys[which]
-    lengths = np.frombuffer(keys.lengths, np.uint8)
-    return PackedKeys(lengths[which], np.frombuffer(keys.data, np.uint8)[np.repeat(which, lengths)])
-
-
-def refuse_repeated(rows: KeyRows) -> None:
-    """Raise KeyRepeatedError if a key comes twice among the puts and removes. O(k)."""
-    keys = [*key_list(rows.keys), *key_list(rows.removes)]
-    if len(set(keys)) == len(keys):
-        return
-    puts = len(rows.keys)
-    seen: dict[Key, int] = {}
-    for number, key in enumerate(keys):
-        first = seen.setdefault(key, number)
-        if first != number:
-            places = [("puts.keys", each) if each < puts else ("removes", each - puts) for each in (first, number)]
-            raise KeyRepeatedError(key, places[0], places[1])
-
-
-def _merged(group: list[KeyRows]) -> KeyRows:
-    """One change with the effect of several: the last position of each key."""
-    if len(group) == 1:
-        return group[0]
-    last: dict[Key, int] = {}  # the row of the last put, REMOVED after a removal
-    number = 0
-    for rows in group:
-        for key in key_list(rows.removes):
-            last[key] = REMOVED
-        for key in key_list(rows.keys):
-            last[key] = number
-            number += 1
-    put = [key for key, row in last.items() if row != REMOVED]
-    chosen = np.array([last[key] for key in put], np.intp)
-    dated = [rows.times for rows in group if rows.times is not None]
-    times = np.concatenate(dated)[chosen] if dated else None
-    kind = group[0].keys
-    points = np.concatenate([rows.points for rows in group])[chosen]
-    removed = [key for key, row in last.items() if row == REMOVED]
-    return KeyRows(_of_kind(put, kind), points, _of_kind(removed, kind), times)
-
-
-def _of_kind(keys: list[Any], kind: Keys) -> Keys:
-    return PackedKeys.pack(keys) if isinstance(kind, PackedKeys) else np.array(keys, np.uint64)
-
-
-def _key(keys: Keys, row: int) -> Key:
-    return keys[row] if isinstance(keys, PackedKeys) else int(keys[row])
-
-
-def keys_match(contents: Contents, points: Points) -> bool:
-    """Whether the positions of the keys are these points in lexicographic order, and each key comes once."""
-    keys = contents.keys
-    assert keys is not None  # those of a keyed hull
-    different = len(set(keys)) if isinstance(keys, PackedKeys) else len(np.unique(keys))
-    if not different == len(keys) == len(contents.points):
-        return False
-    x, y = contents.points.T
-    return np.array_equal(contents.points[np.lexsort((y, x))], points)

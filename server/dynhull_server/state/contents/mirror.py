@@ -9,15 +9,19 @@ from dynhull.arrays import Points
 from dynhull.globe import Gnomonic
 from dynhull.keys import Keys, key_list
 
+from .key_rows import update
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
+
+    from ..records import KeyRows
 
 Key = str | int
 Position = tuple[float, float]
 
 
 class Mirror:
-    """A hull in the plane that gets each change of a geographic hull.
+    """A hull in the plane that is told of each change of a geographic hull before it takes place, and follows it.
 
     Args:
         hull: the geographic hull, which has a centre that stays.
@@ -58,3 +62,26 @@ class Mirror:
         """Take note of where those keys are that may leave."""
         for keys in self.inside():
             self.note(keys)
+
+    def change(self, rows: "KeyRows") -> None:
+        """Keys are put and removed."""
+        self.note(rows.keys)
+        self.note(rows.removes)
+        self.plane.remove_many(rows.removes, missing="ignore")
+        if len(rows.keys):
+            update(self.plane, rows, self.project(rows.points))
+
+    def evict(self, number: int) -> None:
+        """The oldest keys leave."""
+        self.note_inside()
+        self.plane.evict(number)
+
+    def expire(self, until: int | None) -> None:
+        """The keys whose time is at most `until` leave, or others do by their deadlines."""
+        self.note_inside()
+        if until is not None:
+            self.plane.expire(until)
+
+    def remove(self, keys: "Sequence[Key]") -> None:
+        """Keys leave by their deadlines, after `expire`."""
+        self.plane.remove_many(keys, missing="ignore")

@@ -14,7 +14,8 @@ from dynhull.globe import Boundary, Gnomonic
 from dynhull.keys import PackedKeys, key_list
 
 from ...batch import NO_POINTS
-from ...contents.keyed import Keyed, stored_times
+from ...contents.key_rows import stored_times
+from ...contents.keyed import Keyed
 from ...contents.live import AnyKeyedHull
 from ...hull import Hull
 from ...hull_state import HullState
