@@ -25,6 +25,7 @@ from ..state.fences.model.requests import (
     ReplaceFence,
 )
 from ..state.fences.trip.leg import members
+from ..state.registry import page_of
 from ..storage.port import Storage, StorageError
 from .driver import Driver
 from .waiter import Waiter
@@ -170,17 +171,8 @@ class Fences:
 
         Only names that begin with one of the prefixes. These are sorted, and none of them begins with another.
         """
-        fences: list[LiveFence] = []
-        for prefix in prefixes:
-            for name in self._driver.core.fences.irange(minimum=max(prefix, after)):
-                if not name.startswith(prefix):
-                    break
-                if name == after:
-                    continue
-                if len(fences) == size:
-                    return fences, True
-                fences.append(self.get(name))
-        return fences, False
+        names, more = page_of(self._driver.core.fences, prefixes, after, size)
+        return [self.get(name) for name in names], more
 
     async def create(self, name: str, config: FenceConfig) -> LiveFence:
         """Create a fence, or raise the error that refuses it."""

@@ -7,6 +7,7 @@ from ..state.batch import Applied
 from ..state.errors import HullUnsuitableError
 from ..state.hull import Hull
 from ..state.records import DEFAULT, HullSettings
+from ..state.registry import page_of
 from ..state.requests import CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 from ..storage.port import Storage
 from .batch_stream import BatchStream
@@ -65,17 +66,8 @@ class Hulls:
 
         Only names that begin with one of the prefixes. These are sorted, and none of them begins with another.
         """
-        hulls: list[LiveHull] = []
-        for prefix in prefixes:
-            for name in self._driver.core.hulls.irange(minimum=max(prefix, after)):
-                if not name.startswith(prefix):
-                    break
-                if name == after:
-                    continue
-                if len(hulls) == size:
-                    return hulls, True
-                hulls.append(self.get(name))
-        return hulls, False
+        names, more = page_of(self._driver.core.hulls, prefixes, after, size)
+        return [self.get(name) for name in names], more
 
     async def create(self, name: str, settings: HullSettings = DEFAULT) -> LiveHull:
         """Create an empty hull, or raise HullExistsError, LimitExceededError or NotStoredError."""

@@ -1,7 +1,7 @@
 """The hulls and fences that are committed, and the numbers and places of new ones."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sortedcontainers import SortedDict
@@ -109,3 +109,21 @@ class Registry:
         number = self._next_number
         self._next_number += 1
         return number
+
+
+def page_of(names: "SortedDict[str, Any]", prefixes: Sequence[str], after: str, size: int) -> tuple[list[str], bool]:
+    """At most `size` names that follow `after` and begin with a prefix, and whether there are more.
+
+    The prefixes are sorted, and none of them begins with another.
+    """
+    found: list[str] = []
+    for prefix in prefixes:
+        for name in names.irange(minimum=max(prefix, after)):
+            if not name.startswith(prefix):
+                break
+            if name == after:
+                continue
+            if len(found) == size:
+                return found, True
+            found.append(name)
+    return found, False
