@@ -257,29 +257,13 @@ class Driver:
     def commit(self, changes: list[Any]) -> "asyncio.Future[None]":
         """Commit steps of a snapshot or sweep, together with batches; the future raises the error of a failure."""
         done: asyncio.Future[None] = self._loop.create_future()
-
-        def finish(error: Exception | None) -> None:
-            if done.done():
-                return
-            if error is None:
-                done.set_result(None)
-            else:
-                done.set_exception(error)
-
-        self._commits.submit(changes, lambda error, _: self._from_thread(partial(finish, error)))
+        self._commits.submit(changes, lambda error, _: self._from_thread(partial(_settle, done, error)))
         return done
 
     def commit_from_thread(self, changes: list[Any]) -> None:
         """Commit, from another thread, changes of shards; raises the error of a failure."""
         done: Future[None] = Future()
-
-        def finish(error: Exception | None, _: bool) -> None:
-            if error is None:
-                done.set_result(None)
-            else:
-                done.set_exception(error)
-
-        self._commits.submit(changes, finish)
+        self._commits.submit(changes, lambda error, _: _settle(done, error))
         done.result()
 
     # Effects
@@ -411,3 +395,13 @@ class Driver:
         since = self._commits.since
         if since is not None and now - since > STUCK:
             self.supervisor.failed("commits", TimeoutError(f"a commit has been running for {now - since:.0f} s"))
+
+
+def _settle(done: "Future[None] | asyncio.Future[None]", error: Exception | None) -> None:
+    """Have whoever waits for a commit hear of it; they may have gone."""
+    if done.done():
+        return
+    if error is None:
+        done.set_result(None)
+    else:
+        done.set_exception(error)
