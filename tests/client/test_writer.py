@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cluster import descendants
-from patience import wait_until, waits
+from patience import PATIENCE, wait_until, waits
 from proxy import proxy
 from server_process import server_process
 
@@ -142,6 +142,14 @@ def acknowledged(writer, sequence: int) -> None:
 def test_every_batch_once_though_the_server_is_killed(tmp_path: Path, connect: type[HullClient]) -> None:
     """Three servers, one after another, on the same data; the first two are killed in the middle of batches."""
     data = ("--data", str(tmp_path))
+    kills = [threading.Event(), threading.Event()]
+
+    def batches() -> Iterator[np.ndarray]:
+        for number, batch in enumerate(MANY):
+            if number in (300, 600):  # a fast machine would have all of them applied before it is killed
+                kills[number // 300 - 1].wait(PATIENCE)
+            yield batch
+
     with (
         server_process(*data, killed=True) as first,
         proxy(first.address) as way,
@@ -149,15 +157,15 @@ def test_every_batch_once_though_the_server_is_killed(tmp_path: Path, connect: t
     ):
         client.create_hull("a")
         with client.writer("a", producer="p", batch_points=5) as writer, ExitStack() as stack:
-            with putting(writer, MANY):
+            with putting(writer, batches()):
                 acknowledged(writer, 150)
                 first.process.kill()
-                assert writer.sequence < 800
+                kills[0].set()
                 second = stack.enter_context(server_process(*data, killed=True, torn=True))
                 way.server = second.address
                 acknowledged(writer, 400)
                 second.process.kill()
-                assert writer.sequence < 800
+                kills[1].set()
                 way.server = stack.enter_context(server_process(*data, torn=True)).address
             hull = client.get_hull("a")
             assert (hull.revision, writer.sequence, hull.info.points) == (800, 800, 4000)
