@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +14,9 @@ from dynhull_surface.described import option_of
 from dynhull_surface.reasons import Exit
 
 from ..command import LogForm
+
+if TYPE_CHECKING:
+    from collections.abc import Coroutine
 
 
 class Tombstones(StrEnum):
@@ -138,18 +141,14 @@ def ingest(
     Bad messages are counted, logged and, with --bad, kept aside. Exit code 1 if there were more than --max-bad, or if
     the broker has removed messages that were not read yet, unless --accept-gaps.
     """
-    import asyncio
-
     import structlog
 
     from dynhull_client import AsyncHullClient
 
     from .. import logs
-    from ..urls import without_secrets
     from .bad import BadMessages
-    from .feed import DoubtfulError, FeedError
     from .feeds import FeedOptions, feeds_of
-    from .ingest import IngestError, run
+    from .ingest import run
     from .mapping import Mapping
     from .pump import Settings
 
@@ -193,8 +192,19 @@ def ingest(
                 report=seconds["--report"].total_seconds() if seconds["--report"] else 10.0,
             )
 
+    _run_to_end(serve(), source, to_end=to_end)
+
+
+def _run_to_end(serving: "Coroutine[Any, Any, bool]", source: str, *, to_end: bool) -> None:
+    """Run an ingest, and end with the exit code of what it has ended with."""
+    import asyncio
+
+    from ..urls import without_secrets
+    from .feed import DoubtfulError, FeedError
+    from .ingest import IngestError
+
     try:
-        ended = asyncio.run(serve())
+        ended = asyncio.run(serving)
     except DoubtfulError as error:
         fail(Exit.UNUSABLE, str(error))
     except FeedError as error:

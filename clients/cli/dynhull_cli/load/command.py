@@ -18,6 +18,8 @@ from .options import STANDARD_INPUT, Format, Options
 if TYPE_CHECKING:
     from dynhull_client import HullClient, HullInfo
 
+    from .sending import Sending
+
 
 def _input(text: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, help=text, rich_help_panel="Input", **more)
@@ -159,9 +161,8 @@ def load(
     from .source import integers_of_any_size, open_source
 
     _check(decimal, replace=replace, resume=resume, again=again)
-    for option, value in (("--time-unit", time_unit), ("--time-zone", time_zone), ("--time-format", time_format)):
-        if value is not None and time is None and expires is None:
-            raise ValueError(f"{option} is given with --time or --expires")
+    if time is None and expires is None:
+        _refuse_forms({"--time-unit": time_unit, "--time-zone": time_zone, "--time-format": time_format})
     of_puts = conditions(only, ttl, key=key, expires=expires)
     options = Options(
         x,
@@ -226,14 +227,24 @@ def load(
             replace=replace,
             conditions=of_puts,
         )
+    _report(name, sending, bad.count, as_json)
+
+
+def _report(name: str, sending: "Sending", bad_rows: int, as_json: bool) -> None:
     loaded, counts, points = sending.counts.taken, sending.counts, sending.points
     if as_json:
-        typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad.count, points=points, **counts))
+        typer.echo(json_line(name=name, loaded=loaded, bad_rows=bad_rows, points=points, **counts))
     else:
         more = f" ({counts})" if str(counts) else ""
-        typer.echo(
-            f"{name}: {plural(loaded, 'point')} loaded{more}" + ("" if points is None else f", {points:,} in the hull")
-        )
+        there = "" if points is None else f", {points:,} in the hull"
+        typer.echo(f"{name}: {plural(loaded, 'point')} loaded{more}{there}")
+
+
+def _refuse_forms(options: dict[str, object]) -> None:
+    """Raise ValueError for an option about the form of times, of which there are none."""
+    for option, value in options.items():
+        if value is not None:
+            raise ValueError(f"{option} is given with --time or --expires")
 
 
 def _has_integer_keys(known: "HullInfo | None", name: str) -> bool:
