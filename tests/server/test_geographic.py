@@ -112,7 +112,7 @@ def test_first_points_too_far_apart_choose_no_centre(client, name):
 
 def test_questions_about_places_that_are_none_are_refused_with_their_row(client, fiji):
     for question in (client.locate, client.count, client.distance, client.tangents):
-        with pytest.raises(InvalidRequestError, match=r"points\[1\] is \(0\.0, 91\.0\): a latitude is from -90 to 90"):
+        with pytest.raises(InvalidRequestError, match=r"points row 1 is \(0\.0, 91\.0\): a latitude is from -90 to 90"):
             question(fiji, [(0, 0), (0, 91)])
     with pytest.raises(InvalidRequestError, match=r"points\[0\] is \(0\.0, 0\.0\): 162\.7\d+ degrees from the centre"):
         client.tangents(fiji, [(0, 0)])

@@ -61,7 +61,7 @@ def test_keys_of_a_hull_about_another_centre_are_located(client, fiji, name):
 
 def test_a_put_too_far_is_refused_with_its_row_in_any_batch(client, fiji, name):
     with pytest.raises(
-        InvalidRequestError, match=r"batch\.puts\.points\[1\] is \(5\.0, 50\.0\): 1\d\d\.\d+ degrees from"
+        InvalidRequestError, match=r"points row 1 is \(5\.0, 50\.0\): 1\d\d\.\d+ degrees from"
     ):
         client.put(fiji, ["Suva", "Paris"], [(178, -18), (5, 50)])
     with pytest.raises(InvalidRequestError, match=r"batch\.puts\.points\[0\] is \(5\.0, 95\.0\): a latitude"):
@@ -83,7 +83,7 @@ def test_a_window_on_the_globe(client, name):
     assert late_and_far.late == 1
     found = client.get_hull(name)
     np.testing.assert_array_equal(found.vertices, dynhull.GeoHull([*places[1:], (-178, 1)], center).vertices())
-    with pytest.raises(InvalidRequestError, match=r"batch\.inserts\[1\] is \(10\.0, 0\.0\)"):
+    with pytest.raises(InvalidRequestError, match=r"insert row 1 is \(10\.0, 0\.0\)"):
         client.apply(name, insert=[(0, 0), (10, 0)], times=[MOMENT - 99 * SECOND, MOMENT + 66 * SECOND])
     assert client.verify(name).equal
 

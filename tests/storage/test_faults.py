@@ -174,7 +174,7 @@ def test_a_snapshot_that_fails_leaves_nothing_behind_for_long(storage, disk):
         storage.commit([next(steps)])
     steps.close()
     assert storage.read(1).revision == 0
-    assert sum(storage.commit([step]) is None for step in storage.sweep()) == 1
+    assert len([storage.commit([step]) for step in storage.sweep()]) == 1
     assert list(storage.sweep()) == []
 
 

@@ -165,7 +165,7 @@ def test_parquet(data, tmp_path):
 
 @pytest.mark.parametrize(("keyed", "keys"), [("str", PackedKeys.pack(STRINGS)), ("int", np.array(INTEGERS, np.uint64))])
 def test_what_is_exported_is_imported(tmp_path, keyed, keys):
-    times = np.array([time if time != NO_TIME else 1 for time in TIMES])
+    times = np.array([time if time != NO_TIME else 1 for time in TIMES]).astype("datetime64[us]")
     with server_process("--data", str(tmp_path / "data")) as server, HullClient(server.address) as client:
         client.create_hull("from", keyed=keyed)
         client.put("from", keys, POINTS, times)
