@@ -114,9 +114,11 @@ def test_questions_about_places_that_are_none_are_refused_with_their_row(client,
     for question in (client.locate, client.count, client.distance, client.tangents):
         with pytest.raises(InvalidRequestError, match=r"points row 1 is \(0\.0, 91\.0\): a latitude is from -90 to 90"):
             question(fiji, [(0, 0), (0, 91)])
-    with pytest.raises(InvalidRequestError, match=r"points\[0\] is \(0\.0, 0\.0\): 162\.7\d+ degrees from the centre"):
+    with pytest.raises(InvalidRequestError, match=r"points row 0 is \(0\.0, 0\.0\): 162\.7\d+ degrees from the centre"):
         client.tangents(fiji, [(0, 0)])
-    with pytest.raises(InvalidRequestError, match=r"targets\[0\] is \(0\.0, 0\.0\): 162\.7\d+ degrees from the centre"):
+    with pytest.raises(
+        InvalidRequestError, match=r"targets row 0 is \(0\.0, 0\.0\): 162\.7\d+ degrees from the centre"
+    ):
         client.intersect_lines(fiji, [(179, 0)], [(0, 0)])
     with pytest.raises(InvalidRequestError, match=r"targets\[0\] is \(-180\.0, 0\.0\): .* no line"):
         client.intersect_lines(fiji, [(180, 0)], [(-180, 0)])

@@ -62,11 +62,11 @@ def test_keys_of_a_hull_about_another_centre_are_located(client, fiji, name):
 def test_a_put_too_far_is_refused_with_its_row_in_any_batch(client, fiji, name):
     with pytest.raises(InvalidRequestError, match=r"points row 1 is \(5\.0, 50\.0\): 1\d\d\.\d+ degrees from"):
         client.put(fiji, ["Suva", "Paris"], [(178, -18), (5, 50)])
-    with pytest.raises(InvalidRequestError, match=r"batch\.puts\.points\[0\] is \(5\.0, 95\.0\): a latitude"):
+    with pytest.raises(InvalidRequestError, match=r"points row 0 is \(5\.0, 95\.0\): a latitude"):
         client.put(fiji, ["Paris"], [(5, 95)], only="present")
     plane = f"{name}-plane"
     client.create_hull(plane, keyed="str")
-    with pytest.raises(InvalidRequestError, match=r"batches\[1\]\.batch\.puts\.points\[0\] is \(5\.0, 50\.0\)"):
+    with pytest.raises(InvalidRequestError, match=r"points row 0 is \(5\.0, 50\.0\)"):
         client.transfer({plane: Batch(keys=["a"], points=[(5, 50)]), fiji: Batch(keys=["a"], points=[(5, 50)])})
     assert (client.get_hull(plane).revision, entities_of(client, fiji)) == (0, FLEET)
 

@@ -165,14 +165,15 @@ def test_parquet(data, tmp_path):
 
 @pytest.mark.parametrize(("keyed", "keys"), [("str", PackedKeys.pack(STRINGS)), ("int", np.array(INTEGERS, np.uint64))])
 def test_what_is_exported_is_imported(tmp_path, keyed, keys):
-    times = np.array([time if time != NO_TIME else 1 for time in TIMES]).astype("datetime64[us]")
+    times = np.array([time if time != NO_TIME else 1 for time in TIMES])
+    dates = times.astype("datetime64[us]")
     with server_process("--data", str(tmp_path / "data")) as server, HullClient(server.address) as client:
         client.create_hull("from", keyed=keyed)
-        client.put("from", keys, POINTS, times)
+        client.put("from", keys, POINTS, dates)
         leaving = [row for row, end in enumerate(DEADLINES) if end != FOREVER]
         ends = [DEADLINES[row] for row in leaving]
         names = [list(keys)[row] for row in leaving]
-        client.put("from", names, [POINTS[row] for row in leaving], times[leaving], expire_times=ends)
+        client.put("from", names, [POINTS[row] for row in leaving], dates[leaving], expire_times=ends)
         first = exported(tmp_path / "data", tmp_path / "first.csv", "from")
         with first.open(encoding="utf-8", newline="") as read:
             assert list(csv.reader(read))[1:] == [
