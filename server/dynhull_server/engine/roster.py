@@ -14,8 +14,8 @@ from typing import Protocol
 from ..state.records import Committed
 from .positions import Standing
 
-# Bytes of the states in one message, unless there is but one.
-MESSAGE_BYTES = 2**18
+# Bytes of the states in one message, unless there is but one, and seconds of encoding after which it is sent.
+MESSAGE_BYTES, MESSAGE_SECONDS = 2**18, 0.05
 # Names that are gone, and kept for those who have yet to hear of it, before it is looked who has.
 SOME_GONE = 1_000
 # Messages that are kept for others who are equally far.
@@ -221,15 +221,16 @@ class Roster:
     async def _message(self, entries: Sequence[Entry], first: int) -> tuple[bytes, int]:
         """The next message, and the number of the first entry after it."""
         loop = asyncio.get_running_loop()
-        begun, size = loop.time(), 0
+        begun = slice_begun = loop.time()
+        size = 0
         states: list[bytes] = []
-        while first < len(entries):
+        while first < len(entries) and not (states and loop.time() - begun > MESSAGE_SECONDS):
             state = entries[first].state
             if state is None:
                 state = await self._encoded(entries[first])
-                if loop.time() - begun > SLICE:
+                if loop.time() - slice_begun > SLICE:
                     await asyncio.sleep(0)
-                    begun = loop.time()
+                    slice_begun = loop.time()
             if states and size + len(state) > MESSAGE_BYTES:
                 break
             states.append(state)

@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
 from pydantic import Field
 
-from dynhull_client import AsyncHullClient, HullNotFoundError, UnavailableError
+from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
 
 from ..callers import Caller, token_of
 from ..problems import ProblemError
@@ -150,7 +150,7 @@ async def watch_many(
         raise ProblemError(400, detail, "INVALID_FIELD", field="max_vertices", value=str(max_vertices))
     _admit(request)
     view = ManyView(token_of(request), prefix, tuple(sorted(set(name))), outlines, max_vertices, rate)
-    with suppress(UnavailableError):  # an answer of 503 would end an EventSource for good
+    with suppress(UnavailableError, DeadlineError):  # an answer of 503 would end an EventSource for good
         async with client.watch_many(**view.arguments(), timeout=PATIENCE_SECONDS) as allowed:
             await anext(allowed)  # whether these hulls may be read
     state = request.app.state
