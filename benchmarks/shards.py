@@ -34,10 +34,10 @@ import numpy as np
 from dynhull import DynamicHull, convex_hull
 from dynhull_client import HullClient
 from dynhull_cluster.shards.logs import Decided, Decision
-from dynhull_cluster.shards.messages import Apply, Corners, Done, Effect, Opened, Reply, Request, Totals
+from dynhull_cluster.shards.messages import Apply, Corners, Done, Effect, Opened, Reply, Request, ShardTotals
 from dynhull_cluster.shards.parts import divided
 from dynhull_cluster.shards.placement import point_hashes, shards_of
-from dynhull_cluster.shards.requests import Write
+from dynhull_cluster.shards.requests import RootWrite
 from dynhull_cluster.shards.root import Root
 from dynhull_server.state.batch import NO_POINTS, Applied, Batch
 from dynhull_server.state.limits import Limits
@@ -185,7 +185,7 @@ class NoLog:
 def message_seconds() -> float:
     """What the root takes to make a message and to take its reply, without the bytes between processes."""
     root = Root(HullSettings(), LIMITS, SHARDS, NoLog(), now=0.0)
-    nothing = Totals(0, 0, None)
+    nothing = ShardTotals(0, 0, None)
 
     def reply(message: Request) -> Reply:
         header = message.epoch, message.ticket
@@ -206,7 +206,7 @@ def message_seconds() -> float:
     dividing = time.perf_counter() - dividing
     rounds, begun = 20, time.perf_counter()
     for _ in range(rounds):
-        root.submit(Write(write, 0.0))
+        root.submit(RootWrite(write, 0.0))
         answer_all()
     return ((time.perf_counter() - begun) / rounds - dividing) / SHARDS
 

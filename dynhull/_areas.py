@@ -72,7 +72,7 @@ class Polygons:
 
 
 @dataclass(frozen=True, slots=True)
-class Disk:
+class DiskArea:
     """All points at most `radius` from `center`; of an open one, those that are nearer."""
 
     center: Point
@@ -133,7 +133,7 @@ def hull_area(vertices: list[Point], closed: bool) -> Area:
 
 def disk_area(center: Point, radius: float, closed: bool) -> Area:
     """A disk; nothing if it is open and has no radius."""
-    return Disk(center, radius) if closed or radius > 0 else NOTHING
+    return DiskArea(center, radius) if closed or radius > 0 else NOTHING
 
 
 def squared_distance(p: Point, a: Point, b: Point) -> Fraction:

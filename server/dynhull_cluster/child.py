@@ -18,7 +18,7 @@ from dynhull_server.settings import Settings
 from dynhull_server.starting import started
 from dynhull_server.storage.port import StorageError
 
-from .line import Line
+from .line import ProcessLine
 from .serving import Serving, serving
 
 
@@ -32,7 +32,7 @@ def main(end: socket.socket) -> None:
 
 
 async def _run(end: socket.socket) -> None:
-    line = await Line.on(end)
+    line = await ProcessLine.on(end)
     begin = await line.receive()
     if begin is None:
         return
@@ -68,7 +68,7 @@ def _name_process(name: str) -> None:
         Path("/proc/self/comm").write_text(name, "utf-8")
 
 
-async def _listen(line: Line, served: "asyncio.Future[Serving]") -> None:
+async def _listen(line: ProcessLine, served: "asyncio.Future[Serving]") -> None:
     """Answer the supervisor, and end with it: all acknowledged batches are stored."""
     while (asked := await line.receive()) is not None:
         page = await asyncio.to_thread(generate_latest, (await served).registry)

@@ -13,7 +13,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, cast
 
 from . import child
-from .line import Line
+from .line import ProcessLine
 
 # Seconds before a process that has ended is started again: at first, and at most. One that has served for a while is
 # started again at once.
@@ -76,7 +76,7 @@ class ChildProcess:
         self._restarting = False
         self._process: BaseProcess | None = None
         self._ended: asyncio.Future[None]
-        self._line: Line | None = None
+        self._line: ProcessLine | None = None
         self._numbers = count(1)
         self._asked: dict[int, asyncio.Future[str | None]] = {}
 
@@ -150,7 +150,7 @@ class ChildProcess:
         self._process = process
         self._ended = ended = asyncio.get_running_loop().create_future()
         self.starts += 1
-        line = self._line = await Line.on(ours)
+        line = self._line = await ProcessLine.on(ours)
         line.send(self._begin)
         try:
             while (message := await line.receive()) is not None:

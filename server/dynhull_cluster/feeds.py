@@ -20,7 +20,7 @@ from .again import reason_of
 from .worker_link import WorkerLink
 
 
-class Feed(Protocol):
+class SharedFeed(Protocol):
     """A watch of a worker, for several calls."""
 
     @property
@@ -31,7 +31,7 @@ class Feed(Protocol):
         """End it."""
 
 
-F = TypeVar("F", bound=Feed)
+F = TypeVar("F", bound=SharedFeed)
 
 
 class Feeds(Generic[F]):

@@ -18,7 +18,7 @@ from dynhull_server.state.hull_state import VertexKeys
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class WatcherHull:
     """What a watcher holds at a revision.
 
     Attributes:
@@ -34,12 +34,12 @@ class Held:
     center: tuple[float, float] | None
 
     @classmethod
-    def of(cls, event: pb.WatchResponse, *, keys: bool) -> "Held":
+    def of(cls, event: pb.WatchResponse, *, keys: bool) -> "WatcherHull":
         """What the watchers of a snapshot hold."""
         vertices = decode_points(event.snapshot.vertices, "vertices")
         return cls(event.revision, vertices, _keys(event.snapshot.vertex_keys) if keys else None, _center(event))
 
-    def after(self, event: pb.WatchResponse) -> "Held":
+    def after(self, event: pb.WatchResponse) -> "WatcherHull":
         """What they hold after the next event. O(number of vertices), or O(1) for a progress mark."""
         vertices, keys, change = self.vertices, self.keys, event.change
         if event.HasField("change"):
@@ -47,9 +47,9 @@ class Held:
             if keys is not None:
                 keys = _edited(keys, _keys(change.added_keys), change)
                 keys[list(change.renamed_indices)] = _keys(change.renamed_keys)
-        return Held(event.revision, vertices, keys, _center(event))
+        return WatcherHull(event.revision, vertices, keys, _center(event))
 
-    def change_to(self, later: "Held", encoding: points_pb2.PointEncoding) -> pb.HullChange | None:
+    def change_to(self, later: "WatcherHull", encoding: points_pb2.PointEncoding) -> pb.HullChange | None:
         """The change from these vertices to later ones, None if they are the same. O(h log h) for h vertices."""
         edit = difference(self.vertices, later.vertices, self.keys, later.keys)
         if not edit:

@@ -13,7 +13,7 @@ from typing import Any, Self
 MOST_BYTES = 2**26
 
 
-class Line:
+class ProcessLine:
     """One end of the line."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -13,7 +13,7 @@ from google.rpc import code_pb2
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.engine.positions import Standing, decode_position
-from dynhull_server.engine.roster import Entry, Roster
+from dynhull_server.engine.roster import Roster, RosterEntry
 from dynhull_server.engine.watch_many import watch_many
 from dynhull_server.rpc import decode
 from dynhull_server.rpc.calls import Call
@@ -21,7 +21,7 @@ from dynhull_server.rpc.many import MANY_INTERVAL, encode_many, name_only, requi
 from dynhull_server.rpc.methods import DESCRIPTOR
 from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
-from dynhull_server.state.records import Committed
+from dynhull_server.state.records import CommitStamp
 
 from .callers import metadata_of, metadata_of_feed
 from .feeds import Feeds, tokens_have_changed
@@ -149,11 +149,11 @@ class ManyFeed:
         """How far each worker is."""
         return [part.standing for part in self._parts]
 
-    async def encode(self, entry: Entry) -> bytes:
+    async def encode(self, entry: RosterEntry) -> bytes:
         """That a hull is gone: the workers have encoded all others."""
         return name_only(entry, pb.HULL_PRESENCE_GONE)
 
-    def unchanged(self, entry: Entry) -> bytes:
+    def unchanged(self, entry: RosterEntry) -> bytes:
         """The name of a hull."""
         return name_only(entry, pb.HULL_PRESENCE_UNCHANGED)
 
@@ -229,7 +229,7 @@ class ManyFeed:
             time = hull.changed_time.ToMicroseconds()
             self.roster.change(
                 hull.name,
-                Committed(hull.commit, time) if hull.HasField("changed_time") else None,
+                CommitStamp(hull.commit, time) if hull.HasField("changed_time") else None,
                 partition=part.number,
                 new=not hull.revision,
                 state=pb.WatchManyResponse(hulls=[hull]).SerializeToString(),

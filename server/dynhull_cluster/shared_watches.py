@@ -25,7 +25,7 @@ from dynhull_server.state.errors import HullNotFoundError
 
 from .callers import metadata_of, metadata_of_feed
 from .feeds import Feeds, require_allowed, tokens_have_changed
-from .held import Held
+from .held import WatcherHull
 from .relay import Relay
 from .upstream import lost_status, one_request
 from .worker_link import WorkerLink
@@ -51,7 +51,7 @@ class SharedWatches:
     def __init__(self, relay: Relay, metrics: Metrics) -> None:
         self._relay = relay
         self._metrics = metrics
-        self._feeds: Feeds[Feed] = Feeds()
+        self._feeds: Feeds[HullFeed] = Feeds()
 
     async def watch(self, call: Call) -> None:
         """The method `Watch`."""
@@ -74,12 +74,12 @@ class SharedWatches:
         message: bytes,
         watcher: object,
         joined: ExitStack,
-    ) -> "tuple[Feed, Held] | None":
+    ) -> "tuple[HullFeed, WatcherHull] | None":
         """Pass on a watch of the caller's own, until what the caller holds is known; None if it ends before."""
         revision = request.resume.revision
         # Otherwise the first event has to come before the next one of the feed, or after it, or names all vertices.
         may_join = not (request.min_revision > revision or request.max_events_per_second or request.include_keys)
-        feed: Feed | None = None
+        feed: HullFeed | None = None
         if request.resume.uid:
             feed = joined.enter_context(self._feed(link, request, request.resume.uid))
             if may_join and (held := feed.recent.get(revision)) is not None:
@@ -107,7 +107,7 @@ class SharedWatches:
                 if event.HasField("snapshot"):
                     if feed is None or feed.uid != event.snapshot.uid:
                         feed = joined.enter_context(self._feed(link, request, event.snapshot.uid))
-                    return feed, Held.of(event, keys=request.include_keys)
+                    return feed, WatcherHull.of(event, keys=request.include_keys)
 
     async def _follow(
         self,
@@ -116,8 +116,8 @@ class SharedWatches:
         request: pb.WatchRequest,
         watcher: object,
         joined: ExitStack,
-        feed: "Feed",
-        held: Held,
+        feed: "HullFeed",
+        held: WatcherHull,
     ) -> None:
         """Pass on the feed to a caller, and the next one when the tokens of the worker have changed."""
         loop = asyncio.get_running_loop()
@@ -144,13 +144,13 @@ class SharedWatches:
                 with self._metrics.sending(watcher, event.kind):
                     await self._relay.send(call, event.message)
 
-    def _feed(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> "AbstractContextManager[Feed]":
+    def _feed(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> "AbstractContextManager[HullFeed]":
         """The feed for watches like this one, of the hull with this uid."""
         kind = pb.WatchRequest()
         kind.CopyFrom(request)
         kind.ClearField("resume")
         kind.ClearField("min_revision")
-        return self._feeds.use((uid, kind.SerializeToString(deterministic=True)), partial(Feed, link, kind, uid))
+        return self._feeds.use((uid, kind.SerializeToString(deterministic=True)), partial(HullFeed, link, kind, uid))
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,7 @@ class Event:
     kind: str
 
 
-class Feed:
+class HullFeed:
     """One watch of a worker, for all watches of a kind.
 
     Args:
@@ -178,14 +178,14 @@ class Feed:
     def __init__(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> None:
         self.uid = uid
         self.failure: Exception | None = None
-        self.recent: OrderedDict[int, Held] = OrderedDict()
+        self.recent: OrderedDict[int, WatcherHull] = OrderedDict()
         self._link = link
         self._request = request
         self._number = 0
         self._latest = Event(b"", "")
         self._event = pb.WatchResponse()
         self._measures = pb.WatchResponse().measures
-        self._held: Held | None = None
+        self._held: WatcherHull | None = None
         self._moved = asyncio.Event()
         self._running = asyncio.create_task(self._run())
 
@@ -198,7 +198,7 @@ class Feed:
         """End the watch."""
         self._running.cancel()
 
-    async def at(self, revision: int) -> Held | None:
+    async def at(self, revision: int) -> WatcherHull | None:
         """Wait until the feed is at this revision or later; what watchers hold at it, None if that is not known."""
         while self.failure is None and (self._held is None or self._held.revision < revision):
             await self._moved.wait()
@@ -216,7 +216,7 @@ class Feed:
         else:
             await asyncio.sleep(0)
 
-    async def since(self, number: int | None, held: Held) -> tuple[int, Held, Event | None]:
+    async def since(self, number: int | None, held: WatcherHull) -> tuple[int, WatcherHull, Event | None]:
         """The number of the last message, what watchers hold after it, and what brings a watcher there, if anything.
 
         Args:
@@ -261,7 +261,7 @@ class Feed:
         if self._held is None:
             if event.snapshot.uid != self.uid:  # it was deleted meanwhile, and created again
                 raise HullNotFoundError(self._request.name)
-            held = Held.of(event, keys=self._request.include_keys)
+            held = WatcherHull.of(event, keys=self._request.include_keys)
         else:
             held = await _run(self._held.after, len(self._held.vertices), event)
         if event.HasField("measures"):

@@ -55,7 +55,7 @@ class WorkerLink:
         self.health = dict.fromkeys(watched, UNKNOWN)
         self._ways = ways
         self._changed = changed
-        self._connection: Connection | None = None
+        self._connection: WorkerConnection | None = None
         self._leaving: dict[asyncio.Task[None], AskingFrames] = {}
         self._retired = False
         self._closed = asyncio.Event()
@@ -79,7 +79,7 @@ class WorkerLink:
             except OSError:
                 await _until(self._elsewhere)
                 continue
-            connection = Connection(frames, self._ways.channel(self.number))
+            connection = WorkerConnection(frames, self._ways.channel(self.number))
             try:
                 async with asyncio.TaskGroup() as tasks:
                     watches = [tasks.create_task(self._watch(connection, service)) for service in self.health]
@@ -199,7 +199,7 @@ class WorkerLink:
         """
         return self._present().stream(method, (*caller, *self._ways.proof(self.number)))
 
-    def _present(self) -> "Connection":
+    def _present(self) -> "WorkerConnection":
         if self._retired:
             raise RetiredError(self.number)
         if self._connection is None or not self._connection.frames.connected:
@@ -214,7 +214,7 @@ class WorkerLink:
         for frames in self._leaving.values():
             frames.replaced()
 
-    async def _watch(self, connection: "Connection", service: str) -> None:
+    async def _watch(self, connection: "WorkerConnection", service: str) -> None:
         """Follow one health service of the worker."""
         while True:
             responses = connection.channel.unary_stream(
@@ -263,7 +263,7 @@ async def _until(event: asyncio.Event, seconds: float = LOOK_SECONDS) -> None:
             await event.wait()
 
 
-class Connection:
+class WorkerConnection:
     """What leads to a worker until it ends: frames, and a channel for gRPC.
 
     The frames notice the end of the worker. gRPC may not, as when a machine is gone, and have calls wait for ever.

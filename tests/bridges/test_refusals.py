@@ -19,12 +19,12 @@ from ports import free_port
 from receiver import receiver
 
 from dynhull_bridges.ingest.feed import DoubtfulError, Feed, FeedError
-from dynhull_bridges.ingest.jetstream import JetStream
+from dynhull_bridges.ingest.jetstream import JetStreamSource
 from dynhull_bridges.ingest.kafka import Kafka
-from dynhull_bridges.ingest.mqtt import Mqtt
-from dynhull_bridges.jetstream import JetStream as JetStreamTarget
+from dynhull_bridges.ingest.mqtt import MqttSource
+from dynhull_bridges.jetstream import JetStreamSource as JetStreamTarget
 from dynhull_bridges.letters import Letter
-from dynhull_bridges.mqtt import Mqtt as MqttTarget
+from dynhull_bridges.mqtt import MqttSource as MqttTarget
 from dynhull_bridges.refusals.kafka import KAFKA
 from dynhull_bridges.refusals.mqtt import MQTT
 from dynhull_bridges.refusals.nats import NATS
@@ -92,7 +92,7 @@ def answering(greeting: bytes, *answers: bytes) -> Iterator[int]:
 
 def mqtt(version: str, *answers: bytes) -> Exception:
     with answering(b"", *answers) as port:
-        return asyncio.run(begin(Mqtt(f"mqtt://127.0.0.1:{port}/t?version={version}", "h")))
+        return asyncio.run(begin(MqttSource(f"mqtt://127.0.0.1:{port}/t?version={version}", "h")))
 
 
 def test_the_rows_of_mqtt_are_answers_that_there_are() -> None:
@@ -150,7 +150,7 @@ def test_publications_to_mqtt(code: int) -> None:
 
 def test_a_connection_that_is_lost_before_the_answer() -> None:
     with answering(b"", b"") as port:
-        feed = Mqtt(f"mqtt://127.0.0.1:{port}/t", "h")
+        feed = MqttSource(f"mqtt://127.0.0.1:{port}/t", "h")
         feed._client.on_socket_open = lambda _client, _data, socket: socket.shutdown(2)
         assert type(asyncio.run(begin(feed))) is FeedError
 
@@ -168,18 +168,21 @@ def test_answers_of_jetstream(without_jetstream: int, code: int) -> None:
     async def run() -> Exception:
         url = f"nats://127.0.0.1:{without_jetstream}"
         async with await nats.connect(url) as connection:
-            answer = {"type": "error", "error": {"code": 400, "err_code": code, "description": "said by JetStream"}}
+            answer = {
+                "type": "error",
+                "error": {"code": 400, "err_code": code, "description": "said by JetStreamSource"},
+            }
 
             async def refuse(message: Any) -> None:
                 await message.respond(json.dumps(answer).encode())
 
             await connection.subscribe("$JS.API.STREAM.INFO.S", cb=refuse)
             await connection.flush()
-            return await begin(JetStream(f"{url}/S", None, "mapping"))
+            return await begin(JetStreamSource(f"{url}/S", None, "mapping"))
 
     error = asyncio.run(run())
     assert type(error) is ERRORS[NATS.meaning(code)]
-    assert "said by JetStream" in str(error) or str(error) == "NATS has no stream 'S'"
+    assert "said by JetStreamSource" in str(error) or str(error) == "NATS has no stream 'S'"
 
 
 @pytest.mark.parametrize("code", [10054, 10060, 10077, 10109, 10047, 10008, 99999])
@@ -187,7 +190,7 @@ def test_publications_to_jetstream(without_jetstream: int, code: int) -> None:
     async def run() -> Exception:
         url = f"nats://127.0.0.1:{without_jetstream}"
         async with await nats.connect(url) as connection:
-            answer = {"error": {"code": 400, "err_code": code, "description": "said by JetStream"}, "stream": "S"}
+            answer = {"error": {"code": 400, "err_code": code, "description": "said by JetStreamSource"}, "stream": "S"}
 
             async def refuse(message: Any) -> None:
                 await message.respond(json.dumps(answer).encode())
@@ -201,14 +204,14 @@ def test_publications_to_jetstream(without_jetstream: int, code: int) -> None:
 
 def test_no_jetstream(without_jetstream: int) -> None:
     """As long as nobody answers, it may be starting."""
-    feed = JetStream(f"nats://127.0.0.1:{without_jetstream}/S", None, "mapping")
+    feed = JetStreamSource(f"nats://127.0.0.1:{without_jetstream}/S", None, "mapping")
     assert type(asyncio.run(begin(feed))) is FeedError
 
 
 @pytest.mark.parametrize("words", [code for codes in NATS.rows.values() for code in codes if isinstance(code, str)])
 def test_connections_of_nats(words: str) -> None:
     with answering(b'INFO {"max_payload":1048576}\r\n', f"-ERR '{words.title()}'\r\n".encode()) as port:
-        error = asyncio.run(begin(JetStream(f"nats://127.0.0.1:{port}/S", None, "mapping")))
+        error = asyncio.run(begin(JetStreamSource(f"nats://127.0.0.1:{port}/S", None, "mapping")))
     assert type(error) is ERRORS[NATS.meaning(words)]
     assert words in str(error).lower()
 

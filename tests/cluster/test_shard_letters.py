@@ -21,9 +21,9 @@ POINTS = np.array([[1.5, -0.0], [np.nan, 2.0**-1074]])
 STRINGS = PackedKeys.pack(["a", "ä" * 100])
 NUMBERS = np.array([0, 2**64 - 1], np.uint64)
 TIMES = np.array([-(2**63), 2**63 - 1])
-TOTALS = say.Totals(3, 2, None)
+TOTALS = say.ShardTotals(3, 2, None)
 ROWS = KeyRows(STRINGS, POINTS, PackedKeys(b"", b""), TIMES, None, "absent")
-CHANGE = say.Change(say.Corners(NO_POINTS, ()), say.Corners(POINTS, ("a", 2**64 - 1)))
+CHANGE = say.VertexChange(say.Corners(NO_POINTS, ()), say.Corners(POINTS, ("a", 2**64 - 1)))
 MESSAGES = [
     Greeting("fleet/a", "0a", 1.5, HullSettings("str", window=Window(7, clock="data"), shards=3, shard=2)),
     Greeted(2**40),
@@ -32,8 +32,8 @@ MESSAGES = [
     Letter("0a", 7, 2, say.Open(1, 1, 9)),
     Letter("0a", 0, 0, say.Undo(1, 2, 9)),
     Letter("0a", 0, 0, say.Apply(1, 2, (say.Step(1, Batch(POINTS, NO_POINTS, 0, count_missing=True), None, True),))),
-    say.Step(2, windowed.Admitted(Batch(POINTS, NO_POINTS, 0, count_missing=False), TIMES, 5, 0, 0), 5, False),
-    say.Step(3, gate.Admitted(ROWS, None, 1, 0, refuse_missing=True), None, False),
+    say.Step(2, windowed.AdmittedRows(Batch(POINTS, NO_POINTS, 0, count_missing=False), TIMES, 5, 0, 0), 5, False),
+    say.Step(3, gate.AdmittedPuts(ROWS, None, 1, 0, refuse_missing=True), None, False),
     say.Ask(1, 3, say.FoundOf(NUMBERS)),
     say.Ask(1, 3, say.CountOf(POINTS)),
     say.Ask(1, 3, say.SlotsOf(5, 1024)),

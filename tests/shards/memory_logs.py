@@ -6,8 +6,8 @@ from typing import Any
 from dynhull_cluster.shards.epochs import Epochs
 from dynhull_cluster.shards.logs import Decided, Decision, FencedError
 from dynhull_cluster.shards.messages import Message
-from dynhull_cluster.shards.placement import Place
-from dynhull_cluster.shards.requests import Request
+from dynhull_cluster.shards.placement import ShardAddress
+from dynhull_cluster.shards.requests import RootRequest
 from dynhull_cluster.shards.root import Root
 from dynhull_cluster.shards.shard import Shard
 from dynhull_server.state.limits import Limits
@@ -122,8 +122,8 @@ class Cluster:
         self._settings, self._limits = settings, limits
         self._count = count
         self._decisions = Decisions()
-        self._logs: dict[Place, MemoryShardLog] = {}
-        self._shards: dict[Place, Shard] = {}
+        self._logs: dict[ShardAddress, MemoryShardLog] = {}
+        self._shards: dict[ShardAddress, Shard] = {}
         self.restart_root()
 
     @property
@@ -139,7 +139,7 @@ class Cluster:
 
     def restart_shard(self, shard: int) -> None:
         (generation,) = self.root.generations
-        place = Place(generation, shard)
+        place = ShardAddress(generation, shard)
         self._shards[place] = Shard(self._settings, self._logs[place])
 
     def deliver(self) -> None:
@@ -149,14 +149,14 @@ class Cluster:
                 if reply is not None:
                     self.root.receive(place, reply)
 
-    def receive(self, place: Place, message: Message) -> Any:
+    def receive(self, place: ShardAddress, message: Message) -> Any:
         """What a shard replies, a new one if there is none."""
         if place not in self._shards:
             self._logs[place] = MemoryShardLog()
             self._shards[place] = Shard(self._settings, self._logs[place])
         return self._shards[place].receive(message)
 
-    def serve(self, *requests: Request) -> Request:
+    def serve(self, *requests: RootRequest) -> RootRequest:
         """Have requests answered, those that can be in one round. Returns the last one."""
         for request in requests:
             self.root.submit(request)

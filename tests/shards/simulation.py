@@ -21,8 +21,8 @@ from dynhull_cluster.shards import shard as shard_module
 from dynhull_cluster.shards.epochs import Epochs
 from dynhull_cluster.shards.logs import FencedError
 from dynhull_cluster.shards.messages import Open, SampleOf, StaticHull
-from dynhull_cluster.shards.placement import Place
-from dynhull_cluster.shards.requests import Expire, Read, Request, Reshard, Write
+from dynhull_cluster.shards.placement import ShardAddress
+from dynhull_cluster.shards.requests import ExpirePoints, Read, Reshard, RootRequest, RootWrite
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Kept
 from dynhull_server.state.requests import WriteBatch
@@ -58,7 +58,7 @@ class InFlight:
     """A message between a root and a shard, or the reply to it; None says that it came too late."""
 
     root: RootProcess
-    shard: Place
+    shard: ShardAddress
     message: Any
     replied: bool = False
     reply: Any = None
@@ -70,7 +70,7 @@ class Client:
     def __init__(self, name: str) -> None:
         self.name = name
         self.sequence = 0  # of the last batch that was applied
-        self.waiting: list[Write] = []
+        self.waiting: list[RootWrite] = []
         self.refused = False  # so that those behind it are out of order
 
     def may_send(self) -> bool:
@@ -98,14 +98,14 @@ class World:
         self._faults = True
         self._decisions = Decisions()
         self._count = draw.choice((1, 2, 2, 3))
-        self._shard_logs: dict[Place, MemoryShardLog] = {}
-        self._shards: dict[Place, Any] = {}
+        self._shard_logs: dict[ShardAddress, MemoryShardLog] = {}
+        self._shards: dict[ShardAddress, Any] = {}
         self._in_flight: list[InFlight] = []
         self._process: RootProcess | None = None
         self._replaced: list[RootProcess] = []
         self._clients = [Client(name) for name in "ab"[:CLIENTS]]
         self._reads: list[Read] = []
-        self._expiries: list[Expire] = []
+        self._expiries: list[ExpirePoints] = []
         self._reshards: list[Reshard] = []
         self._batches: dict[tuple[str, int], WriteBatch] = {}
         self._acknowledged: dict[tuple[str, int], Any] = {}
@@ -167,7 +167,7 @@ class World:
         """Clients send again what they have no answer to."""
         self._reads, self._expiries = [], []
         for client in self._clients:
-            client.waiting = [Write(request.batch, now=0.0) for request in client.waiting]
+            client.waiting = [RootWrite(request.batch, now=0.0) for request in client.waiting]
             for request in client.waiting:
                 self._ask_root(request)
         self._reshards = [Reshard(reshard.shards) for reshard in self._reshards]
@@ -194,7 +194,7 @@ class World:
             self._ask_root(read)
         elif roll < 0.3 and self._settings.window is not None and self._settings.window.clock == "server":
             self._workload.time += draw.choice((0, 10**6))
-            expiry = Expire(self._workload.time)
+            expiry = ExpirePoints(self._workload.time)
             self._expiries.append(expiry)
             self._ask_root(expiry)
         elif roll > 1 - self._restless and not self._reshards:
@@ -208,10 +208,10 @@ class World:
                 write = self._workload.batch()
                 write.producer, write.sequence = client.name, client.sequence + len(client.waiting) + 1
                 self._batches[client.name, write.sequence] = write
-                client.waiting.append(Write(write, now=0.0))
+                client.waiting.append(RootWrite(write, now=0.0))
                 self._ask_root(client.waiting[-1])
 
-    def _ask_root(self, request: Request) -> None:
+    def _ask_root(self, request: RootRequest) -> None:
         process = self._process
         if process is None:  # it died of the request before
             return
@@ -280,7 +280,7 @@ class World:
             self._replaced.remove(each.root)  # the shards that it knows have been dropped: the hull has others
         self._hear()
 
-    def _kill_shard(self, shard: Place) -> None:
+    def _kill_shard(self, shard: ShardAddress) -> None:
         self._shards[shard] = self._shard_type(self._settings, self._shard_logs[shard])
 
     def _drop_unneeded(self) -> None:

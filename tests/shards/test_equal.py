@@ -9,7 +9,7 @@ from shards.memory_logs import Cluster
 from shards.workload import KINDS, LIMITS, Workload, same_effect
 
 from dynhull_cluster.shards.messages import CountOf, PositionsOf, SampleOf, StaticHull
-from dynhull_cluster.shards.requests import Expire, Read, Reshard, Write
+from dynhull_cluster.shards.requests import ExpirePoints, Read, Reshard, RootWrite
 from dynhull_server.rpc.encode import CAUSES
 from dynhull_server.state.batch import NO_POINTS, KeyedBatch
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError
@@ -41,8 +41,8 @@ def test_a_hull_over_shards_is_one_hull(kind, shards):
                 met["divided in another way"] += reshard(one, cluster, draw.randint(1, 6))
             if one.contents.clock is not None and one.contents.follows_server and draw.random() < 0.2:
                 workload.time += draw.choice((0, 10**6))
-                assert cluster.serve(Expire(workload.time)).result == one.expire(workload.time, None)
-            requests = [Write(workload.batch(), now=0.0) for _ in range(draw.choice((1, 1, 2, 5)))]
+                assert cluster.serve(ExpirePoints(workload.time)).result == one.expire(workload.time, None)
+            requests = [RootWrite(workload.batch(), now=0.0) for _ in range(draw.choice((1, 1, 2, 5)))]
             cluster.serve(*requests)
             for request in requests:
                 met[compare(one, request, workload)] += 1
@@ -130,7 +130,7 @@ def test_a_batch_about_the_quarantine_is_refused():
     write = WriteBatch(rows=1, make=lambda: batch)
     write.name = "hull"
     cluster = Cluster(HullSettings("int"), LIMITS, 2)
-    request = cluster.serve(Write(write, now=0.0))
+    request = cluster.serve(RootWrite(write, now=0.0))
     assert isinstance(request.error, HullUnsuitableError)
     assert "has shards, so it has no quarantine" in str(request.error)
     assert cluster.root.revision == 0

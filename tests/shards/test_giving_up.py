@@ -5,7 +5,7 @@ from shards.memory_logs import Cluster
 from shards.workload import LIMITS
 
 from dynhull_cluster.shards.messages import SampleOf
-from dynhull_cluster.shards.requests import Read, Reshard, Write
+from dynhull_cluster.shards.requests import Read, Reshard, RootWrite
 from dynhull_server.state.batch import NO_POINTS, Batch
 from dynhull_server.state.errors import ShardAwayError
 from dynhull_server.state.records import HullSettings
@@ -17,7 +17,7 @@ POINTS = np.array([(x, y) for x in range(4) for y in range(4)], float)
 def write(points, stream=None):
     batch = WriteBatch(rows=len(points), make=lambda: Batch(points, NO_POINTS, 0, count_missing=False))
     batch.name, batch.stream = "hull", stream
-    return Write(batch, now=0.0)
+    return RootWrite(batch, now=0.0)
 
 
 def test_what_is_given_up_has_not_happened():

@@ -23,9 +23,9 @@ from dynhull_cluster.postgres import ownership, processes
 from dynhull_cluster.postgres.ownership import LOOK, REQUIRE, Leases, Ownership, taken_over, writer_name
 from dynhull_server.state.errors import NotStoredError, OutcomeUnknownError
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import Committed
+from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.memory import MemoryStorage
-from dynhull_server.storage.port import Contents, NotCommittedError, Progress, StorageError, TakenOverError
+from dynhull_server.storage.port import NotCommittedError, Progress, StorageError, StoredContents, TakenOverError
 
 from .clients import Client, probe
 from .core_life import ClientActor, Condition, CoreServer, Wait, compare
@@ -93,12 +93,12 @@ class OwnedStorage:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._site.store, name)
 
-    def open(self, progress: Progress) -> Contents:
+    def open(self, progress: Progress) -> StoredContents:
         """Take up everything."""
         self._commits = self._site.commits
         return self._site.store.open(progress)
 
-    def commit(self, changes: Sequence[Any], now: int = 0) -> Committed:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> CommitStamp:
         """Keep the changes, unless another server owns them, or the connection is lost before."""
         try:
             session = self._begun()

@@ -51,13 +51,13 @@ from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, FenceEvent, Inside
 from dynhull_server.state.fences.model.requests import (
+    Acknowledge,
     CreateFence,
+    DeleteConsumer,
     DeleteFence,
-    DropConsumer,
-    DropEvents,
-    PutConsumer,
     ReadFence,
     ReplaceFence,
+    TrimEvents,
 )
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.limits import Limits
@@ -361,11 +361,11 @@ class CoreServer:
         await self._ask(DeleteFence(Answer(), name, self.time()))
 
     async def acknowledge(self, name: str, consumer: str, sequence: int | None, uid: str) -> Consumer:
-        found: Consumer = await self._ask(PutConsumer(Answer(), name, self.time(), consumer, sequence, uid))
+        found: Consumer = await self._ask(Acknowledge(Answer(), name, self.time(), consumer, sequence, uid))
         return found
 
     async def drop_consumer(self, name: str, consumer: str) -> None:
-        await self._ask(DropConsumer(Answer(), name, self.time(), consumer))
+        await self._ask(DeleteConsumer(Answer(), name, self.time(), consumer))
 
     async def who_is_inside(self, name: str, rows: int) -> tuple[Fence, Inside]:
         def read(fence: Fence, events: Sequence[FenceEvent]) -> tuple[Fence, Inside]:
@@ -407,7 +407,7 @@ class CoreServer:
             fence.unsaved = max(fence.last - inside.sequence, 0)
             first = self._storage.boundary(fence.number, max(1, fence.last + 1 - op["back"]))
             self.model.fences.permit(fence.number, first)
-            await self._ask(DropEvents(Answer(), op["name"], self.time(), fence, first))
+            await self._ask(TrimEvents(Answer(), op["name"], self.time(), fence, first))
         except (KeyError, OSError, MemoryError) as error:  # deleted meanwhile, or the storage fails
             if not isinstance(error, KeyError) and not self.model.faulty:
                 raise self.model.finds(f"without a reason: {error!r}") from error

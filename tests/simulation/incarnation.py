@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dynhull_server.state.fences.model.records import Cause, Consumer, EventType, KeptFence
-from dynhull_server.storage.port import Contents
+from dynhull_server.storage.port import StoredContents
 
 from .fence_model import FenceTruth, same
 
@@ -27,7 +27,7 @@ class Backup:
     def __init__(self, model: "Model") -> None:
         self._model = copy.deepcopy(model)
 
-    def restore(self, model: "Model", contents: Contents, fences: list[KeptFence]) -> None:
+    def restore(self, model: "Model", contents: StoredContents, fences: list[KeptFence]) -> None:
         """Lead a model back to the backup, and compare what is in the folder that was made of it.
 
         Args:
@@ -50,7 +50,7 @@ class Backup:
             _begin_anew(model, model.fences.alive[fence.row.name], fence)
 
 
-def _compare_hulls(model: "Model", contents: Contents) -> None:
+def _compare_hulls(model: "Model", contents: StoredContents) -> None:
     """Take over the uids of restored hulls."""
     if sorted(row.name for row in contents.hulls) != sorted(model.alive):
         raise model.finds(f"restored are the hulls {contents.hulls}, in the backup are {sorted(model.alive)}")

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import IO, Any
 
 from dynhull_server.state.fences.model.records import KeptFence
-from dynhull_server.state.records import Committed
+from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
-from dynhull_server.storage.port import Contents, Progress
+from dynhull_server.storage.port import Progress, StoredContents
 from dynhull_server.storage.sqlite import copies
-from dynhull_server.storage.sqlite.disk import Access, Disk
+from dynhull_server.storage.sqlite.disk import Disk, OpenMode
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 from .incarnation import Backup
@@ -52,7 +52,7 @@ class SQLiteLives(FaultyStorage):
         """What fails at this call of a method of the disk."""
         return self._fault(place)
 
-    def open(self, progress: Progress) -> Contents:
+    def open(self, progress: Progress) -> StoredContents:
         """Take up what the life before has left."""
         if self.dead:
             left = self._folder
@@ -77,7 +77,7 @@ class SQLiteLives(FaultyStorage):
             if not file.name.endswith("-shm"):
                 shutil.copy(file, self._folder)
 
-    def _fences(self, contents: Contents) -> list[KeptFence]:
+    def _fences(self, contents: StoredContents) -> list[KeptFence]:
         """The fences in the folder, each with all of its events."""
         numbers = [row.number for row in contents.fences]
         kept = [each for each in self._inner.read_fences(numbers) if each is not None]
@@ -94,7 +94,7 @@ class SQLiteLives(FaultyStorage):
         """Have the next life find the last backup, if there is one."""
         self._restores = True
 
-    def commit(self, changes: Sequence[Any], now: int = 0) -> Committed:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> CommitStamp:
         """Keep the changes."""
         self.give_way()
         self._pending = changes
@@ -174,7 +174,7 @@ class _FaultyDisk(Disk):
     def sync(self, _: IO[bytes]) -> None:
         _fail(self.fault("fsync"), OSError)
 
-    def connect(self, database: Path, access: Access) -> sqlite3.Connection:
+    def connect(self, database: Path, access: OpenMode) -> sqlite3.Connection:
         _fail(self.fault("connect"), sqlite3.OperationalError)
         address = f"{database.absolute().as_uri()}?{access.value}"
         connection = sqlite3.connect(

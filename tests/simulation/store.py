@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
-from dynhull_server.state.records import Committed, HullRow, Kept
-from dynhull_server.storage.port import NEWEST, Contents, NotCommittedError, Progress, Step, Storage
+from dynhull_server.state.records import CommitStamp, HullRow, Kept
+from dynhull_server.storage.port import NEWEST, NotCommittedError, Progress, Storage, StorageStep, StoredContents
 
 from .model import Model
 
@@ -56,7 +56,7 @@ class FaultyStorage:
         if kind is not None:
             raise ERRORS[kind](f"{place} fails, as planned")
 
-    def open(self, progress: Progress) -> Contents:
+    def open(self, progress: Progress) -> StoredContents:
         """Decide what was left undecided, and take up everything."""
         self.dead = False
         self._decide()
@@ -70,7 +70,7 @@ class FaultyStorage:
         """Have the next life find the last copy, if there is one, in place of what is there."""
         raise NotImplementedError("only folders are copied")
 
-    def commit(self, changes: Sequence[Any], now: int = 0) -> Committed:
+    def commit(self, changes: Sequence[Any], now: int = 0) -> CommitStamp:
         """Keep the changes, and fail before, instead or afterwards."""
         self.give_way()
         kind = self._fault("commit")
@@ -92,7 +92,7 @@ class FaultyStorage:
         self.give_way()
         return commit
 
-    def _keep(self, changes: Sequence[Any], now: int) -> Committed:
+    def _keep(self, changes: Sequence[Any], now: int) -> CommitStamp:
         self._model.landed(changes)
         try:
             return self._inner.commit(changes, now)
@@ -161,21 +161,21 @@ class FaultyStorage:
         self._fail("read")
         return self._inner.boundary(number, first)
 
-    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
+    def inside(self, number: int, inside: Inside) -> Iterator[StorageStep]:
         """Steps; each may fail."""
         for step in self._inner.inside(number, inside):
             self.give_way()
             self._fail("snapshot")
             yield step
 
-    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator[StorageStep]:
         """Steps; each may fail."""
         for step in self._inner.snapshot(number, kept):
             self.give_way()
             self._fail("snapshot")
             yield step
 
-    def sweep(self) -> Iterator[Step]:
+    def sweep(self) -> Iterator[StorageStep]:
         """Steps; each may fail."""
         self._fail("sweep")
         for step in self._inner.sweep():

@@ -16,7 +16,7 @@ from dynhull.keys import PackedKeys
 from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, Kept, KeyRows, Record
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import NotCommittedError, StorageError
-from dynhull_server.storage.sqlite.disk import Access
+from dynhull_server.storage.sqlite.disk import OpenMode
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 
@@ -158,7 +158,7 @@ def test_a_sync_that_failed_is_made_good_by_a_checkpoint(folder, disk):
     with pytest.raises(OSError, match="injected"):
         storage.sync()
     storage.sync()  # does without
-    raw = disk.connect(folder / DATABASE, Access.RAW)
+    raw = disk.connect(folder / DATABASE, OpenMode.RAW)
     assert raw.execute("SELECT max(last) FROM batches").fetchone() == (3,)
     raw.close()
     disk.no_sync = False

@@ -22,7 +22,7 @@ from dynhull_server.state.fences.recovery.restored import members_after
 from dynhull_server.state.records import Append, Create, Delete, Expiry, HullRow, HullSettings, KeyRows, Record, Window
 from dynhull_server.storage.port import StorageError
 from dynhull_server.storage.rows.columns import point_bytes
-from dynhull_server.storage.sqlite.disk import Access, Disk
+from dynhull_server.storage.sqlite.disk import Disk, OpenMode
 from dynhull_server.storage.sqlite.schema import FORMAT
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
@@ -76,7 +76,7 @@ FLEET = {"stopped": 40, "killed": 43}
 PRODUCERS = {"plane": 12, "ship": 12, "train": 12, "bus": 4}
 
 
-def query(folder, sql, access=Access.READ):
+def query(folder, sql, access=OpenMode.READ):
     """What a statement finds. Unless it only reads, the log is copied and deleted when the connection closes."""
     with closing(Disk().connect(folder / DATABASE, access)) as database:
         return database.execute(sql).fetchall()
@@ -160,7 +160,7 @@ def test_damage_to_a_folder_of_format_2_is_noticed(folder):
         ("UPDATE batches SET payload = x'00' WHERE first = 30", "revisions 30 to 30 are damaged, and later ones exist"),
     ):
         shutil.copytree(FORMAT_2 / "stopped", folder)
-        query(folder, damage, Access.WRITE)
+        query(folder, damage, OpenMode.WRITE)
         with pytest.raises(StorageError, match=words):
             opened(folder)
         shutil.rmtree(folder)

@@ -13,7 +13,7 @@ from ._calls import Writing, known
 from ._errors import DynhullError
 from ._gathering import put_parts, remove_parts
 from ._outcomes import settle
-from ._window import Window
+from ._window import InFlight
 from ._writer import CLOSED
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class AsyncWriter:
         self._turn = asyncio.Condition()
         self._connections = 0
         self._closed = asyncio.Event()
-        self._window: Window[asyncio.Future[Applied]] | None = None
+        self._window: InFlight[asyncio.Future[Applied]] | None = None
         self._task: asyncio.Task[None] | None = None
 
     @property
@@ -142,17 +142,17 @@ class AsyncWriter:
                 self._turn.notify_all()
         return outcome
 
-    def _may_put(self, window: Window[asyncio.Future[Applied]], part: Part) -> bool:
+    def _may_put(self, window: InFlight[asyncio.Future[Applied]], part: Part) -> bool:
         return window.admits(part) or window.failure is not None or self._closed.is_set()
 
-    async def _open(self) -> Window[asyncio.Future[Applied]]:
+    async def _open(self) -> InFlight[asyncio.Future[Applied]]:
         async with self._opening:
             if self._window is None:
                 asking = self._connection.answer(known(self._writing))
                 begin = await unless(self._closed, asking)
                 if self._closed.is_set() or begin is None:
                     raise RuntimeError(CLOSED)
-                self._window = Window(self._writing, begin, asyncio.get_running_loop().create_future)
+                self._window = InFlight(self._writing, begin, asyncio.get_running_loop().create_future)
                 self._task = asyncio.create_task(self._run(self._window), name=f"writer to {self._writing.name}")
             if self._closed.is_set():
                 raise RuntimeError(CLOSED)
@@ -168,7 +168,7 @@ class AsyncWriter:
         if self._task is not None:
             await end(self._task)
 
-    async def _run(self, window: Window[asyncio.Future[Applied]]) -> None:
+    async def _run(self, window: InFlight[asyncio.Future[Applied]]) -> None:
         """One connection after another, until the writer is closed or has failed."""
         while True:
             lost = await self._connect(window)
@@ -183,7 +183,7 @@ class AsyncWriter:
                 return
             await self._connection.pause(pause)
 
-    async def _connect(self, window: Window[asyncio.Future[Applied]]) -> DynhullError:
+    async def _connect(self, window: InFlight[asyncio.Future[Applied]]) -> DynhullError:
         """Send batches and read acknowledgements; returns the error that ended the connection."""
 
         async def hear(response: pb.StreamResponse) -> bool:
@@ -197,7 +197,7 @@ class AsyncWriter:
         return await self._connection.converse("Stream", requests, hear)
 
     async def _requests(
-        self, window: Window[asyncio.Future[Applied]], connection: int
+        self, window: InFlight[asyncio.Future[Applied]], connection: int
     ) -> AsyncIterator[pb.StreamRequest]:
         """The messages to send on a connection."""
         yield window.first()

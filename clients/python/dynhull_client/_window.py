@@ -68,7 +68,7 @@ class Next(Generic[Future]):
 
 
 @dataclass(slots=True)
-class Batch(Generic[Future]):
+class SentBatch(Generic[Future]):
     """A numbered batch.
 
     Attributes:
@@ -84,7 +84,7 @@ class Batch(Generic[Future]):
     sent: int = 0
 
 
-class Window(Generic[Future]):
+class InFlight(Generic[Future]):
     """The batches of a writer that are not acknowledged.
 
     Attributes:
@@ -107,9 +107,9 @@ class Window(Generic[Future]):
         self._before = sequence  # that of the batch before the next one
         self._next: Next[Future] | None = None
         self._awaited: Next[Future] | None = None  # the one whose time the sender waits for
-        self._waiting: deque[Batch[Future]] = deque()  # to be sent on this connection
+        self._waiting: deque[SentBatch[Future]] = deque()  # to be sent on this connection
         self._waiting_bytes = 0
-        self._sent: deque[Batch[Future]] = deque()  # on this connection
+        self._sent: deque[SentBatch[Future]] = deque()  # on this connection
         self._most_batches = self._most_bytes = 0  # of a message, once the server has announced that it takes several
         self._one_at_a_time = False
         self._refusal: DynhullError | None = None
@@ -316,7 +316,7 @@ class Window(Generic[Future]):
             message.after_sequence = self._before
             self._before = self._last
         size = message.ByteSize() + FRAME_BYTES
-        self._waiting.append(Batch(following.outcome, message, size))
+        self._waiting.append(SentBatch(following.outcome, message, size))
         self._waiting_bytes += size
 
     def _send(self) -> pb.NumberedBatch:

@@ -14,7 +14,7 @@ from ._errors import DynhullError
 from ._gathering import put_parts, remove_parts
 from ._home import Home
 from ._outcomes import Outcome, settle
-from ._window import Window
+from ._window import InFlight
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,7 +56,7 @@ class Writer:
         self._connections = 0
         self._closed = False
         self._call: Any = None
-        self._window: Window[Future[Applied]] | None = None
+        self._window: InFlight[Future[Applied]] | None = None
         self._thread: threading.Thread | None = None
 
     @property
@@ -183,10 +183,10 @@ class Writer:
                 self._turn.notify_all()
         return outcome
 
-    def _may_put(self, window: Window[Future[Applied]], part: Part) -> bool:
+    def _may_put(self, window: InFlight[Future[Applied]], part: Part) -> bool:
         return window.admits(part) or window.failure is not None or self._closed
 
-    def _open(self) -> Window[Future[Applied]]:
+    def _open(self) -> InFlight[Future[Applied]]:
         with self._opening:
             if self._window is None:
                 try:
@@ -203,7 +203,7 @@ class Writer:
             return self._window
 
     def _begin(self, begin: Known) -> None:
-        self._window = Window(self._writing, begin, Outcome)
+        self._window = InFlight(self._writing, begin, Outcome)
         name = f"writer to {self._writing.name}"
         self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
         self._home.begin()
@@ -232,7 +232,7 @@ class Writer:
             self._thread.join()
         self._home.end()
 
-    def _run(self, window: Window[Future[Applied]]) -> None:
+    def _run(self, window: InFlight[Future[Applied]]) -> None:
         """One connection after another, until the writer is closed or has failed."""
         while True:
             lost = self._connect(window)
@@ -247,7 +247,7 @@ class Writer:
                 return
             self._connection.pause(pause, lambda: self._closed)
 
-    def _connect(self, window: Window[Future[Applied]]) -> DynhullError:
+    def _connect(self, window: InFlight[Future[Applied]]) -> DynhullError:
         """Send batches and read acknowledgements; returns the error that ended the connection."""
         requests = self._requests(window, self._connections)
         try:
@@ -265,7 +265,7 @@ class Writer:
             return self._connection.error_of(failure, "Stream")
         return DynhullError("the server ended the stream", call.code(), "", {})
 
-    def _requests(self, window: Window[Future[Applied]], connection: int) -> Iterator[pb.StreamRequest]:
+    def _requests(self, window: InFlight[Future[Applied]], connection: int) -> Iterator[pb.StreamRequest]:
         """The messages to send on a connection; runs in a thread of gRPC."""
         yield window.first()
         while True:

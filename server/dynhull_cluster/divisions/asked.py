@@ -8,20 +8,20 @@ from dynhull_server.state.hull import Hull
 from dynhull_server.state.trip import refuse
 
 from ..shards import messages as say
-from ..shards.requests import Expire, Read, Request, Reshard, Write
+from ..shards.requests import ExpirePoints, Read, Reshard, RootRequest, RootWrite
 
 
-class Told(Protocol):
+class Asker(Protocol):
     """Somebody who asked hears of the answer."""
 
     def tell(self) -> None:
         """Have them hear of it, on the event loop."""
 
 
-class AskedWrite(Write):
+class AskedWrite(RootWrite):
     """A batch of a caller. Its stream stops with it, in the thread of the root, before another one begins."""
 
-    def __init__(self, request: requests.WriteBatch, hull: Hull, now: float, answered: list[Told]) -> None:
+    def __init__(self, request: requests.WriteBatch, hull: Hull, now: float, answered: list[Asker]) -> None:
         super().__init__(request, now)
         self._hull = hull
         self._answered = answered
@@ -49,10 +49,10 @@ class AskedWrite(Write):
             self.batch.to.answer(self.batch)
 
 
-class AskedExpiry(Expire):
+class AskedExpiry(ExpirePoints):
     """Points that leave by the clock, as the core has noticed."""
 
-    def __init__(self, request: requests.Expire, answered: list[Told]) -> None:
+    def __init__(self, request: requests.Expire, answered: list[Asker]) -> None:
         super().__init__(request.time)
         self._request = request
         self._answered = answered
@@ -68,7 +68,7 @@ class AskedExpiry(Expire):
         self._request.to.answer(self._request)
 
 
-class _Awaited(Request):
+class _Awaited(RootRequest):
     """What a caller waits for. The counts are those of its revision: readers see each decision before the next one.
 
     Attributes:
@@ -76,7 +76,7 @@ class _Awaited(Request):
         asked: is done when the caller has been told.
     """
 
-    def _await(self, hull: Hull, answered: list[Told]) -> None:
+    def _await(self, hull: Hull, answered: list[Asker]) -> None:
         self.counts = hull.counts
         self.asked: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._hull = hull
@@ -97,7 +97,7 @@ class _Awaited(Request):
 class AskedRead(_Awaited, Read):
     """A question of a reader."""
 
-    def __init__(self, question: say.Question, hull: Hull, answered: list[Told]) -> None:
+    def __init__(self, question: say.Question, hull: Hull, answered: list[Asker]) -> None:
         Read.__init__(self, question)
         self._await(hull, answered)
 
@@ -105,7 +105,7 @@ class AskedRead(_Awaited, Read):
 class AskedReshard(_Awaited, Reshard):
     """Another number of shards."""
 
-    def __init__(self, shards: int, hull: Hull, answered: list[Told]) -> None:
+    def __init__(self, shards: int, hull: Hull, answered: list[Asker]) -> None:
         Reshard.__init__(self, shards)
         self._await(hull, answered)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from dynhull_server.engine.division import Division, StoredShard
+from dynhull_server.engine.division import DividedReads, StoredShard
 from dynhull_server.engine.driver import Driver
 from dynhull_server.engine.shard_store import ShardStore
 from dynhull_server.settings import Settings
@@ -17,7 +17,7 @@ from dynhull_server.state.requests import Expire, WriteBatch
 
 from ..placement import worker_of, worker_of_shard
 from ..shards import messages as say
-from ..shards.placement import Place
+from ..shards.placement import ShardAddress
 from .letters import Answer, Greeted, Greeting, IsWanted, Letter, Wanted
 from .local_shard import LocalShard
 from .peers import PeerAwayError, Peers
@@ -35,15 +35,15 @@ SHARDS = "shards"
 MARK = "#"
 
 
-def name_of_shard(name: str, uid: str, place: Place) -> str:
+def name_of_shard(name: str, uid: str, place: ShardAddress) -> str:
     """The name of a shard in the storage: others of the hull, and of a deleted one of its name, may be there."""
     return f"{name}{MARK}{uid}.{place.generation}.{place.number}"
 
 
-def place_of(settings: HullSettings) -> Place:
+def place_of(settings: HullSettings) -> ShardAddress:
     """The place of a shard with these settings."""
     assert settings.shard is not None  # they are those of one
-    return Place(settings.generation, settings.shard)
+    return ShardAddress(settings.generation, settings.shard)
 
 
 def hull_of_shard(name: str) -> str:
@@ -69,7 +69,7 @@ class ServedDivisions:
         self._patience = (0.0 if peers is None else peers.takeover) or AWAY_SECONDS
         self._driver: Driver | None = None
         self._roots: dict[str, ServedRoot] = {}
-        self._shards: dict[tuple[str, Place], LocalShard] = {}
+        self._shards: dict[tuple[str, ShardAddress], LocalShard] = {}
         self._ending: set[asyncio.Task[None]] = set()
         self._closed = False
 
@@ -121,7 +121,7 @@ class ServedDivisions:
         """Carry out requests in this order, and answer them."""
         self._roots[hull.uid].carry_out(requests)
 
-    def of(self, hull: Hull) -> Division:
+    def of(self, hull: Hull) -> DividedReads:
         """The shards of a hull."""
         root = self._roots.get(hull.uid)
         if root is None:
@@ -159,7 +159,7 @@ class ServedDivisions:
                 shard = await self._found(letter)
                 return Greeted(await shard.epoch())
             case Letter():
-                known = self._shards.get((letter.uid, Place(letter.generation, letter.shard)))
+                known = self._shards.get((letter.uid, ShardAddress(letter.generation, letter.shard)))
                 if known is None or not known.stored:
                     raise PeerAwayError("there is no such shard")
                 return Answer(await known.receive(letter.message))
@@ -189,7 +189,7 @@ class ServedDivisions:
         assert self._driver is not None  # nothing begins before
         return self._driver
 
-    async def _greet(self, hull: Hull, place: Place) -> int:
+    async def _greet(self, hull: Hull, place: ShardAddress) -> int:
         row = hull.row
         settings = replace(row.settings, shard=place.number, generation=place.generation)
         greeting = Greeting(row.name, row.uid, row.created, settings)
@@ -197,7 +197,7 @@ class ServedDivisions:
         epoch: int = greeted.epoch
         return epoch
 
-    async def _deliver(self, hull: Hull, place: Place, message: say.Request) -> say.Reply | None:
+    async def _deliver(self, hull: Hull, place: ShardAddress, message: say.Request) -> say.Reply | None:
         answer = await self._send(self._worker_of(hull.name, place), Letter(hull.uid, *place, message))
         reply: say.Reply | None = answer.reply
         return reply
@@ -205,7 +205,7 @@ class ServedDivisions:
     def _shard(self, row: HullRow, *, stored: bool = True) -> LocalShard:
         return LocalShard(self._started.machine.threads.pool("shard", 1), self._store, row, stored=stored)
 
-    def _worker_of(self, name: str, place: Place) -> int:
+    def _worker_of(self, name: str, place: ShardAddress) -> int:
         return worker_of_shard(name, place.number, self._workers)
 
     async def _send(self, worker: int, letter: Any) -> Any:

@@ -34,7 +34,7 @@ from dynhull_server.storage.port import DamagedError
 
 from ..shards.epochs import Epochs
 from ..shards.logs import Decided, Decision, FencedError
-from ..shards.messages import Change, Corners, Effect
+from ..shards.messages import Corners, Effect, VertexChange
 
 
 class StoredRootLog:
@@ -108,7 +108,7 @@ class StoredRootLog:
             return [record]
         return [_expiry(decision.revision - 1, left, decision.clock, {}), record]
 
-    def _rows(self, changes: Sequence[Change]) -> Rows:
+    def _rows(self, changes: Sequence[VertexChange]) -> Rows:
         """The vertices that have come and gone."""
         come = np.concatenate([NO_POINTS, *(each.come.points for each in changes)])
         if self._settings.identity == "multiset":

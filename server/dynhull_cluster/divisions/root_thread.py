@@ -26,10 +26,10 @@ from dynhull_server.storage.port import StorageError
 from ..shards import messages as say
 from ..shards.epochs import Epochs
 from ..shards.logs import FencedError
-from ..shards.placement import Place
-from ..shards.requests import Request
+from ..shards.placement import ShardAddress
+from ..shards.requests import RootRequest
 from ..shards.root import Root, ShardsDifferError
-from .asked import Asked, AskedExpiry, AskedWrite, Told
+from .asked import Asked, AskedExpiry, AskedWrite, Asker
 from .logs import StoredRootLog
 
 if TYPE_CHECKING:
@@ -51,8 +51,8 @@ class Turn:
         generations: the generations whose shards are needed; None where that is not known.
     """
 
-    messages: list[tuple[Place, say.Request]] | None
-    answered: list[Told]
+    messages: list[tuple[ShardAddress, say.Request]] | None
+    answered: list[Asker]
     waits: bool
     opened: bool
     failure: Exception | None
@@ -74,7 +74,7 @@ class RootThread:
     """
 
     def __init__(self, driver: Driver, epoch: int, hull: Hull, took: Callable[[Turn], None]) -> None:
-        self.answered: list[Told] = []
+        self.answered: list[Asker] = []
         self.damage: Exception | None = None
         self._driver = driver
         self._hull = hull
@@ -84,7 +84,7 @@ class RootThread:
         self._epochs = Epochs(epoch)
         self._root: Root | None = None
         self._log: StoredRootLog | None = None
-        self._backlog: list[Request] = []
+        self._backlog: list[RootRequest] = []
         self._refusal: Exception | None = None  # why every request is refused
         self._opened = False
 
@@ -99,7 +99,7 @@ class RootThread:
             for each in requests:
                 each.tell()
 
-    def receive(self, place: Place, message: say.Request, reply: say.Reply | None) -> None:
+    def receive(self, place: ShardAddress, message: say.Request, reply: say.Reply | None) -> None:
         """Handle the reply of a shard to a message; None where the message came too late."""
         self._do(partial(self._receive, place, message, reply))
 
@@ -163,7 +163,7 @@ class RootThread:
         backlog, self._backlog = self._backlog, []
         self._submit(backlog)
 
-    def _submit(self, requests: Sequence[Request]) -> None:
+    def _submit(self, requests: Sequence[RootRequest]) -> None:
         for request in requests:
             if isinstance(request, AskedWrite) and request.for_another_hull:
                 request.answer(error=HullNotFoundError(self._hull.name))
@@ -174,7 +174,7 @@ class RootThread:
             else:
                 self._root.submit(request)
 
-    def _receive(self, place: Place, message: say.Request, reply: say.Reply | None) -> None:
+    def _receive(self, place: ShardAddress, message: say.Request, reply: say.Reply | None) -> None:
         if self._root is None:
             return
         if reply is not None:
@@ -235,6 +235,6 @@ class RootThread:
         return None if isinstance(error, HullNotFoundError | StoppingError) else error
 
 
-def _refuse(requests: Sequence[Request], error: Exception) -> None:
+def _refuse(requests: Sequence[RootRequest], error: Exception) -> None:
     for request in requests:
         request.answer(error=error)

@@ -25,7 +25,7 @@ from dynhull_server.state.root_state import RootState
 from dynhull_server.storage.port import DamagedError
 
 from ..shards import messages as say
-from ..shards.placement import Place
+from ..shards.placement import ShardAddress
 from .asked import Asked, AskedExpiry, AskedRead, AskedReshard, AskedWrite
 from .peers import PeerAwayError
 from .root_thread import RootThread, Turn
@@ -39,9 +39,9 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 
 Reply = TypeVar("Reply")
 # Brings a message to a shard, and returns its reply. Raises PeerAwayError.
-Deliver = Callable[[Place, say.Request], Awaitable[say.Reply | None]]
+Deliver = Callable[[ShardAddress, say.Request], Awaitable[say.Reply | None]]
 # Returns the last epoch that a shard knows of; it is created if there is none. Raises PeerAwayError.
-Greet = Callable[[Place], Awaitable[int]]
+Greet = Callable[[ShardAddress], Awaitable[int]]
 
 
 class ServedRoot:
@@ -68,9 +68,9 @@ class ServedRoot:
         self._thread = RootThread(driver, epoch, hull, self._took)
         self._waits = False
         self._generations: frozenset[int] | None = None  # those that are needed; None where that is not known
-        self._couriers: dict[Place, tuple[say.Request, asyncio.Task[None]]] = {}
-        self._unanswered: dict[Place, float] = {}  # since when
-        self._away: set[Place] = set()
+        self._couriers: dict[ShardAddress, tuple[say.Request, asyncio.Task[None]]] = {}
+        self._unanswered: dict[ShardAddress, float] = {}  # since when
+        self._away: set[ShardAddress] = set()
         self._closed = False
         self._starting = self._loop.create_task(self._start(FIRST_PAUSE))
 
@@ -210,11 +210,11 @@ class ServedRoot:
             _, division = await self._driver.ask(read)
         except Exception as error:  # the storage may have failed
             return error
-        places = [Place(division.generation, number) for number in range(division.shards)]
+        places = [ShardAddress(division.generation, number) for number in range(division.shards)]
         greeted = await asyncio.gather(*map(self._greeted, places))
         return await self._thread.begin(max(greeted))
 
-    async def _greeted(self, place: Place) -> int:
+    async def _greeted(self, place: ShardAddress) -> int:
         self._unanswered.setdefault(place, self._clock.monotonic())
         return await self._answer_of(place, lambda: self._greet(place))
 
@@ -249,7 +249,7 @@ class ServedRoot:
             self._unanswered.setdefault(place, now)
             self._couriers[place] = message, self._loop.create_task(self._bring(place, message))
 
-    async def _bring(self, place: Place, message: say.Request) -> None:
+    async def _bring(self, place: ShardAddress, message: say.Request) -> None:
         """Bring a message to a shard, which is created for the first one, and the reply to the root."""
         if isinstance(message, say.Open):
             await self._answer_of(place, lambda: self._greet(place))
@@ -257,7 +257,7 @@ class ServedRoot:
         reply = await self._answer_of(place, lambda: self._deliver(place, message))
         self._thread.receive(place, message, reply)
 
-    async def _answer_of(self, place: Place, ask: Callable[[], Awaitable[Reply]]) -> Reply:
+    async def _answer_of(self, place: ShardAddress, ask: Callable[[], Awaitable[Reply]]) -> Reply:
         """Ask a shard, again and again until it answers."""
         while True:
             try:
@@ -273,7 +273,7 @@ class ServedRoot:
                 self._heard(place)
                 return answer
 
-    def _heard(self, place: Place) -> None:
+    def _heard(self, place: ShardAddress) -> None:
         self._unanswered.pop(place, None)
         self._away.discard(place)
 

@@ -107,7 +107,7 @@ class Member:
         self._settled = asyncio.Event()
         self.address = settings.cluster_host
         self.registry = CollectorRegistry(auto_describe=False)
-        self.registry.register(_Collector(self._served, self._board))
+        self.registry.register(_PartitionCollector(self._served, self._board))
 
     async def start(self) -> None:
         """Join the cluster, and take what is free.
@@ -353,7 +353,7 @@ class Member:
         await self._served.pop(number).drain(LAST_STATUSES)
 
 
-class _Collector(Collector):
+class _PartitionCollector(Collector):
     """The metrics of all partitions of a process."""
 
     def __init__(self, served: dict[int, Server], board: Board) -> None:

@@ -18,7 +18,7 @@ from dynhull_server.storage.rows.encoding import weight
 from dynhull_server.storage.rows.examine import Findings, examine
 from dynhull_server.storage.rows.fence_examine import FenceExamination, FoundFences
 from dynhull_server.storage.rows.hull_rows import FORMATS
-from dynhull_server.storage.rows.ledger import HullRows, Ledger, Snapshot
+from dynhull_server.storage.rows.ledger import HullRows, Ledger, StoredSnapshot
 from dynhull_server.storage.rows.tables import FORMAT
 from dynhull_server.storage.rows.totals import Totals, totals_from
 
@@ -189,14 +189,14 @@ class Follower:
         ledger = self.ledger
         known = {each.id for hull in ledger.hulls.values() for each in hull.snapshots}
         there: set[int] = set()
-        new: dict[int, tuple[int, Snapshot]] = {}
+        new: dict[int, tuple[int, StoredSnapshot]] = {}
         orphans = array("q")
         for place, number, revision, chunks in self._reader.every("snapshots", "id, hull, revision, chunks"):
             there.add(place)
             if number not in ledger.hulls:
                 orphans.append(place)
             elif place not in known:
-                new[place] = number, Snapshot(place, revision, array("q", [0]) * chunks)
+                new[place] = number, StoredSnapshot(place, revision, array("q", [0]) * chunks)
         ledger.dead["snapshots"] = orphans
         for place, of, number in self._reader.every("chunks", "rowid, snapshot, number"):
             if of in new:

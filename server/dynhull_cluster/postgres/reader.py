@@ -101,7 +101,7 @@ class BegunReader(PostgresReader):
         """Read on as of the same moment."""
 
 
-class Readers:
+class ReaderPool:
     """Connections for reading. Some are kept; one that has failed is not used again.
 
     Args:

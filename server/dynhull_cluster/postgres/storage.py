@@ -19,15 +19,15 @@ from psycopg.errors import DiskFull
 
 from dynhull_server.state.changes import Change
 from dynhull_server.state.errors import words, words_for_callers
-from dynhull_server.state.records import Committed
+from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import (
-    Contents,
     DamagedError,
     NotCommittedError,
     Progress,
-    Step,
     StorageError,
+    StorageStep,
+    StoredContents,
     TakenOverError,
 )
 from dynhull_server.storage.refusals import Meaning
@@ -41,7 +41,7 @@ from .examination import examined
 from .follower import Follower
 from .origin import NOTE, begin_anew_if_copied, place_of
 from .ownership import REQUIRE, Leases, Ownership, taken_over, writer_name
-from .reader import BegunReader, PostgresReader, Readers
+from .reader import BegunReader, PostgresReader, ReaderPool
 from .schema import UPDATE_TOTALS, hold, prepare, put_totals, queries_of, require_partitions
 
 # With `off` commits survive the end of this process; a crash of PostgreSQL may lose those since the last `sync`.
@@ -113,7 +113,7 @@ class PostgresStorage(RowStorage):
 
     # Opening and closing
 
-    def follow(self, progress: Progress) -> Contents:
+    def follow(self, progress: Progress) -> StoredContents:
         """Read the partition while another server owns it, and later what has come since."""
         if self._follower is None:
             with ExitStack() as stack:
@@ -130,7 +130,7 @@ class PostgresStorage(RowStorage):
         self._ledger = self._follower.ledger
         return self._contents([])
 
-    def open(self, progress: Progress) -> Contents:
+    def open(self, progress: Progress) -> StoredContents:
         """Own the partition, examine it, repair what can be repaired, and load it."""
         with ExitStack() as stack:
             stack.push(self._open.pop_all())
@@ -146,7 +146,7 @@ class PostgresStorage(RowStorage):
                 self._write(Group(self._ledger, findings.repairs))
             idle = () if self._follower is None else (self._follower.connection,)
             self._follower = None
-            self._readers = Readers(
+            self._readers = ReaderPool(
                 partial(self._database.connect, f"dynhull reader {self._partition}"), self._partition, idle
             )
             stack.callback(self._readers.close)
@@ -199,7 +199,7 @@ class PostgresStorage(RowStorage):
 
     # Committing
 
-    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> Committed:
+    def commit(self, changes: Sequence[Change | StorageStep], now: int = 0) -> CommitStamp:
         """Commit all of the changes or none."""
         group = self._group(changes, now)
         self._write(group)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dynhull_server.storage.port import DamagedError, LockedError, Progress, StorageError
-from dynhull_server.storage.rows.divided import Part, latest_epoch
+from dynhull_server.storage.rows.divided import DatabaseView, latest_epoch
 from dynhull_server.storage.rows.examine import Findings
 from dynhull_server.storage.rows.tables import COLUMNS, Insert, Reader
 from dynhull_server.storage.rows.totals import STOPPED
@@ -91,7 +91,7 @@ def to_database(folder: Path, database: Database, progress: Progress) -> Moved:
             copy = examined(connection, partition, lambda *_: None)
             _require_same(findings, copy, str(database))
             moved.add(findings)
-            epoch = max(epoch, latest_epoch(Part(PostgresReader(connection, partition), copy.ledger)))
+            epoch = max(epoch, latest_epoch(DatabaseView(PostgresReader(connection, partition), copy.ledger)))
         for partition in range(len(parts)):
             follow_owner(connection, partition, owner_of(epoch))
     return moved

@@ -24,7 +24,7 @@ def inverse_of(admitted: Admitted | None, contents: LiveContents, settings: Hull
     """
     if isinstance(contents, Multiset) and isinstance(admitted, Batch):
         return _of_points(admitted, contents)
-    if isinstance(contents, keyed.Keyed) and isinstance(admitted, gate.Admitted) and admitted.clock is None:
+    if isinstance(contents, keyed.Keyed) and isinstance(admitted, gate.AdmittedPuts) and admitted.clock is None:
         return _of_keys(admitted.rows, contents)
     copy = Kept(0, contents.stored(), clock=contents.clock)
     return lambda: replayed(copy, settings)
@@ -63,4 +63,4 @@ def _of_keys(rows: KeyRows, contents: keyed.Keyed) -> Inverse:
 
 
 def _apply(contents: keyed.Keyed, rows: KeyRows) -> None:
-    contents.apply(gate.Admitted(rows, None, 0, 0, refuse_missing=False), 0)
+    contents.apply(gate.AdmittedPuts(rows, None, 0, 0, refuse_missing=False), 0)

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from dynhull_server.state.records import Cause, Division, Kept, Record
 
-from .messages import Change, Effect
+from .messages import Effect, VertexChange
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Decision:
     may_skip: bool = False
     effects: Mapping[int, Effect] = field(default_factory=dict)
     division: Division | None = None
-    replaced: Change | None = None
+    replaced: VertexChange | None = None
 
 
 class FencedError(Exception):

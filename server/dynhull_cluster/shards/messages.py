@@ -162,7 +162,7 @@ class Corners:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class VertexChange:
     """The vertices that have gone from a shard's hull, and those that have come; one of another key has done both."""
 
     gone: Corners
@@ -170,7 +170,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Totals:
+class ShardTotals:
     """Counts of a shard.
 
     Attributes:
@@ -189,7 +189,7 @@ class Opened(Message):
     """The shard is at the root's last decision: the last step in its log, its counts, and all of its vertices."""
 
     number: int
-    totals: Totals
+    totals: ShardTotals
     corners: Corners
 
 
@@ -208,11 +208,11 @@ class Effect:
     """
 
     number: int
-    totals: Totals
+    totals: ShardTotals
     expired: int = 0
-    left: Change | None = None
+    left: VertexChange | None = None
     applied: Applied | None = None
-    changed: Change | None = None
+    changed: VertexChange | None = None
     error: RefusedError | None = None
 
     @property

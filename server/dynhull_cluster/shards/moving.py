@@ -41,7 +41,7 @@ def puts(contents: Contents, clock: int | None) -> Iterator[Admitted]:
     if keys is None:
         batch = Batch(contents.points, NO_POINTS, 0, count_missing=False)
         if len(batch.inserts):
-            yield batch if times is None else windowed.Admitted(batch, times, clock, 0, 0)
+            yield batch if times is None else windowed.AdmittedRows(batch, times, clock, 0, 0)
         return
     dated = np.zeros(len(keys), np.bool_) if times is None else times != NO_TIME
     for have_times in (False, True):  # a put gives all of its keys a time, or none
@@ -54,4 +54,4 @@ def puts(contents: Contents, clock: int | None) -> Iterator[Admitted]:
                 times[rows] if have_times and times is not None else None,
                 None if contents.deadlines is None else contents.deadlines[rows],
             )
-            yield gate.Admitted(put, clock, 0, 0, refuse_missing=False)
+            yield gate.AdmittedPuts(put, clock, 0, 0, refuse_missing=False)

@@ -17,7 +17,7 @@ from dynhull_surface.counts import COUNTS
 
 from .placement import Hashes, key_hashes, point_hashes, shards_of
 
-Admitted = Batch | windowed.Admitted | gate.Admitted
+Admitted = Batch | windowed.AdmittedRows | gate.AdmittedPuts
 RowNumbers = npt.NDArray[np.intp]
 NO_ROWS: RowNumbers = np.empty(0, np.intp)
 
@@ -37,7 +37,7 @@ class Part:
 
 def refusable(admitted: Admitted) -> bool:
     """Whether it depends on the points of a shard whether it refuses the batch."""
-    if isinstance(admitted, gate.Admitted):
+    if isinstance(admitted, gate.AdmittedPuts):
         return admitted.refuse_missing and len(admitted.rows.removes) > 0
     batch = _batch(admitted)
     return not batch.count_missing and len(batch.deletes) > 0
@@ -45,7 +45,7 @@ def refusable(admitted: Admitted) -> bool:
 
 def most_growth(admitted: Admitted) -> int:
     """The largest increase in the number of points."""
-    return len(admitted.rows.keys) if isinstance(admitted, gate.Admitted) else _batch(admitted).growth
+    return len(admitted.rows.keys) if isinstance(admitted, gate.AdmittedPuts) else _batch(admitted).growth
 
 
 def refuse_repeated(rows: KeyRows) -> None:
@@ -57,7 +57,7 @@ def refuse_repeated(rows: KeyRows) -> None:
 
 def divided(admitted: Admitted, count: int) -> dict[int, Part]:
     """The part of each shard that has one. O(k + count)."""
-    if isinstance(admitted, gate.Admitted):
+    if isinstance(admitted, gate.AdmittedPuts):
         rows = admitted.rows
         puts = _by_shard(key_hashes(rows.keys), count)
         removes = _by_shard(key_hashes(rows.removes), count)
@@ -89,11 +89,11 @@ def first_refusal(admitted: Admitted, refusals: Sequence[tuple[Part, RefusedErro
     row, error = min(rows, key=lambda each: each[0])
     if isinstance(error, KeyMissingError):
         return KeyMissingError(row, error.key)
-    assert not isinstance(admitted, gate.Admitted)  # it has no points to delete
+    assert not isinstance(admitted, gate.AdmittedPuts)  # it has no points to delete
     return missing_point(_batch(admitted), row, error.point)
 
 
-def _batch(admitted: Batch | windowed.Admitted) -> Batch:
+def _batch(admitted: Batch | windowed.AdmittedRows) -> Batch:
     return admitted if isinstance(admitted, Batch) else admitted.batch
 
 
@@ -109,16 +109,16 @@ def _joined(one: dict[int, RowNumbers], other: dict[int, RowNumbers]) -> dict[in
     return {shard: (one.get(shard, NO_ROWS), other.get(shard, NO_ROWS)) for shard in sorted({*one, *other})}
 
 
-def _points_part(admitted: Batch | windowed.Admitted, inserts: RowNumbers, deletes: RowNumbers) -> Part:
+def _points_part(admitted: Batch | windowed.AdmittedRows, inserts: RowNumbers, deletes: RowNumbers) -> Part:
     batch = _batch(admitted)
     # Origin and destination of a move may belong to different shards, so a part has inserts and deletes alone.
     part = Batch(batch.inserts[inserts], batch.deletes[deletes], 0, batch.count_missing)
     if isinstance(admitted, Batch):
         return Part(part, deletes)
-    return Part(windowed.Admitted(part, admitted.times[inserts], admitted.clock, 0, 0), deletes)
+    return Part(windowed.AdmittedRows(part, admitted.times[inserts], admitted.clock, 0, 0), deletes)
 
 
-def _keyed_part(admitted: gate.Admitted, puts: RowNumbers, removes: RowNumbers) -> Part:
+def _keyed_part(admitted: gate.AdmittedPuts, puts: RowNumbers, removes: RowNumbers) -> Part:
     rows = admitted.rows
     part = KeyRows(
         keys_at(rows.keys, puts),
@@ -128,7 +128,7 @@ def _keyed_part(admitted: gate.Admitted, puts: RowNumbers, removes: RowNumbers) 
         None if rows.deadlines is None else rows.deadlines[puts],
         rows.condition,
     )
-    return Part(gate.Admitted(part, admitted.clock, 0, 0, admitted.refuse_missing), removes)
+    return Part(gate.AdmittedPuts(part, admitted.clock, 0, 0, admitted.refuse_missing), removes)
 
 
 def keys_at(keys: Keys, rows: RowNumbers) -> Keys:

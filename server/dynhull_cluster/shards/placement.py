@@ -14,7 +14,7 @@ from dynhull_server.state.records import Keys
 SLOTS = 1024
 
 
-class Place(NamedTuple):
+class ShardAddress(NamedTuple):
     """A shard: its number in a division of a hull. Each division has a generation that no other one of the hull has."""
 
     generation: int

@@ -13,7 +13,7 @@ from dynhull_server.state.taking import TRIP_ROWS
 
 from .messages import Effect, Step
 from .parts import Admitted, Part, divided, first_refusal, most_growth, refusable, refuse_repeated
-from .requests import Write
+from .requests import RootWrite
 
 
 @dataclass(slots=True)
@@ -30,7 +30,7 @@ class Plan:
         undoable: whether a shard may have to undo it.
     """
 
-    request: Write
+    request: RootWrite
     number: int
     admitted: Admitted
     clock: int | None
@@ -49,7 +49,7 @@ class Plan:
         if refusals:
             return first_refusal(self.admitted, refusals)
         after, grows = points - sum(effect.expired for effect in effects.values()), True
-        if isinstance(self.admitted, gate.Admitted):
+        if isinstance(self.admitted, gate.AdmittedPuts):
             applied = [effect.applied for effect in effects.values() if effect.applied is not None]
             new = sum(each.inserted for each in applied)
             after += new - sum(each.deleted for each in applied)
@@ -86,7 +86,7 @@ class Planner:
         self._sequences: dict[str, int] = {}
         self._doubtful = False  # whether one of them may be refused
 
-    def begin(self, request: Write, number: int, points: int, clock: int | None) -> Plan | None:
+    def begin(self, request: RootWrite, number: int, points: int, clock: int | None) -> Plan | None:
         """The plan of the first batch of a round; None where it has already been applied; or raise what refuses it."""
         self._number, self._points, self._clock = number, points, clock
         self._rows, self._sequences, self._doubtful = 0, {}, False
@@ -97,7 +97,7 @@ class Planner:
             return None
         return self._take(request, *self._admitted(write))
 
-    def join(self, request: Write) -> Plan | None:
+    def join(self, request: RootWrite) -> Plan | None:
         """The plan of a further batch of the round; None if it has to wait for the next one."""
         write = request.batch
         if write.producer:
@@ -114,7 +114,7 @@ class Planner:
             return None
         return self._take(request, admitted, clock)
 
-    def _take(self, request: Write, admitted: Admitted, clock: int | None) -> Plan:
+    def _take(self, request: RootWrite, admitted: Admitted, clock: int | None) -> Plan:
         parts = divided(admitted, self.shards)
         shards: Collection[int] = range(self.shards) if clock != self._clock else parts
         suspect = self._points + most_growth(admitted) > self._most_points
@@ -142,6 +142,6 @@ class Planner:
             if self._points + admitted.growth > self._most_points:
                 raise LimitExceededError("max_points", self._most_points)
             return admitted, None
-        if isinstance(admitted, gate.Admitted):
+        if isinstance(admitted, gate.AdmittedPuts):
             refuse_repeated(admitted.rows)
         return admitted, admitted.clock

@@ -9,7 +9,7 @@ from .messages import Question
 
 
 @dataclass(slots=True, eq=False)
-class Request:
+class RootRequest:
     """A request of a caller.
 
     Attributes:
@@ -28,7 +28,7 @@ class Request:
 
 
 @dataclass(slots=True, eq=False)
-class Write(Request):
+class RootWrite(RootRequest):
     """Apply a batch that arrived at `now`, seconds on a monotonic clock. The result is an Applied."""
 
     batch: WriteBatch
@@ -42,21 +42,21 @@ class Write(Request):
 
 
 @dataclass(slots=True, eq=False)
-class Expire(Request):
+class ExpirePoints(RootRequest):
     """Make the points leave that leave at `clock`. The result is their number."""
 
     clock: int
 
 
 @dataclass(slots=True, eq=False)
-class Reshard(Request):
+class Reshard(RootRequest):
     """Divide the points among another number of shards. The result is the revision that did, or has found it so."""
 
     shards: int
 
 
 @dataclass(slots=True, eq=False)
-class Read(Request):
+class Read(RootRequest):
     """A question about all points. The result is the revision, and the answer.
 
     For StaticHull the answer is whether it is equal; for FoundOf, AllOf and Recompute it is the answers of all shards,

@@ -16,16 +16,16 @@ from dynhull_server.state.sample import sample
 
 from . import messages as say
 from .logs import Decision, RootLog
-from .messages import Change, Corners, Totals
+from .messages import Corners, ShardTotals, VertexChange
 from .moving import puts
 from .parts import merged
-from .placement import SLOTS, Piece, Place, pieces
+from .placement import SLOTS, Piece, ShardAddress, pieces
 from .planning import Plan, Planner
-from .requests import Expire, Read, Request, Reshard, Write
+from .requests import ExpirePoints, Read, Reshard, RootRequest, RootWrite
 
-Round = dict[Place, say.Request]
+Round = dict[ShardAddress, say.Request]
 Effects = Mapping[int, say.Effect]
-Replies = dict[Place, Any]
+Replies = dict[ShardAddress, Any]
 Talk = Generator[Round, Any, Any]
 Names = dict[tuple[float, float], list[Any]]
 
@@ -84,10 +84,10 @@ class Root:
         self.clock: int | None = decided.clock
         self.hull: DynamicHull | None = None
         self._names: Names = {}  # the key of each shard that has this vertex
-        self._totals = [Totals(0, 0, None)] * shards
+        self._totals = [ShardTotals(0, 0, None)] * shards
         self._numbers = [decided.steps.get(shard, 0) for shard in range(shards)]  # the last step in the log of each
-        self._waiting: deque[Request] = deque()
-        self._current: list[Request] = []
+        self._waiting: deque[RootRequest] = deque()
+        self._current: list[RootRequest] = []
         self._ticket = 0
         self._talk: Talk | None = self._open()
         self._sent: Round = {}
@@ -96,7 +96,7 @@ class Root:
 
     # Requests and messages
 
-    def submit(self, request: Request) -> None:
+    def submit(self, request: RootRequest) -> None:
         """Serve the request after those before it.
 
         Raises:
@@ -108,7 +108,7 @@ class Root:
         if self._talk is None:
             self._go_on(self._next(), None)
 
-    def messages(self) -> list[tuple[Place, say.Request]]:
+    def messages(self) -> list[tuple[ShardAddress, say.Request]]:
         """The messages without a reply, each with its shard: send them, and again after a while."""
         return [(place, each) for place, each in self._sent.items() if place not in self._replies]
 
@@ -117,7 +117,7 @@ class Root:
         """The generations whose shards are needed; the shards of all others are not."""
         return frozenset(each.generation for each in (self._division, self._arising) if each is not None)
 
-    def receive(self, place: Place, reply: say.Reply) -> None:
+    def receive(self, place: ShardAddress, reply: say.Reply) -> None:
         """Handle a reply of a shard.
 
         Raises:
@@ -154,7 +154,7 @@ class Root:
         if begun:  # otherwise they are being opened
             self._begin_again()
 
-    def leave(self) -> tuple[list[Request], list[Request]]:
+    def leave(self) -> tuple[list[RootRequest], list[RootRequest]]:
         """The requests under way, and those that wait, for another root to serve: this one has failed."""
         current, waiting = self._current, list(self._waiting)
         self._current = []
@@ -195,9 +195,9 @@ class Root:
         request = self._waiting.popleft()
         self._current = [request]
         match request:
-            case Write():
+            case RootWrite():
                 return self._write(request)
-            case Expire():
+            case ExpirePoints():
                 return self._expire(request)
             case Reshard():
                 return self._reshard(request)
@@ -206,10 +206,10 @@ class Root:
         raise AssertionError(f"not a request: {request}")
 
     def _drop_abandoned(self) -> None:
-        while self._waiting and (first := self._waiting[0]) and isinstance(first, Write) and first.abandoned:
+        while self._waiting and (first := self._waiting[0]) and isinstance(first, RootWrite) and first.abandoned:
             self._waiting.popleft()
 
-    def _answer(self, request: Request, result: Any = None, error: Exception | None = None) -> None:
+    def _answer(self, request: RootRequest, result: Any = None, error: Exception | None = None) -> None:
         self._current.remove(request)
         request.answer(result, error)
 
@@ -281,14 +281,14 @@ class Root:
                 steps = f"is at step {replies[shard].number}, not {self._numbers[shard]}"
                 raise ShardsDifferError(f"shard {shard} {steps}: its log has lost steps, or is that of another hull")
             self._totals[shard] = replies[shard].totals
-            _take(hull, names, [say.Change(NOTHING, replies[shard].corners)])
+            _take(hull, names, [say.VertexChange(NOTHING, replies[shard].corners)])
         if self.hull is not None and not (
             np.array_equal(hull.points(), self.hull.points()) and _same(names, self._names)
         ):
             raise ShardsDifferError("shards have other vertices after a restart than before")
         self.hull, self._names = hull, names
 
-    def _write(self, first: Write) -> Talk:
+    def _write(self, first: RootWrite) -> Talk:
         try:
             plan = self._planner.begin(first, self._number, self.points, self.clock)
         except Exception as error:  # any error is the answer to the caller
@@ -329,7 +329,7 @@ class Root:
         """The plans of the batches behind the first one that make the round with it."""
         while True:
             self._drop_abandoned()
-            if not self._waiting or not isinstance(self._waiting[0], Write):
+            if not self._waiting or not isinstance(self._waiting[0], RootWrite):
                 return
             plan = self._planner.join(self._waiting[0])
             if plan is None:
@@ -372,7 +372,7 @@ class Root:
             result.expired = sum(effect.expired for effect in own.values())
             self._answer(plan.request, result)
 
-    def _expire(self, request: Expire) -> Talk:
+    def _expire(self, request: ExpirePoints) -> Talk:
         clock = request.clock if self.clock is None else max(request.clock, self.clock)
         number = self._number + 1
         step = say.Step(number, None, clock, undoable=False)
@@ -391,7 +391,7 @@ class Root:
     def _round(self, messages: Mapping[int, say.Request]) -> Generator[Round, Any, dict[int, Any]]:
         """The replies to messages to shards of the present division."""
         generation = self._division.generation
-        replies = yield {Place(generation, shard): each for shard, each in messages.items()}
+        replies = yield {ShardAddress(generation, shard): each for shard, each in messages.items()}
         return {place.number: each for place, each in replies.items()}
 
     # Another division
@@ -409,7 +409,7 @@ class Root:
         self._ticket = 1
         yield from self._open()
         self._arising = arising = Division(request.shards, self._epoch)
-        new = [Place(arising.generation, number) for number in range(arising.shards)]
+        new = [ShardAddress(arising.generation, number) for number in range(arising.shards)]
         yield dict.fromkeys(new, say.Open(self._epoch, self._ticket, 0))
         filled = yield from self._fill(arising)
         assert self.hull is not None  # all shards are open
@@ -424,7 +424,7 @@ class Root:
             frozenset(shard for shard, number in enumerate(filled.numbers) if number),
             effects={shard: say.Effect(filled.numbers[shard], each) for shard, each in enumerate(filled.totals)},
             division=arising,
-            replaced=Change(_corners(self.hull, self._names), _corners(filled.hull, filled.names)),
+            replaced=VertexChange(_corners(self.hull, self._names), _corners(filled.hull, filled.names)),
         )
         self._log.decide(self._epoch, [decision])
         self._division, self._arising = arising, None
@@ -451,14 +451,14 @@ class Root:
                     filled.number += 1
                     steps.setdefault(piece.target, []).append(say.Step(filled.number, part, None, undoable=False))
             round_of_both: Round = {
-                Place(self._division.generation, source): say.Ask(
+                ShardAddress(self._division.generation, source): say.Ask(
                     self._epoch, self._ticket, say.SlotsOf(piece.first, piece.end)
                 )
                 for source, piece in asked.items()
             }
             for target, some in steps.items():
                 apply = say.Apply(self._epoch, self._ticket, tuple(some))
-                round_of_both[Place(arising.generation, target)] = apply
+                round_of_both[ShardAddress(arising.generation, target)] = apply
             replies = yield round_of_both
             for target in steps:
                 filled.take(target, replies[arising.generation, target].effects)
@@ -476,7 +476,7 @@ class Root:
         self._take_changes(effect.left for effect in effects.values())
         return self._take_changes(effect.changed for effect in effects.values())
 
-    def _take_changes(self, changes: Iterable[say.Change | None]) -> bool:
+    def _take_changes(self, changes: Iterable[say.VertexChange | None]) -> bool:
         """Bring the hull to what the shards have. Returns whether it has changed."""
         assert self.hull is not None  # requests wait until it is open
         before = self.hull.changes
@@ -497,7 +497,7 @@ class _Filled:
     def __init__(self, number: int, shards: int) -> None:
         self.number = number
         self.numbers = [0] * shards
-        self.totals = [Totals(0, 0, None)] * shards
+        self.totals = [ShardTotals(0, 0, None)] * shards
         self.hull = DynamicHull()
         self.names: Names = {}
 
@@ -514,7 +514,7 @@ def _logged(effects: Effects) -> frozenset[int]:
     return frozenset(shard for shard, effect in effects.items() if effect.logged)
 
 
-def _take(hull: DynamicHull, names: Names, changes: Sequence[say.Change]) -> None:
+def _take(hull: DynamicHull, names: Names, changes: Sequence[say.VertexChange]) -> None:
     """Apply changes of shards' vertices to the hull of all, as one batch."""
     if not changes:
         return

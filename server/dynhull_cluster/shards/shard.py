@@ -27,7 +27,6 @@ from .messages import (
     Answered,
     Apply,
     Ask,
-    Change,
     Closed,
     Corners,
     CountOf,
@@ -43,12 +42,13 @@ from .messages import (
     Reply,
     Request,
     SampleOf,
+    ShardTotals,
     SlotsOf,
     StaticHull,
     Step,
-    Totals,
     Undo,
     Undone,
+    VertexChange,
 )
 from .moving import Dealt
 
@@ -189,7 +189,7 @@ class Shard:
             self._corners_as_of = self._contents.hull.changes
         return Undone(message.epoch, message.ticket)
 
-    def _follow(self, contents: LiveContents) -> Change | None:
+    def _follow(self, contents: LiveContents) -> VertexChange | None:
         """How the vertices have changed since this was last called. O(1) where they have not and have no keys."""
         if not isinstance(contents, Keyed) and contents.hull.changes == self._corners_as_of:
             return None
@@ -239,8 +239,8 @@ def _recomputed(contents: LiveContents) -> Recomputed:
     return Recomputed(len(points), vertices, tuple(each for each in trace if isinstance(each, Round)), whole)
 
 
-def _totals(contents: LiveContents) -> Totals:
-    return Totals(len(contents.hull), contents.hull.distinct, contents.due)
+def _totals(contents: LiveContents) -> ShardTotals:
+    return ShardTotals(len(contents.hull), contents.hull.distinct, contents.due)
 
 
 def _corners(contents: LiveContents) -> Corners:
@@ -248,7 +248,7 @@ def _corners(contents: LiveContents) -> Corners:
     return Corners(contents.hull.vertices().copy(), keys)
 
 
-def _difference(before: Corners, after: Corners) -> Change | None:
+def _difference(before: Corners, after: Corners) -> VertexChange | None:
     if before.keys is None or after.keys is None:
         old, new = as_numbers(before.points), as_numbers(after.points)
         gone = np.isin(old, new, assume_unique=True, invert=True)
@@ -258,7 +258,7 @@ def _difference(before: Corners, after: Corners) -> Change | None:
         gone, come = _missing_from(named[1], before), _missing_from(named[0], after)
     if not gone.any() and not come.any():
         return None
-    return Change(_selected(before, gone), _selected(after, come))
+    return VertexChange(_selected(before, gone), _selected(after, come))
 
 
 def _missing_from(named: set[Any], corners: Corners) -> Rows:

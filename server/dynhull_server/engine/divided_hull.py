@@ -11,7 +11,7 @@ from ..state.errors import HullUnsuitableError
 from ..state.hull import Hull
 from ..state.hull_state import Counts
 from ..state.records import QuarantineRules
-from .division import Division
+from .division import DividedReads
 from .driver import Driver
 from .fences import Fences
 from .layers import Layers, Peeling
@@ -50,7 +50,7 @@ class DividedHull(LiveHull):
         recalls: Recalls,
         fences: Fences,
         copies: asyncio.Semaphore,
-        division: Division,
+        division: DividedReads,
     ) -> None:
         super().__init__(driver, hull, recalls, fences, copies)
         self.division = division

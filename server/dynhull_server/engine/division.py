@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .verification import Verification
 
 
-class Division(Protocol):
+class DividedReads(Protocol):
     """The shards of one hull, as its root asks them. What is read is of one revision, that of the counts.
 
     Every method may raise ShardAwayError, where a shard does not answer; then nothing has changed.
@@ -88,7 +88,7 @@ class Divisions(Protocol):
     def carry_out(self, hull: Hull, requests: Sequence[WriteBatch | Expire]) -> None:
         """Carry out requests in this order, and answer them."""
 
-    def of(self, hull: Hull) -> Division:
+    def of(self, hull: Hull) -> DividedReads:
         """The shards of a hull."""
 
     def shards(self) -> Sequence[StoredShard]:

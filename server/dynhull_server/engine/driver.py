@@ -34,7 +34,7 @@ from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
-from ..state.records import Committed, Kept
+from ..state.records import CommitStamp, Kept
 from ..state.requests import Birth, Expire, Request, WriteBatch
 from ..state.trip import Trip
 from ..storage.port import Storage
@@ -110,7 +110,7 @@ class Driver:
         self.supervisor = supervisor
         self.machine = machine
         self.core = Core(limits)
-        self.published = Committed(0, 0)
+        self.published = CommitStamp(0, 0)
         self._storage = storage
         self._events: deque[Event] = deque()
         self._calls: deque[Callable[[], None]] = deque()
@@ -132,7 +132,7 @@ class Driver:
         self._turns, self._reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
         self._disk = threads.pool("disk", DISK_THREADS)
 
-    def start(self, hulls: HullObserver, fences: FenceObserver, committed: Committed) -> None:
+    def start(self, hulls: HullObserver, fences: FenceObserver, committed: CommitStamp) -> None:
         """Serve the hulls and fences of the core.
 
         Args:
@@ -156,6 +156,7 @@ class Driver:
             lambda error: self._from_thread(partial(self._commit_reported, error)),
             lambda error: self._from_thread(partial(self.supervisor.died, "commits", error)),
         )
+        self._ticked = self._commit_time.now()
         self._started = True
         self.supervisor.every(TICK, "clock", self._tick)
         self.supervisor.every(WATCH_SECONDS, "commit watch", self._watch_commits)
@@ -272,8 +273,8 @@ class Driver:
         match effect:
             case Reply():
                 if effect.moved:
-                    if not self._storage.keeps:  # it does not number its commits
-                        self.published = Committed(self.published.number + 1, self._commit_time.now())
+                    if not self._storage.keeps:  # it does not number its commits: nor does it need their time exactly
+                        self.published = CommitStamp(self.published[0] + 1, self._ticked)
                     self._hulls.moved(effect.moved)
                 for request in effect.requests:
                     request.to.answer(request)
@@ -307,7 +308,7 @@ class Driver:
 
         self._commits.submit(changes, done)
 
-    def _committed(self, trip: Trip, commit: Committed) -> None:
+    def _committed(self, trip: Trip, commit: CommitStamp) -> None:
         self.published = commit
         self.dispatch(events.Committed(trip))
 
@@ -384,7 +385,7 @@ class Driver:
 
     async def _tick(self) -> None:
         now = self.machine.clock.monotonic()
-        time = self.time()
+        time, self._ticked = self.time(), self._commit_time.now()
         self.dispatch(Tick(now, time, self._expiries))
         if self.supervisor.fails("expiry") and not self.core.expiring(time):  # `expiring` is O(hulls)
             self.supervisor.succeeded("expiry")

@@ -5,8 +5,8 @@ from functools import partial
 
 from ..state.core import Core
 from ..state.limits import Limits
-from ..state.records import Committed
-from ..storage.port import Contents, FollowedStorage, Progress, Storage, StorageError
+from ..state.records import CommitStamp
+from ..storage.port import FollowedStorage, Progress, Storage, StorageError, StoredContents
 from .division import Divisions
 from .driver import Driver
 from .fence_keeping import FenceKeeping
@@ -79,7 +79,7 @@ class Engine:
         """
         driver, storage = self.driver, self._storage
         driver.begin()
-        contents: Contents = await driver.on_disk(partial(self._open, progress))
+        contents: StoredContents = await driver.on_disk(partial(self._open, progress))
         driver.core = Core(
             driver.limits,
             contents.next_number,
@@ -92,7 +92,7 @@ class Engine:
         await driver.in_turn(partial(self._restore_fences, contents))
         if storage.keeps:
             self.hulls.restored(incarnation_of(contents.hulls))
-        driver.start(self.hulls, self.fences, Committed(contents.commits, contents.committed))
+        driver.start(self.hulls, self.fences, CommitStamp(contents.commits, contents.committed))
         self._started = True
         keeping = FenceKeeping(driver, self.fences, storage)
         driver.supervisor.every(keeping.SECONDS, "fences", keeping.round)
@@ -104,12 +104,12 @@ class Engine:
             raise StorageError("the storage has hulls over shards: start the server with `dynhull serve`")
         return contents.notes
 
-    def _open(self, progress: Progress) -> Contents:
+    def _open(self, progress: Progress) -> StoredContents:
         contents = self._storage.open(progress)
         self._opened = True
         return contents
 
-    def _restore_fences(self, contents: Contents) -> None:
+    def _restore_fences(self, contents: StoredContents) -> None:
         kept = self._storage.read_fences([row.number for row in contents.fences])
         self.driver.core.restore_fences([each for each in kept if each is not None])
 

@@ -16,13 +16,13 @@ from ..state.fences.model.config import FenceConfig, PolygonArea
 from ..state.fences.model.fence import Fence
 from ..state.fences.model.records import Consumer, FenceEvent, Inside
 from ..state.fences.model.requests import (
+    Acknowledge,
     CreateFence,
+    DeleteConsumer,
     DeleteFence,
-    DropConsumer,
-    DropEvents,
-    PutConsumer,
     ReadFence,
     ReplaceFence,
+    TrimEvents,
 )
 from ..state.fences.trip.leg import members
 from ..state.registry import page_of
@@ -76,17 +76,17 @@ class LiveFence:
 
     async def acknowledge(self, consumer: str, sequence: int | None, uid: str = "") -> Consumer:
         """Acknowledge events for a consumer, which is created if it is new."""
-        request = PutConsumer(Waiter(), self.name, self._driver.time(), consumer, sequence, uid)
+        request = Acknowledge(Waiter(), self.name, self._driver.time(), consumer, sequence, uid)
         found: Consumer = await self._driver.ask(request)
         return found
 
     async def drop_consumer(self, consumer: str) -> None:
         """Delete a consumer."""
-        await self._driver.ask(DropConsumer(Waiter(), self.name, self._driver.time(), consumer))
+        await self._driver.ask(DeleteConsumer(Waiter(), self.name, self._driver.time(), consumer))
 
     async def drop_events(self, first: int) -> None:
         """Drop the events before `first`."""
-        await self._driver.ask(DropEvents(Waiter(), self.name, self._driver.time(), self.fence, first))
+        await self._driver.ask(TrimEvents(Waiter(), self.name, self._driver.time(), self.fence, first))
 
     async def events(self, after: int, most: int) -> list[FenceEvent]:
         """At most that many events after a sequence, from the oldest one that is kept.

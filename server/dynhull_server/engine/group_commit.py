@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, NoReturn
 
 from ..state.changes import Change
 from ..state.errors import words, words_for_callers
-from ..storage.port import NotCommittedError, Step, Storage, TakenOverError
+from ..storage.port import NotCommittedError, Storage, StorageStep, TakenOverError
 from .threads import Clock, Inbox, Threads
 
 if TYPE_CHECKING:
-    from ..state.records import Committed
+    from ..state.records import CommitStamp
 
 # Called with the outcome of a commit: its error or None, and whether the outcome is unknown.
 Done = Callable[[Exception | None, bool], None]
@@ -26,7 +26,7 @@ STEPS_TOGETHER = 4
 class _Waiting:
     """Changes to commit; without any, a request to decide earlier commits."""
 
-    changes: Sequence[Change | Step]
+    changes: Sequence[Change | StorageStep]
     done: Done
 
 
@@ -41,7 +41,7 @@ class _Large:
         over: whether the last piece has been taken, or one has failed.
     """
 
-    def __init__(self, steps: Sequence[Step], waiting: _Waiting) -> None:
+    def __init__(self, steps: Sequence[StorageStep], waiting: _Waiting) -> None:
         self._steps = deque(steps)
         self._waiting = waiting
         self.over = False
@@ -92,11 +92,11 @@ class GroupCommit:
         self._time = time
         self._undecided = False
         self.since: float | None = None
-        self.latest: Committed | None = None
+        self.latest: CommitStamp | None = None
         self._inbox: Inbox[_Waiting] = threads.inbox()
         self._thread = threads.spawn("commits", self._run, died)
 
-    def submit(self, changes: Sequence[Change | Step], done: Done) -> None:
+    def submit(self, changes: Sequence[Change | StorageStep], done: Done) -> None:
         """Commit the changes, then call `done`, in the committing thread."""
         self._inbox.put(_Waiting(changes, done))
 

@@ -31,7 +31,7 @@ from ..state.fences.recovery.sides import Sides, sides_of
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState, VertexKeys
 from ..state.outline import GlobeOutline, Outline
-from ..state.records import Center, Committed, Contents, HullSettings, Keys, QuarantineRules
+from ..state.records import Center, CommitStamp, Contents, HullSettings, Keys, QuarantineRules
 from ..state.requests import ReadHull, ReadTogether, Recenter, WriteBatch
 from ..state.sample import sample
 from .difference import Differences
@@ -117,7 +117,7 @@ class LiveHull:
         return self._hull.counts
 
     @property
-    def committed(self) -> Committed | None:
+    def committed(self) -> CommitStamp | None:
         """The commit of the latest revision; None where it is not known."""
         return self._hull.committed
 

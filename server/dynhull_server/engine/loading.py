@@ -9,7 +9,7 @@ from ..state.hull_state import HullState
 from ..state.records import HullRow, Kept
 from ..state.root_state import state_of
 from ..state.trip import unsaved_of
-from ..storage.port import Contents, FollowedStorage, Progress, Storage
+from ..storage.port import FollowedStorage, Progress, Storage, StoredContents
 from .driver import Driver
 
 # Hulls that share queries of the storage.
@@ -44,10 +44,10 @@ class Loader:
     async def follow(self, storage: FollowedStorage, progress: Progress) -> None:
         """Load the hulls while another server owns them, or what has come since the last call."""
         self._followed = storage
-        contents: Contents = await self._driver.on_disk(partial(storage.follow, progress))
+        contents: StoredContents = await self._driver.on_disk(partial(storage.follow, progress))
         await self.load(contents, progress)
 
-    async def load(self, contents: Contents, progress: Progress) -> None:
+    async def load(self, contents: StoredContents, progress: Progress) -> None:
         """Load the hulls of the storage, or what has come since they were loaded."""
         rows = [row for row in contents.hulls if row.settings.shard is None]
         if self._loaded:

@@ -5,7 +5,7 @@ from struct import Struct
 from typing import NamedTuple
 from zlib import crc32
 
-from ..state.records import INCARNATION, Committed, HullRow
+from ..state.records import INCARNATION, CommitStamp, HullRow
 
 _STANDING = Struct(">IQQ")
 
@@ -23,7 +23,7 @@ class Standing(NamedTuple):
     number: int
     time: int
 
-    def has(self, commit: Committed | None) -> bool:
+    def has(self, commit: CommitStamp | None) -> bool:
         """Whether a commit of the same incarnation is one of these.
 
         One of a partition that was made anew is not: it is later, whatever its number.
@@ -36,7 +36,7 @@ def incarnation_of(hulls: Sequence[HullRow]) -> str:
     return next((hull.uid.partition(INCARNATION)[2] for hull in hulls if INCARNATION in hull.uid), "")
 
 
-def standing(incarnation: str, latest: Committed) -> Standing:
+def standing(incarnation: str, latest: CommitStamp) -> Standing:
     """How far a partition is while perhaps not all that its latest commit has changed is published."""
     return Standing(crc32(incarnation.encode()), max(latest.number - 1, 0), latest.time)
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..state.records import Committed
+from ..state.records import CommitStamp
 from .positions import Standing
 
 # Bytes of the states in one message, unless there is but one, and seconds of encoding after which it is sent.
@@ -25,7 +25,7 @@ SLICE = 0.005
 
 
 @dataclass(slots=True, eq=False)
-class Entry:
+class RosterEntry:
     """One name.
 
     Attributes:
@@ -41,7 +41,7 @@ class Entry:
     name: str
     version: int
     partition: int = 0
-    commit: Committed | None = None
+    commit: CommitStamp | None = None
     new: bool = False
     gone: bool = False
     state: bytes | None = None
@@ -53,10 +53,10 @@ class Source(Protocol):
     def standings(self) -> list[Standing]:
         """How far each partition is: what its commits up to there have changed is in the roster."""
 
-    async def encode(self, entry: Entry) -> bytes:
+    async def encode(self, entry: RosterEntry) -> bytes:
         """The state of an entry as a message that has only this one: the bytes of several are those of one with all."""
 
-    def unchanged(self, entry: Entry) -> bytes:
+    def unchanged(self, entry: RosterEntry) -> bytes:
         """The same of an entry that a follower has."""
 
 
@@ -75,7 +75,7 @@ class Roster:
         self.version = 0
         self.generation = 0
         self._source = source
-        self._entries: OrderedDict[str, Entry] = OrderedDict()
+        self._entries: OrderedDict[str, RosterEntry] = OrderedDict()
         self._gone = 0
         self._most_gone = SOME_GONE
         self._moved = asyncio.Event()
@@ -86,19 +86,19 @@ class Roster:
     def __len__(self) -> int:
         return len(self._entries) - self._gone
 
-    def get(self, name: str) -> Entry | None:
+    def get(self, name: str) -> RosterEntry | None:
         """The entry of a name that is there."""
         entry = self._entries.get(name)
         return None if entry is None or entry.gone else entry
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[RosterEntry]:
         """Those that are there, the one that has changed last at the end."""
         return [entry for entry in self._entries.values() if not entry.gone]
 
     def change(
         self,
         name: str,
-        commit: Committed | None,
+        commit: CommitStamp | None,
         *,
         partition: int = 0,
         new: bool = False,
@@ -124,11 +124,11 @@ class Roster:
         self.generation += 1
         self._moved.set()
 
-    def _at_end(self, name: str) -> Entry:
+    def _at_end(self, name: str) -> RosterEntry:
         self.version += 1
         entry = self._entries.get(name)
         if entry is None:
-            entry = self._entries[name] = Entry(name, self.version)
+            entry = self._entries[name] = RosterEntry(name, self.version)
         else:
             entry.version = self.version
             self._entries.move_to_end(name)
@@ -169,7 +169,7 @@ class Roster:
             self._moved.clear()
             await self._moved.wait()
 
-    def after(self, version: int) -> list[Entry]:
+    def after(self, version: int) -> list[RosterEntry]:
         """What has changed after a version, in order. O(its number)."""
         found = []
         for entry in reversed(self._entries.values()):
@@ -197,7 +197,7 @@ class Roster:
             message, first = shared
             yield message
 
-    async def states(self, entries: Sequence[Entry]) -> AsyncGenerator[bytes, None]:
+    async def states(self, entries: Sequence[RosterEntry]) -> AsyncGenerator[bytes, None]:
         """The states of some entries, many to a message."""
         first = 0
         while first < len(entries):
@@ -205,7 +205,7 @@ class Roster:
                 message, first = await self._message(entries, first)
             yield message
 
-    async def names(self, entries: Sequence[Entry]) -> AsyncGenerator[bytes, None]:
+    async def names(self, entries: Sequence[RosterEntry]) -> AsyncGenerator[bytes, None]:
         """The names of entries that a follower has, many to a message."""
         waiting: list[bytes] = []
         size = 0
@@ -218,7 +218,7 @@ class Roster:
         if waiting:
             yield b"".join(waiting)
 
-    async def _message(self, entries: Sequence[Entry], first: int) -> tuple[bytes, int]:
+    async def _message(self, entries: Sequence[RosterEntry], first: int) -> tuple[bytes, int]:
         """The next message, and the number of the first entry after it."""
         loop = asyncio.get_running_loop()
         begun = slice_begun = loop.time()
@@ -238,7 +238,7 @@ class Roster:
             first += 1
         return b"".join(states), first
 
-    async def _encoded(self, entry: Entry) -> bytes:
+    async def _encoded(self, entry: RosterEntry) -> bytes:
         version = entry.version
         state = await self._source.encode(entry)
         if entry.version == version:  # otherwise it comes again, with what has changed meanwhile

@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)
-class Health:
+class WorkHealth:
     """The health of one kind of background work.
 
     Attributes:
@@ -56,18 +56,18 @@ class Supervisor:
         self._fatal = fatal
         self._tasks: list[asyncio.Task[None]] = []
         self.reason: str | None = None
-        self.works: dict[str, Health] = {}
+        self.works: dict[str, WorkHealth] = {}
 
     def every(self, seconds: float, name: str, work: Callable[[], Awaitable[object]]) -> None:
         """Repeat some work, with a pause in between."""
-        self.works.setdefault(name, Health())
+        self.works.setdefault(name, WorkHealth())
         task = asyncio.get_running_loop().create_task(self._repeat(seconds, name, work), name=name)
         task.add_done_callback(lambda task: self._ended(name, task))
         self._tasks.append(task)
 
     def failed(self, name: str, error: BaseException) -> None:
         """Record a failure of work that will be retried."""
-        health = self.works.setdefault(name, Health())
+        health = self.works.setdefault(name, WorkHealth())
         now = self._clock.monotonic()
         health.failures += 1
         if health.failing_since is None:
@@ -98,7 +98,7 @@ class Supervisor:
         log.critical("background work has died: the server stops", extra={"work": name}, exc_info=error)
         self._fatal(f"{name}: {words(error)}")
 
-    def failing_seconds(self, health: Health) -> float:
+    def failing_seconds(self, health: WorkHealth) -> float:
         """The seconds since work began to fail; 0 while it succeeds."""
         return 0.0 if health.failing_since is None else self._clock.monotonic() - health.failing_since
 

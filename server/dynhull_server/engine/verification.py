@@ -27,7 +27,7 @@ LARGE = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class FirstDifference:
     """The first row where two lists of vertices differ; a shape of (0, 2) where a list is shorter."""
 
     index: int
@@ -47,7 +47,7 @@ class Verification:
     points: int
     vertices: int
     rounds: list[Round]
-    difference: Difference | None
+    difference: FirstDifference | None
     seconds: float
     keys_equal: bool = True
     fences: int = 0
@@ -86,14 +86,14 @@ def _given_at(points: Points, places: Points, vertices: Points) -> Points:
     return np.roll(given, -start, axis=0)
 
 
-def first_difference(live: Points, recomputed: Points) -> Difference | None:
+def first_difference(live: Points, recomputed: Points) -> FirstDifference | None:
     """The first row where two lists of vertices differ, None where they are equal."""
     if np.array_equal(live, recomputed):
         return None
     shorter = min(len(live), len(recomputed))
     rows = np.flatnonzero((live[:shorter] != recomputed[:shorter]).any(axis=1))
     i = int(rows[0]) if rows.size else shorter
-    return Difference(i, live[i : i + 1], recomputed[i : i + 1])
+    return FirstDifference(i, live[i : i + 1], recomputed[i : i + 1])
 
 
 def _recompute(points: Points) -> tuple[Points, list[Round], float]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from .positions import Standing, encode_position
-from .roster import Entry, Roster
+from .roster import Roster, RosterEntry
 
 # Seconds between positions.
 MARK_SECONDS = 1.0
@@ -26,7 +26,7 @@ class Picture(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ManyPart:
     """What is sent at once.
 
     Attributes:
@@ -42,7 +42,7 @@ class Part:
 
 async def watch_many(
     roster: Roster, position: Sequence[Standing] | None, interval: float
-) -> AsyncGenerator[Part, None]:
+) -> AsyncGenerator[ManyPart, None]:
     """The states of the hulls of a roster, or of those that are not as at a position, then of all that change.
 
     Args:
@@ -58,16 +58,16 @@ async def watch_many(
             marked = encode_position(standings)
             entries = roster.entries()
             goes_on = position is not None and _go_on(position, standings)
-            yield Part(picture=Picture.BEGINS if goes_on or position is None else Picture.BEGINS_ANEW)
+            yield ManyPart(picture=Picture.BEGINS if goes_on or position is None else Picture.BEGINS_ANEW)
             changed, same = _apart(entries, position if goes_on else None)
             async with aclosing(roster.states(changed)) as messages:
                 async for message in messages:
-                    yield Part(message)
+                    yield ManyPart(message)
             async with aclosing(roster.names(same)) as messages:
                 async for message in messages:
-                    yield Part(message)
+                    yield ManyPart(message)
             del entries, changed, same
-            yield Part(picture=Picture.COMPLETE, position=marked)
+            yield ManyPart(picture=Picture.COMPLETE, position=marked)
             marked_at, slot = loop.time(), -1
             while roster.generation == generation:
                 roster.heard(follower, version)
@@ -85,12 +85,12 @@ async def watch_many(
                     now, until = encode_position(roster.standings()), roster.version
                     async with aclosing(roster.changes(version)) as messages:
                         async for message in messages:
-                            yield Part(message)
+                            yield ManyPart(message)
                     marked, version = now, until
                 elif version == roster.version:
                     marked = encode_position(roster.standings())
                 if loop.time() >= marked_at + MARK_SECONDS:
-                    yield Part(position=marked)
+                    yield ManyPart(position=marked)
                     marked_at = loop.time()
             position = ()
 
@@ -103,12 +103,14 @@ def _go_on(position: Sequence[Standing], standings: Sequence[Standing]) -> bool:
     )
 
 
-def _apart(entries: list[Entry], position: Sequence[Standing] | None) -> tuple[list[Entry], list[Entry]]:
+def _apart(
+    entries: list[RosterEntry], position: Sequence[Standing] | None
+) -> tuple[list[RosterEntry], list[RosterEntry]]:
     """What has changed since a position, and the rest."""
     if position is None:
         return entries, []
-    changed: list[Entry] = []
-    same: list[Entry] = []
+    changed: list[RosterEntry] = []
+    same: list[RosterEntry] = []
     for entry in entries:
         as_before = not entry.new and position[entry.partition].has(entry.commit)
         (same if as_before else changed).append(entry)

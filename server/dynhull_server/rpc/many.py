@@ -9,10 +9,10 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.positions import Standing
-from ..engine.roster import Entry
+from ..engine.roster import RosterEntry
 from ..engine.rosters import Choice
 from ..engine.steps import FEW_ROWS, Run, at_once
-from ..engine.watch_many import Part, Picture
+from ..engine.watch_many import ManyPart, Picture
 from ..state.errors import HullNotFoundError
 from ..state.hull_state import Counts
 from .access import Rights
@@ -51,7 +51,7 @@ class HullStates:
         """How far the server is."""
         return [self._hulls.standing]
 
-    async def encode(self, entry: Entry) -> bytes:
+    async def encode(self, entry: RosterEntry) -> bytes:
         """The state of a hull."""
         if entry.gone:
             return name_only(entry, pb.HULL_PRESENCE_GONE)
@@ -62,7 +62,7 @@ class HullStates:
             return name_only(entry, pb.HULL_PRESENCE_GONE)
         return message.SerializeToString()
 
-    def unchanged(self, entry: Entry) -> bytes:
+    def unchanged(self, entry: RosterEntry) -> bytes:
         """The name of a hull."""
         return name_only(entry, pb.HULL_PRESENCE_UNCHANGED)
 
@@ -92,7 +92,7 @@ def require_many(choice: Choice, access: Rights) -> None:
         access.require_read(name)
 
 
-def name_only(entry: Entry, presence: pb.HullPresence) -> bytes:
+def name_only(entry: RosterEntry, presence: pb.HullPresence) -> bytes:
     """What is sent of a hull that has no state, or none that is new."""
     message = pb.WatchManyResponse()
     message.hulls.add(name=entry.name, presence=presence)
@@ -115,7 +115,7 @@ def encode_counts(hull: LiveHull, counts: Counts, now: pb.HullNow) -> None:
         now.changed_time.FromMicroseconds(hull.committed.time)
 
 
-def encode_many(part: Part) -> bytes:
+def encode_many(part: ManyPart) -> bytes:
     """The message of what is sent at once: states come as one."""
     if part.picture is None and not part.position:
         return part.states

@@ -1,7 +1,7 @@
 """A hull as clients see it: its committed state."""
 
 from .hull_state import Counts, HullState
-from .records import Committed, HullRow
+from .records import CommitStamp, HullRow
 
 
 class Hull:
@@ -26,7 +26,7 @@ class Hull:
         self.row = row
         self.state = state
         self.counts: Counts = state.counts
-        self.committed: Committed | None = state.committed
+        self.committed: CommitStamp | None = state.committed
         self.unsaved = unsaved
         self.ended = False
         self.timed = row.settings.identity != "multiset" or row.settings.window is not None

@@ -283,7 +283,7 @@ class Shares:
     division: Division | None = None
 
 
-class Committed(NamedTuple):
+class CommitStamp(NamedTuple):
     """The commit of a revision.
 
     Attributes:
@@ -323,7 +323,7 @@ class Record:
     may_skip: bool = False
     shares: Shares | None = None
     cause: Cause | None = None
-    committed: Committed | None = field(default=None, compare=False)
+    committed: CommitStamp | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -402,7 +402,7 @@ class Kept:
     rules: QuarantineRules | None = None
     tallies: dict[int, Tally] = field(default_factory=dict)
     division: Division | None = None
-    committed: Committed | None = field(default=None, compare=False)
+    committed: CommitStamp | None = field(default=None, compare=False)
 
     @property
     def last_revision(self) -> int:

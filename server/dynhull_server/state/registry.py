@@ -13,7 +13,7 @@ from .fences.model.tallies import Tallies
 from .hull import Hull
 from .limits import Limits
 from .records import NO_TIME
-from .trip import Place
+from .trip import Reservation
 
 if TYPE_CHECKING:
     from .fences.model.config import FenceConfig
@@ -84,12 +84,12 @@ class Registry:
         names = [name for name in self.hulls.irange(config.subjects) if name.startswith(config.subjects)]
         return [name for name in names if self.hulls[name].row.settings.identity != "multiset"]
 
-    def reserve_hull(self) -> Place:
+    def reserve_hull(self) -> Reservation:
         """A place for a hull that may be created. Give it back once that is decided."""
         most = self.limits.max_hulls
         full = len(self.hulls) + self._creating >= most
         self._creating += 1
-        return Place(self._new_number(), LimitExceededError("max_hulls", most) if full else None, self.limits)
+        return Reservation(self._new_number(), LimitExceededError("max_hulls", most) if full else None, self.limits)
 
     def reserve_fence(self) -> int | None:
         """A number for a fence that may be created, None if it is too many. Give it back once that is decided."""

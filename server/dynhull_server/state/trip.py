@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class Place:
+class Reservation:
     """The data for a new hull: its number, the reason if no more hulls are allowed, and the limits on its state."""
 
     number: int
@@ -86,7 +86,7 @@ class Trip:
         requests: list[Request],
         now: float,
         pause: float,
-        places: Mapping[str, Place],
+        places: Mapping[str, Reservation],
         fences: "FencePart | None" = None,
     ) -> None:
         self.legs = legs

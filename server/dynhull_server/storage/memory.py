@@ -18,8 +18,8 @@ from ..state.fences.model.records import (
     PutConsumer,
     PutDelays,
 )
-from ..state.records import Append, Committed, Create, Delete, HullRow, Kept, Record
-from .port import NEWEST, Contents, DamagedError, NotCommittedError, Progress, Step
+from ..state.records import Append, CommitStamp, Create, Delete, HullRow, Kept, Record
+from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 
 KEPT_SNAPSHOTS = 2
 FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | PutDelays | DropEvents | PutConsumer | DropConsumer
@@ -72,21 +72,21 @@ class MemoryStorage:
         self._hulls: dict[int, _Hull] = {}
         self._fences: dict[int, KeptFence] = {}
         self._next_number = 1
-        self._commit = Committed(0, 0)
+        self._commit = CommitStamp(0, 0)
         self._turn = Lock()  # commits and reads run in different threads
 
-    def open(self, progress: Progress) -> Contents:
+    def open(self, progress: Progress) -> StoredContents:
         """The hulls."""
         progress(0, len(self._hulls))
         rows = sorted((hull.row for hull in self._hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._fences.values()), key=lambda row: row.name)
-        return Contents(rows, self._next_number, [], fences, self._commit.time, self._commit.number)
+        return StoredContents(rows, self._next_number, [], fences, self._commit.time, self._commit.number)
 
-    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> Committed:
+    def commit(self, changes: Sequence[Change | StorageStep], now: int = 0) -> CommitStamp:
         """Keep the changes."""
         with self._turn:
             self._examine(changes)
-            self._commit = Committed(self._commit.number + 1, max(self._commit.time, now))
+            self._commit = CommitStamp(self._commit.number + 1, max(self._commit.time, now))
             for change in changes:
                 self._carry_out(change)
             return self._commit
@@ -95,7 +95,9 @@ class MemoryStorage:
         """True: nobody else has this memory."""
         return True
 
-    def ahead(self, changes: Sequence[Change | Step]) -> tuple[Sequence[Step], Sequence[Change | Step]]:
+    def ahead(
+        self, changes: Sequence[Change | StorageStep]
+    ) -> tuple[Sequence[StorageStep], Sequence[Change | StorageStep]]:
         """Nothing: commits take no time."""
         return (), changes
 
@@ -133,16 +135,16 @@ class MemoryStorage:
             return NEWEST
         return hull.snapshots[0].kept.revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
 
-    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator[StorageStep]:
         """One step."""
         if self.keeps:
             yield _Snapshot(number, kept)
 
-    def cut(self, number: int, last: int) -> Step | None:
+    def cut(self, number: int, last: int) -> StorageStep | None:
         """One step."""
         return _Cut(number, last) if self._hulls[number].last > last else None
 
-    def sweep(self) -> Iterator[Step]:
+    def sweep(self) -> Iterator[StorageStep]:
         """No steps: deletes leave nothing behind."""
         return iter(())
 
@@ -173,7 +175,7 @@ class MemoryStorage:
     def _boundary(self, fence: KeptFence, first: int) -> int:
         return min(first, fence.inside.sequence + 1) if self.keeps else first
 
-    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
+    def inside(self, number: int, inside: Inside) -> Iterator[StorageStep]:
         """One step."""
         if self.keeps:
             yield _WhoIsInside(number, inside)
@@ -191,7 +193,7 @@ class MemoryStorage:
     def close(self) -> None:
         """Do nothing."""
 
-    def _examine(self, changes: Sequence[Change | Step]) -> None:
+    def _examine(self, changes: Sequence[Change | StorageStep]) -> None:
         """Raise NotCommittedError if one of them cannot be applied after those before it."""
         last: dict[int, int | None] = {}  # revisions after the changes so far; None for a hull they delete
         for change in changes:
@@ -215,7 +217,7 @@ class MemoryStorage:
                 last[change.number] = before + len(revisions)
         self._examine_fences(changes)
 
-    def _examine_fences(self, changes: Sequence[Change | Step]) -> None:
+    def _examine_fences(self, changes: Sequence[Change | StorageStep]) -> None:
         last: dict[int, int | None] = {}  # sequences after the changes so far; None for a fence they delete
         for change in changes:
             if not isinstance(change, FENCE_CHANGES):
@@ -261,7 +263,7 @@ class MemoryStorage:
         hull = self._hulls.get(number)
         return None if hull is None else hull.last
 
-    def _carry_out(self, change: Change | Step) -> None:
+    def _carry_out(self, change: Change | StorageStep) -> None:
         match change:
             case Append():
                 self._append(change)

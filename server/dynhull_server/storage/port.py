@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from ..state.fences.model.records import FenceEvent, FenceRow, Inside, KeptFence
-from ..state.records import Committed, HullRow, Kept, Record
+from ..state.records import CommitStamp, HullRow, Kept, Record
 from .refusals import Meaning
 
 if TYPE_CHECKING:
@@ -64,12 +64,12 @@ class FormatError(StorageError):
     """The data was written by a newer version, or by another program."""
 
 
-class Step(Protocol):
+class StorageStep(Protocol):
     """A part of a snapshot or of a sweep, committed like a change; its content is private to the storage."""
 
 
 @dataclass(frozen=True, slots=True)
-class Contents:
+class StoredContents:
     """The contents of a storage when it is opened.
 
     Attributes:
@@ -103,7 +103,7 @@ class Storage(Protocol):
     keeps: bool
     epoch: int
 
-    def open(self, progress: Progress) -> Contents:
+    def open(self, progress: Progress) -> StoredContents:
         """Examine the data, repair what can be repaired, and load it. Called once, before all other methods.
 
         Raises:
@@ -111,7 +111,7 @@ class Storage(Protocol):
             DamagedError: acknowledged batches are lost, and it is uncertain which.
         """
 
-    def commit(self, changes: Sequence["Change | Step"], now: int = 0) -> Committed:
+    def commit(self, changes: Sequence["Change | StorageStep"], now: int = 0) -> CommitStamp:
         """Commit all of the changes or none, with the configured durability.
 
         Changes apply in order. A step of a deleted hull changes nothing. The records keep the number of the commit, and
@@ -135,7 +135,9 @@ class Storage(Protocol):
     def entitled(self) -> bool:
         """Whether reads may be answered from memory: not while another server may have committed something else."""
 
-    def ahead(self, changes: Sequence["Change | Step"]) -> tuple[Sequence["Step"], Sequence["Change | Step"]]:
+    def ahead(
+        self, changes: Sequence["Change | StorageStep"]
+    ) -> tuple[Sequence["StorageStep"], Sequence["Change | StorageStep"]]:
         """What can be committed ahead of large changes, and what is then left of them, so that other commits wait less.
 
         Commit the steps in their order, some at a time, and then the changes that are returned. The steps have no
@@ -174,7 +176,7 @@ class Storage(Protocol):
     def oldest(self, number: int) -> int:
         """The oldest revision of a hull that `read` can return; KeyError if no hull has that number."""
 
-    def snapshot(self, number: int, kept: Kept) -> Iterator["Step"]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator["StorageStep"]:
         """Write a snapshot, then drop the rows it supersedes: commit each step before the next is taken.
 
         The records of `kept` are not written. A snapshot is valid from its last writing step on. Steps are small, so
@@ -182,7 +184,7 @@ class Storage(Protocol):
         of it. Snapshots of several hulls may be written at the same time.
         """
 
-    def cut(self, number: int, last: int) -> "Step | None":
+    def cut(self, number: int, last: int) -> "StorageStep | None":
         """Drop the revisions of a shard after `last`, which is not before its last snapshot; None for none.
 
         Commit the step at once; it may be followed by batches in the same commit. Each commit before it has added the
@@ -193,7 +195,7 @@ class Storage(Protocol):
             DamagedError: the data is damaged.
         """
 
-    def sweep(self) -> Iterator["Step"]:
+    def sweep(self) -> Iterator["StorageStep"]:
         """Drop what nobody needs of deleted hulls and fences, unfinished snapshots and dropped events, in the same way.
 
         Run only one sweep at a time.
@@ -214,7 +216,7 @@ class Storage(Protocol):
             DamagedError: the data is damaged.
         """
 
-    def inside(self, number: int, inside: Inside) -> Iterator["Step"]:
+    def inside(self, number: int, inside: Inside) -> Iterator["StorageStep"]:
         """Write who is inside of a fence, then drop what that supersedes: commit each step before the next is taken.
 
         It is valid from its last writing step on. Events that follow it are not dropped by `DropEvents`.
@@ -250,7 +252,7 @@ class FollowedStorage(Storage, Protocol):
     `close` may be called.
     """
 
-    def follow(self, progress: Progress) -> Contents:
+    def follow(self, progress: Progress) -> StoredContents:
         """Examine the data; again, before `open`, to find what has come since.
 
         Raises:

@@ -40,7 +40,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.rpc.encode_fence import encode_config
 from dynhull_server.state.batch import KeyedBatch
 from dynhull_server.state.fences.model.config import FenceConfig, HullArea
-from dynhull_server.state.fences.model.requests import CreateFence, DeleteFence, PutConsumer, ReplaceFence
+from dynhull_server.state.fences.model.requests import Acknowledge, CreateFence, DeleteFence, ReplaceFence
 from dynhull_server.state.requests import CreateHull, DeleteHull, WriteBatch, WriteTogether
 
 KEYS = [f"é{i}" for i in range(32)]
@@ -329,7 +329,7 @@ class WorldClient:
                 self._ask(self._fences.DeleteFence, message, grpc.StatusCode.NOT_FOUND)
                 self._commit(request, 1)
                 del self.readers[name], self._world.expected[name]
-            case PutConsumer():  # the model does not count stays: what it acknowledges, the fence has
+            case Acknowledge():  # the model does not count stays: what it acknowledges, the fence has
                 message = fs.AckFenceRequest(
                     name=self.prefix + name, consumer=request.consumer, sequence=request.sequence or 0
                 )

@@ -13,7 +13,7 @@ from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import Batch, KeyedBatch
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent, Origin
-from dynhull_server.state.fences.model.requests import CreateFence, DeleteFence, PassTime, PutConsumer, ReplaceFence
+from dynhull_server.state.fences.model.requests import Acknowledge, CreateFence, DeleteFence, PassTime, ReplaceFence
 from dynhull_server.state.records import NO_TIME, HullSettings
 from dynhull_server.state.requests import Birth, CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
 
@@ -153,7 +153,7 @@ class World:
             case PassTime():
                 if self.fences[request.name].uid == request.fence.row.uid:
                     self._pass_time(request.name)
-            case PutConsumer():
+            case Acknowledge():
                 fence = self.fences[request.name]
                 known = fence.consumers.get(request.consumer, 0)
                 fence.consumers[request.consumer] = max(known, request.sequence or 0)
@@ -632,6 +632,6 @@ class Chance:
         if kind == "delete":
             return DeleteFence(to, name, time)
         if kind == "ack":
-            return PutConsumer(to, name, time, rng.choice(["x", "y"]), rng.randrange(fence.last + 1))
+            return Acknowledge(to, name, time, rng.choice(["x", "y"]), rng.randrange(fence.last + 1))
         config = fence.config if kind == "same" else replace(self.config(fence.config), initial="none")
         return ReplaceFence(to, name, time, config)

@@ -47,7 +47,7 @@ def feeds_of(url: str, options: FeedOptions) -> Find:
 
 
 def _mqtt(url: str, options: FeedOptions) -> Find:
-    from .mqtt import Mqtt
+    from .mqtt import MqttSource
 
     if not options.mapping.keyed:
         raise ValueError(
@@ -58,13 +58,13 @@ def _mqtt(url: str, options: FeedOptions) -> Find:
         raise ValueError("--producer is for NATS and Kafka, which number their messages")
     if options.to_end:
         raise ValueError("--to-end is for NATS and Kafka: a subscription of MQTT has no end")
-    return _known([Mqtt(url, options.hull, options.ping_interval)])
+    return _known([MqttSource(url, options.hull, options.ping_interval)])
 
 
 def _jetstream(url: str, options: FeedOptions) -> Find:
-    from .jetstream import JetStream
+    from .jetstream import JetStreamSource
 
-    return _known([JetStream(url, options.producer, options.mapping.digest, options.ping_interval)])
+    return _known([JetStreamSource(url, options.producer, options.mapping.digest, options.ping_interval)])
 
 
 def _kafka(url: str, options: FeedOptions) -> Find:

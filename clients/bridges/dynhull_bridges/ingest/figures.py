@@ -8,7 +8,7 @@ from dynhull_surface.counts import COUNTS
 from ..metrics_page import serve_page
 
 
-class Figures:
+class IngestFigures:
     """Counts of what the ingest has done, and how far it is behind, by feed."""
 
     def __init__(self) -> None:

@@ -14,7 +14,7 @@ from ..waiting import SERVER_AWAY, Absence, growing_pauses, unless
 from .bad import BadMessages, TooManyBadError
 from .feed import DoubtfulError, Feed, FeedError
 from .feeds import Find
-from .figures import Figures
+from .figures import IngestFigures
 from .lane import NotCreatedError
 from .pump import BROKER_AWAY, DOUBT, FIRST_PAUSE, LONGEST_PAUSE, GapError, Pump, Settings
 
@@ -51,7 +51,7 @@ async def run(
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
-    figures = Figures()
+    figures = IngestFigures()
     if metrics is not None:
         log.info("metrics", port=figures.serve(*metrics))
     feeds = await unless(stop, _found(find, settings.patience)) or ()

@@ -41,7 +41,7 @@ NOT_IN_STREAM, NO_STREAM = 10093, 10059  # codes of errors
 SHORT_REPLY, SEQUENCE = 9, 5
 
 
-class JetStream:
+class JetStreamSource:
     """Reads nats://[USER:PASSWORD@]HOST[:PORT]/STREAM[/SUBJECT], or tls:// for TLS; the subject may have wildcards.
 
     Args:

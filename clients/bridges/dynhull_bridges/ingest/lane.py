@@ -55,7 +55,7 @@ class _RefusedError(Exception):
         self.error = error
 
 
-class Lane:
+class ChunkLane:
     """Sends chunks to a hull, in order.
 
     Args:

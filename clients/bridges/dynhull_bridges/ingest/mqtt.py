@@ -35,7 +35,7 @@ SHARED = "$share/"
 LONGEST_FILTER, LONGEST_SHOWN = 65_535, 200  # bytes, characters
 
 
-class Mqtt:
+class MqttSource:
     """Reads mqtt://[USER:PASSWORD@]HOST[:PORT]/FILTER[?version=3.1.1&client_id=NAME], or mqtts:// for TLS.
 
     The filter may have wildcards, and begin with $share/GROUP/ to share its messages with other subscribers. The broker

@@ -16,9 +16,9 @@ from ..waiting import Absence, unless
 from .bad import BadMessages
 from .chunk import Taken, chunks_of
 from .feed import Beginning, DoubtfulError, Feed, FeedError, Message
-from .figures import Figures
+from .figures import IngestFigures
 from .identity import ANSWER, LogIdentity
-from .lane import Lane
+from .lane import ChunkLane
 from .mapping import Mapping, Row
 
 log = structlog.get_logger("dynhull_ingest")
@@ -68,7 +68,7 @@ class Pump:
         feed: Feed,
         settings: Settings,
         bad: BadMessages,
-        figures: Figures,
+        figures: IngestFigures,
     ) -> None:
         self.reached = 0  # the number of the last message read
         self.points = 0  # acknowledged
@@ -87,7 +87,7 @@ class Pump:
         self._read_so_far = 0  # messages
         self._identity = LogIdentity(client, feed)
         self._was_there = False  # what the feed reads, now or for an ingest before
-        self._lanes: dict[str, Lane] = {}
+        self._lanes: dict[str, ChunkLane] = {}
         self._sending: list[asyncio.Task[None]] = []
         self._under_way: deque[Taken] = deque()
         self._news = asyncio.Event()
@@ -261,9 +261,9 @@ class Pump:
         self._figures.bad.labels(self._feed.name).inc()
         self._bad.add(message, error)
 
-    def _lane(self, hull: str) -> Lane:
+    def _lane(self, hull: str) -> ChunkLane:
         settings = self._settings
-        lane = Lane(
+        lane = ChunkLane(
             self._client,
             hull,
             self._feed.producer,

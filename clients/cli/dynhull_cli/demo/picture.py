@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from .map import drawing_of
-from .replay import Step
+from .replay import ReplayStep
 from .scene import Scene
 
 HULL_COLOUR, POINT_COLOUR, GROUND_COLOUR = "#0072B2", "#D55E00", "#B8B8B8"
@@ -25,7 +25,7 @@ FLATTEST = 0.4  # height of the drawing over its width
 MOST_LABELS = 24
 
 
-def draw(path: Path, scene: Scene, step: Step) -> None:
+def draw(path: Path, scene: Scene, step: ReplayStep) -> None:
     """Write a PNG of one frame: background, points, hull, the corners' names."""
     frame, drawing = step.frame, drawing_of(scene)
     vertices, background = drawing.place(step.vertices), drawing.place(scene.background)

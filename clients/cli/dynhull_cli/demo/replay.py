@@ -15,7 +15,7 @@ from .scene import Frame, Points, Scene
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ReplayStep:
     """The outcome of one frame.
 
     Attributes:
@@ -70,7 +70,7 @@ class Watcher:
         self._follower.stop()
 
 
-def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
+def replay(client: HullClient, scene: Scene) -> Iterator[ReplayStep]:
     """Send every frame as one batch, and check the hull after each.
 
     The live hull must equal Chan's recomputation from the points in the server. These must be the points sent: the same
@@ -104,7 +104,7 @@ def replay(client: HullClient, scene: Scene) -> Iterator[Step]:
                 difference = difference or wrong or (alarms.surplus() if number == scene.length else None)
                 counts = alarms.agreed, alarms.expected
             area = live.measures.area * scene.area_scale
-            yield Step(frame, live.vertices, area, live.vertex_keys, events, counts, difference)
+            yield ReplayStep(frame, live.vertices, area, live.vertex_keys, events, counts, difference)
     finally:
         watcher.stop()
         if alarms:

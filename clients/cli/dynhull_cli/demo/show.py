@@ -8,7 +8,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from dynhull_client import FenceEvent, HullClient
 
-from .replay import Step, replay
+from .replay import ReplayStep, replay
 from .scene import Scene
 from .server import server_process
 
@@ -25,7 +25,7 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
     agreed = 0
     alarms = 0, 0
     events: list[FenceEvent] = []
-    largest: Step | None = None
+    largest: ReplayStep | None = None
     difference = None
     columns = [BarColumn(), MofNCompleteColumn(), TextColumn(scene.step), TimeRemainingColumn()]
     with (
@@ -88,7 +88,7 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:MOST_CORNERS]) + more
 
 
-def _line(scene: Scene, step: Step) -> str:
+def _line(scene: Scene, step: ReplayStep) -> str:
     names = step.corners()
     return (
         f"{step.frame.clock:>5}  {len(step.frame.positions):>5,} {scene.counted}  {len(names):>3} vertices  "

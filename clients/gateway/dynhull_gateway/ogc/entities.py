@@ -13,7 +13,7 @@ from dynhull_client import AsyncHullClient, Entities, HullInfo
 
 from ..problems import ProblemError
 from ..schemas import NO_TIME
-from .filters import Found, Page, in_range
+from .filters import Matching, Page, in_range
 
 KEPT = 16
 KEPT_KEYS = 1_000_000  # of all that are kept, beside the latest: about 200 bytes each
@@ -41,7 +41,7 @@ class Snapshot:
             order = numbers
         return cls(f"{uid}:{found.revision}", keys, order, found.points, found.times)
 
-    def page(self, page: Page) -> Found:
+    def page(self, page: Page) -> Matching:
         """The features of a page."""
         wanted = np.ones(len(self.keys), np.bool_)
         if page.box is not None:
@@ -54,7 +54,7 @@ class Snapshot:
         rows = np.flatnonzero(wanted)
         shown = rows[: page.most].tolist()
         following = str(self.keys[shown[-1]]) if len(rows) > page.most else None
-        return Found([self.feature(row) for row in shown], following, matched)
+        return Matching([self.feature(row) for row in shown], following, matched)
 
     def feature(self, row: int) -> dict[str, Any]:
         """A key as a GeoJSON Feature."""

@@ -24,7 +24,7 @@ RFC3339 = re.compile(r"\d{4}-\d\d-\d\d[Tt]\d\d:\d\d:\d\d(\.\d+)?([Zz]|[+-]\d\d:\
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Matching:
     """A page of features.
 
     Attributes:

@@ -40,7 +40,7 @@ from .documents import (
     schema_of_entities,
 )
 from .entities import Snapshots, feature
-from .filters import Found, Page
+from .filters import Matching, Page
 
 router = APIRouter(tags=["maps"], route_class=JsonRoute)
 
@@ -62,7 +62,7 @@ def geojson(model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
     return {200: {"description": "GeoJSON.", "content": {GEOJSON: {"schema": schema}}}}
 
 
-class GeoJson(Response):
+class GeoJsonAnswer(Response):
     """A response of GeoJSON."""
 
     media_type = GEOJSON
@@ -129,7 +129,7 @@ async def schema(request: Request, client: Caller, collection: CollectionId) -> 
     return JsonSchema(json.dumps(schema_of_entities(url, name, str(info.keyed))))
 
 
-@router.get("/collections/{collection}/items", response_class=GeoJson, responses=geojson(FeatureCollection))
+@router.get("/collections/{collection}/items", response_class=GeoJsonAnswer, responses=geojson(FeatureCollection))
 async def items(request: Request, client: Caller, collection: CollectionId, page: Annotated[Page, Query()]) -> Response:
     """The features of a collection, in pages: follow the links "next"."""
     name = _hull_of(collection)
@@ -162,12 +162,12 @@ async def items(request: Request, client: Caller, collection: CollectionId, page
         number_matched=found.matched,
     )
     unknown = {"number_matched"} if found.matched is None else None
-    return GeoJson(shown.model_dump_json(by_alias=True, exclude=unknown))
+    return GeoJsonAnswer(shown.model_dump_json(by_alias=True, exclude=unknown))
 
 
 @router.get(
     "/collections/{collection}/items/{feature_id}",
-    response_class=GeoJson,
+    response_class=GeoJsonAnswer,
     responses=geojson(Item),
 )
 async def item(request: Request, client: Caller, collection: CollectionId, feature_id: FeatureId) -> Response:
@@ -184,7 +184,7 @@ async def item(request: Request, client: Caller, collection: CollectionId, featu
         _link(request, f"{path}/items/{quote(feature_id, safe='')}", "self", GEOJSON, "This feature"),
         _link(request, path, "collection", JSON, "The collection"),
     ]
-    return GeoJson(Item.model_validate({**found, "links": links}).model_dump_json())
+    return GeoJsonAnswer(Item.model_validate({**found, "links": links}).model_dump_json())
 
 
 def _hull_of(collection: str) -> str | None:
@@ -219,7 +219,7 @@ async def _none() -> AsyncIterator[HullInfo]:
     yield
 
 
-async def _hull_features(client: AsyncHullClient, page: Page) -> Found:
+async def _hull_features(client: AsyncHullClient, page: Page) -> Matching:
     """Polygons of geographic hulls by name."""
     every = [info.name async for info in client.list_hulls() if info.geographic]
     names = [name for name in every if name > (page.after or "")]
@@ -236,9 +236,9 @@ async def _hull_features(client: AsyncHullClient, page: Page) -> Found:
             if page.box is not None and not page.box.meets(shown["geometry"]):
                 continue
             if len(found) == page.most:
-                return Found(found, str(found[-1]["id"]), matched)
+                return Matching(found, str(found[-1]["id"]), matched)
             found.append(shown)
-    return Found(found, None, matched)
+    return Matching(found, None, matched)
 
 
 async def _entity(client: AsyncHullClient, info: HullInfo, text: str) -> dict[str, Any]:

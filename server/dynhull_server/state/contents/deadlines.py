@@ -14,7 +14,7 @@ MOST_SPARE_ROWS = 1024
 
 
 @dataclass(slots=True)
-class Group:
+class SameDeadline:
     """Keys that were given the same deadline, and perhaps another one since."""
 
     deadline: int
@@ -28,8 +28,8 @@ class Deadlines:
     """
 
     def __init__(self) -> None:
-        self._of: dict[Key, Group] = {}
-        self._groups: dict[int, Group] = {}
+        self._of: dict[Key, SameDeadline] = {}
+        self._groups: dict[int, SameDeadline] = {}
         self._order: list[int] = []  # a heap of the groups' deadlines
         self._rows = 0  # of all groups
 
@@ -53,7 +53,7 @@ class Deadlines:
                 continue
             group = self._groups.get(deadline)
             if group is None:
-                group = self._groups[deadline] = Group(deadline)
+                group = self._groups[deadline] = SameDeadline(deadline)
                 heappush(self._order, deadline)
             if self._of.get(key) is not group:
                 self._of[key] = group

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class Admitted:
+class AdmittedPuts:
     """A batch without the rows that are too old.
 
     Attributes:
@@ -113,7 +113,7 @@ class Gate:
 
     def judge(
         self,
-        admitted: Admitted,
+        admitted: AdmittedPuts,
         revision: int,
         hull: AnyKeyedHull,
         globe: Globe | None,

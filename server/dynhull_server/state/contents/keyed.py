@@ -29,7 +29,7 @@ from ..records import (
     Times,
 )
 from .deadlines import Deadlines, Key
-from .gate import NOTHING_HELD, Admitted, Gate
+from .gate import NOTHING_HELD, AdmittedPuts, Gate
 from .key_rows import (
     key_at,
     library_times,
@@ -133,7 +133,7 @@ class Keyed:
         oldest = self._earliest + window.max_age
         return oldest if first is None else min(first, oldest)
 
-    def admit(self, batch: Batch | KeyedBatch, arrived: int) -> Admitted:
+    def admit(self, batch: Batch | KeyedBatch, arrived: int) -> AdmittedPuts:
         """The batch with the times of its rows, without those that are too old."""
         if isinstance(batch, KeyedBatch):
             if batch.kind != self._kind:
@@ -161,7 +161,7 @@ class Keyed:
             if not batch.of_quarantine:  # a released position that has just become too old is missing
                 late = len(rows.keys) - int(np.count_nonzero(admission.young))
             rows = selected(rows, admission.young)
-        admitted = Admitted(rows, admission.clock, late, admission.clamped, batch.refuse_missing, admission.young)
+        admitted = AdmittedPuts(rows, admission.clock, late, admission.clamped, batch.refuse_missing, admission.young)
         if batch.of_quarantine:
             admitted.request = batch
         held = 0 if quarantine is None else len(quarantine)
@@ -169,7 +169,7 @@ class Keyed:
             self._refuse_growth(admitted)
         return admitted
 
-    def check(self, admitted: Admitted) -> None:
+    def check(self, admitted: AdmittedPuts) -> None:
         """Raise KeyRepeatedError or KeyMissingError if `apply` would."""
         refuse_repeated(admitted.rows)
         if admitted.refuse_missing:
@@ -180,7 +180,7 @@ class Keyed:
                 row = int(np.argmin(there))
                 raise KeyMissingError(row, key_at(admitted.rows.removes, row))
 
-    def expires_before(self, admitted: Admitted) -> int | None:
+    def expires_before(self, admitted: AdmittedPuts) -> int | None:
         """The clock that the batch leads to, if points leave at that time; None if none do."""
         clock = admitted.clock
         if clock is None:
@@ -190,7 +190,7 @@ class Keyed:
         old = until is not None and self._earliest is not None and self._earliest <= until
         return clock if ends or old else None
 
-    def apply(self, admitted: Admitted, revision: int) -> Applied:
+    def apply(self, admitted: AdmittedPuts, revision: int) -> Applied:
         """Apply the batch, or raise KeyRepeatedError or KeyMissingError."""
         rows, hull = admitted.rows, self.hull
         judged = self.quarantine is not None or admitted.request is not None
@@ -226,11 +226,11 @@ class Keyed:
             dropped=verdict.dropped,
         )
 
-    def rows(self, admitted: Admitted, _: Applied) -> KeyRows:
+    def rows(self, admitted: AdmittedPuts, _: Applied) -> KeyRows:
         """The keys of an applied batch, without those that are too old."""
         return admitted.rows
 
-    def cause(self, admitted: Admitted) -> Cause:
+    def cause(self, admitted: AdmittedPuts) -> Cause:
         """What makes the revision of a batch: a client that changes positions, or what is held of them."""
         return "batch" if admitted.request is None else "quarantine"
 
@@ -411,7 +411,7 @@ class Keyed:
             if not there.all():
                 admission.young = there if admission.young is None else there & admission.young
 
-    def _refuse_growth(self, admitted: Admitted) -> None:
+    def _refuse_growth(self, admitted: AdmittedPuts) -> None:
         """Raise LimitExceededError if there would be too many keys in the hull and, held out, beside it. O(m)."""
         rows, window, clock = admitted.rows, self._settings.window, admitted.clock
         if rows.condition == "present":

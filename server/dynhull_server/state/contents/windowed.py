@@ -28,7 +28,7 @@ RowNumbers = npt.NDArray[np.intp]
 
 
 @dataclass(slots=True)
-class Admitted:
+class AdmittedRows:
     """A batch without the inserts that are too old.
 
     Attributes:
@@ -79,7 +79,7 @@ class Windowed:
         oldest = self.hull.oldest if self.follows_server and self._window.max_age else None
         return None if oldest is None else int(oldest) + self._window.max_age
 
-    def admit(self, batch: Batch | KeyedBatch, arrived: int) -> Admitted:
+    def admit(self, batch: Batch | KeyedBatch, arrived: int) -> AdmittedRows:
         """The batch with the times of its inserts, without those that are too old."""
         if isinstance(batch, KeyedBatch):
             raise MisfitError(batch.field, NO_KEYS)
@@ -94,7 +94,7 @@ class Windowed:
         assert admission.times is not None  # a hull with a window has times
         if self.globe is not None:
             require_batch(self.globe, batch, admission.young)
-        admitted = Admitted(batch, admission.times, admission.clock, 0, admission.clamped)
+        admitted = AdmittedRows(batch, admission.times, admission.clock, 0, admission.clamped)
         if admission.young is not None:
             admitted.late = rows - int(np.count_nonzero(admission.young))
             admitted.times = admission.times[admission.young]
@@ -104,7 +104,7 @@ class Windowed:
             self._refuse_growth(admitted)
         return admitted
 
-    def check(self, admitted: Admitted) -> None:
+    def check(self, admitted: AdmittedRows) -> None:
         """Raise PointMissingError if `apply` would. O(n)."""
         batch = admitted.batch
         if batch.count_missing or not len(batch.deletes):
@@ -113,13 +113,13 @@ class Windowed:
         rehearsal = DynamicHull(there[np.isin(as_numbers(there), as_numbers(batch.deletes))])
         apply_points(rehearsal, batch)
 
-    def expires_before(self, admitted: Admitted) -> int | None:
+    def expires_before(self, admitted: AdmittedRows) -> int | None:
         """The clock that the batch leads to, if points leave at that time; None if none do."""
         until = self._until(admitted.clock)
         oldest = None if until is None else self.hull.oldest
         return admitted.clock if until is not None and oldest is not None and oldest <= until else None
 
-    def apply(self, admitted: Admitted, revision: int) -> Applied:
+    def apply(self, admitted: AdmittedRows, revision: int) -> Applied:
         """Apply the batch, or raise PointMissingError."""
         hull, batch = self.hull, admitted.batch
         changes, evicted = hull.changes, hull.evicted
@@ -138,12 +138,12 @@ class Windowed:
             clock=self.clock,
         )
 
-    def rows(self, admitted: Admitted, applied: Applied) -> PointRows:
+    def rows(self, admitted: AdmittedRows, applied: Applied) -> PointRows:
         """The points of an applied batch, with the times of the inserts."""
         batch = admitted.batch
         return PointRows(batch.inserts, batch.deletes, applied.missing > 0, admitted.times)
 
-    def cause(self, _: Admitted) -> Cause:
+    def cause(self, _: AdmittedRows) -> Cause:
         """What makes the revision of a batch."""
         return "batch"
 
@@ -233,7 +233,7 @@ class Windowed:
         points, times = self.hull.oldest_first()
         return points[times > until]
 
-    def _refuse_growth(self, admitted: Admitted) -> None:
+    def _refuse_growth(self, admitted: AdmittedRows) -> None:
         """Raise LimitExceededError if the hull would have too many points."""
         after = len(self._staying(admitted.clock)) + admitted.batch.growth
         if self._window.max_points:

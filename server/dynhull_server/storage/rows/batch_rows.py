@@ -4,7 +4,7 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
-from ...state.records import Committed, Record
+from ...state.records import CommitStamp, Record
 from .encoding import checksum, decode
 from .tables import COMMITS_SINCE
 
@@ -31,7 +31,7 @@ def is_whole(stored: Any, payload: Any, *values: Any) -> bool:
 
 def batch_records(payload: bytes, first: int, number: int | None, time: int | None) -> Iterator[Record]:
     """The records of a row with this commit. ValueError if the payload has none."""
-    commit = None if number is None or time is None else Committed(number, time)
+    commit = None if number is None or time is None else CommitStamp(number, time)
     for record in decode(payload, first):
         record.committed = commit
         yield record

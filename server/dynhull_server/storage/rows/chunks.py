@@ -10,7 +10,7 @@ import numpy as np
 
 from dynhull.keys import PackedKeys
 
-from ...state.records import Committed, Contents, Division, Kept, Keys, QuarantineRules, Tally, Times
+from ...state.records import CommitStamp, Contents, Division, Kept, Keys, QuarantineRules, Tally, Times
 from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
 from .held_rows import held_bytes, held_starts, joined_held, take_held
 
@@ -22,18 +22,18 @@ HAS_TIMES, HAS_DEADLINES, STRINGS, INTEGERS = 1, 2, 4, 8
 HELD = 16  # the points of this chunk are in quarantine
 
 
-class Cut(NamedTuple):
+class ChunkRows(NamedTuple):
     """The rows of a chunk, and whether they are those of the points in quarantine."""
 
     rows: slice
     held: bool = False
 
 
-def cuts(contents: Contents) -> list[Cut]:
+def cuts(contents: Contents) -> list[ChunkRows]:
     """The chunks of some contents. O(n)."""
-    cuts = [Cut(rows) for rows in _slices(_starts(contents), len(contents))]
+    cuts = [ChunkRows(rows) for rows in _slices(_starts(contents), len(contents))]
     if contents.held is not None:
-        cuts += [Cut(rows, True) for rows in _slices(held_starts(contents.held, CHUNK_BYTES), len(contents.held))]
+        cuts += [ChunkRows(rows, True) for rows in _slices(held_starts(contents.held, CHUNK_BYTES), len(contents.held))]
     return cuts
 
 
@@ -56,7 +56,7 @@ def _starts(contents: Contents) -> list[int]:
     return list(range(0, max(1, len(contents)), CHUNK_BYTES // row))
 
 
-def chunk(contents: Contents, cut: Cut) -> bytes:
+def chunk(contents: Contents, cut: ChunkRows) -> bytes:
     """Some rows of the contents."""
     rows, held = cut.rows, contents.held
     if cut.held:
@@ -109,7 +109,7 @@ def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
     if "division" in found:
         kept.division = Division(**found["division"])
     if "committed" in found:
-        kept.committed = Committed(*found["committed"])
+        kept.committed = CommitStamp(*found["committed"])
     return kept, _decoded
 
 

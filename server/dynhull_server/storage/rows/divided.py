@@ -23,7 +23,7 @@ class NoLongerKeptError(StorageError):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class DatabaseView:
     """A database as of one moment."""
 
     reader: Reader
@@ -52,7 +52,7 @@ def revisions(ledger: Ledger) -> dict[str, int]:
     return {hull.row.uid: hull.last for hull in ledger.hulls.values() if hull.row.settings.divided}
 
 
-def wholes(parts: Sequence[Part], before: Mapping[str, int]) -> Iterator[Whole]:
+def wholes(parts: Sequence[DatabaseView], before: Mapping[str, int]) -> Iterator[Whole]:
     """The hulls over shards, at the revisions that their roots had before any of the parts was read.
 
     A hull that was created since is at revision 0. What it costs depends on the roots, and on what shards have beyond.
@@ -89,7 +89,7 @@ def wholes(parts: Sequence[Part], before: Mapping[str, int]) -> Iterator[Whole]:
             yield whole
 
 
-def latest_epoch(part: Part) -> int:
+def latest_epoch(part: DatabaseView) -> int:
     """The latest epoch of a root that the shards in a database know of; 0 for none. O(their points)."""
     shards = [hull for hull in part.ledger.hulls.values() if hull.row.settings.shard is not None]
     known = (read_hull(part.reader, hull, hull.last).sequences.get(EPOCHS, 0) for hull in shards)

@@ -16,7 +16,7 @@ from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
 from .group import AnyStep, Cut, DropSnapshot
 from .hull_rows import found_hulls, values
-from .ledger import HullRows, Ledger, Snapshot
+from .ledger import HullRows, Ledger, StoredSnapshot
 from .tables import COLUMNS, FENCES_SINCE, Reader
 from .totals import Totals, totals_from
 
@@ -61,7 +61,7 @@ class _Scanned:
     lasts: "array[int]" = field(default_factory=lambda: array("q"))
     gaps: bool = False
     damaged: dict[int, int] = field(default_factory=dict)  # weights by first revision
-    snapshots: dict[int, Snapshot] = field(default_factory=dict)
+    snapshots: dict[int, StoredSnapshot] = field(default_factory=dict)
 
 
 def examine(reader: Reader, version: int, findings: Findings, progress: Progress, *, contents: bool = True) -> None:
@@ -159,9 +159,9 @@ class _Examination:
             if scanned is None:
                 self._ledger.dead["snapshots"].append(place)
             elif _matches(stored, state, place, number, revision, chunks):
-                scanned.snapshots[place] = Snapshot(place, revision, array("q", [MISSING]) * chunks)
+                scanned.snapshots[place] = StoredSnapshot(place, revision, array("q", [MISSING]) * chunks)
             else:
-                scanned.rows.snapshots.append(Snapshot(place, revision if isinstance(revision, int) else 0))
+                scanned.rows.snapshots.append(StoredSnapshot(place, revision if isinstance(revision, int) else 0))
 
     def _chunks(self) -> None:
         """Assign the chunks to their snapshots."""

@@ -119,7 +119,7 @@ FenceStep = PutInside | DropInside | ShrinkEvents | StageEvents | AppendFirst | 
 
 
 @dataclass(slots=True)
-class _Now:
+class _FenceNow:
     """A fence after a part of the changes; `rows` is its present state in the ledger.
 
     Attributes:
@@ -166,7 +166,7 @@ class FenceChanges:
         self._ledger = ledger
         self._statements = statements
         self._effects = effects
-        self._now: dict[int, _Now] = {}
+        self._now: dict[int, _FenceNow] = {}
         self._lasts = numbers()  # the last events of fences, where these are new
         self._blocks: list[EventBlock] = []
         self._firsts: list[AppendFirst] = []
@@ -198,14 +198,14 @@ class FenceChanges:
         elif not isinstance(change, PutInside | DropInside):  # those may come after the deletion
             raise NotCommittedError(f"there is no fence {number}")
 
-    def _fence(self, number: int) -> _Now | None:
+    def _fence(self, number: int) -> _FenceNow | None:
         """A fence after the changes so far, None if it does not exist."""
         now = self._now.get(number)
         if now is None and (rows := self._ledger.fences.get(number)):
-            now = self._now[number] = _Now(rows, rows.count, rows.sum, rows.start)
+            now = self._now[number] = _FenceNow(rows, rows.count, rows.sum, rows.start)
         return None if now is None or now.deleted else now
 
-    def _plus(self, now: _Now, rows: int, weights: int) -> None:
+    def _plus(self, now: _FenceNow, rows: int, weights: int) -> None:
         now.count += rows
         now.sum += weights
         self.rows += rows
@@ -218,7 +218,7 @@ class FenceChanges:
         *columns, stored = values(row)
         each = weight(stored, row.number)
         rows = FenceRows(row, each, each, last=change.inside.sequence)
-        now = self._now[row.number] = _Now(rows, 0, 0)
+        now = self._now[row.number] = _FenceNow(rows, 0, 0)
         self._lasts[row.number] = rows.last
         self._plus(now, 1, each)
         self.next_number = max(self.next_number, row.number + 1)
@@ -232,7 +232,7 @@ class FenceChanges:
         for step in inside_steps(row.number, change.inside, lambda: next(self._ledger.inside_ids)):
             self._put_inside(step, now)
 
-    def _carry_out(self, change: FenceChange | FenceStep, now: _Now) -> None:
+    def _carry_out(self, change: FenceChange | FenceStep, now: _FenceNow) -> None:
         match change:
             case PutDelays():
                 self._put_delays(change, now)
@@ -383,7 +383,7 @@ class FenceChanges:
         self.sum -= sum(weights[empty].tolist())
         return places[empty].tolist(), partial(self._ledger.events.release, places, counts)
 
-    def _change(self, row: FenceRow, now: _Now) -> None:
+    def _change(self, row: FenceRow, now: _FenceNow) -> None:
         *columns, stored = values(row)
         each = weight(stored, row.number)
         self._statements.append(Remove("fences", (row.number,)))
@@ -391,7 +391,7 @@ class FenceChanges:
         self._plus(now, 0, each - now.rows.weight)
         self._effects.append(lambda: now.rows.change(row, each))
 
-    def _drop_fence(self, number: int, now: _Now) -> None:
+    def _drop_fence(self, number: int, now: _FenceNow) -> None:
         """Delete the row of the fence. `sweep` drops the rest."""
         now.deleted = True
         if number in self._lasts:
@@ -416,7 +416,7 @@ class FenceChanges:
 
         self._effects.append(bury)
 
-    def _drop_events(self, first: int, now: _Now) -> None:
+    def _drop_events(self, first: int, now: _FenceNow) -> None:
         rows, before = now.rows, now.start
         first = rows.boundary(first)
         if first <= (1 if before is None else before.first):
@@ -444,7 +444,7 @@ class FenceChanges:
 
         self._effects.append(drop)
 
-    def _put_consumer(self, consumer: Consumer, number: int, now: _Now) -> None:
+    def _put_consumer(self, consumer: Consumer, number: int, now: _FenceNow) -> None:
         self._drop_consumer(consumer.name, now)
         *columns, stored = consumer_values(number, consumer)
         place, each = next(self._ledger.consumer_ids), weight(stored, number)
@@ -453,14 +453,14 @@ class FenceChanges:
         self._statements.append(Insert("consumers", (place, *columns, stored)))
         self._effects.append(lambda: now.rows.put_consumer(consumer, place, each))
 
-    def _drop_consumer(self, name: str, now: _Now) -> None:
+    def _drop_consumer(self, name: str, now: _FenceNow) -> None:
         known = now.consumer(name)
         if known is not None:
             place, each = known
             self._plus(now, -1, -each)
             self._delete_rows("consumers", [place])
 
-    def _put_delays(self, change: PutDelays, now: _Now) -> None:
+    def _put_delays(self, change: PutDelays, now: _FenceNow) -> None:
         number, rows = change.number, now.rows
         for subject, delay in change.delays.items():
             known = now.delays.get(subject, rows.delays.get(subject))
@@ -479,7 +479,7 @@ class FenceChanges:
             self._statements.append(Insert("delays", (place, number, stored, payload)))
             self._effects.append(partial(rows.put_delay, subject, place, each))
 
-    def _put_inside(self, step: PutInside, now: _Now) -> None:
+    def _put_inside(self, step: PutInside, now: _FenceNow) -> None:
         keys = step.number, step.sequence, step.part, step.parts
         stored = checksum(step.payload, *keys)
         each = weight(stored, *keys)
@@ -487,7 +487,7 @@ class FenceChanges:
         self._statements.append(Insert("insides", (step.place, *keys, stored, step.payload)))
         self._effects.append(lambda: now.rows.put_inside(step.sequence, step.parts, step.part, step.place, each))
 
-    def _drop_inside(self, sequence: int, now: _Now) -> None:
+    def _drop_inside(self, sequence: int, now: _FenceNow) -> None:
         known = now.rows.insides.get(sequence)
         if known is not None:
             self._plus(now, -len(known.places), -known.sum)

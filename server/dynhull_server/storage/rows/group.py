@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...state.changes import Change
-from ...state.records import Append, Committed, Create, Delete, HullRow
+from ...state.records import Append, CommitStamp, Create, Delete, HullRow
 from ..port import NotCommittedError
 from .batch_rows import batch_checksum
 from .encoding import checksum, encode, weight
 from .fence_ledger import FenceChanges, FenceStep
 from .hull_rows import values
-from .ledger import HullRows, Ledger, Snapshot
+from .ledger import HullRows, Ledger, StoredSnapshot
 from .tables import Insert, Remove, Statement
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Finish:
     """Step: makes a snapshot valid."""
 
     number: int
-    snapshot: Snapshot
+    snapshot: StoredSnapshot
     state: bytes
 
 
@@ -43,7 +43,7 @@ class DropSnapshot:
     """Step: deletes a snapshot; its chunks become dead."""
 
     number: int
-    snapshot: Snapshot
+    snapshot: StoredSnapshot
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ class Group:
     def __init__(self, ledger: Ledger, changes: Iterable[Change | AnyStep], now: int = 0) -> None:
         self._ledger = ledger
         self.before = self.totals = ledger.totals
-        self.commit = Committed(self.before.commits + 1, max(self.before.committed, now))
+        self.commit = CommitStamp(self.before.commits + 1, max(self.before.committed, now))
         # The hulls it concerns, after the changes so far.
         self._now: dict[int, _Now] = {}
         self._effects: list[Callable[[], object]] = []

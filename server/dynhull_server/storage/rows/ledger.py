@@ -30,7 +30,7 @@ IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "con
 
 
 @dataclass(slots=True)
-class Snapshot:
+class StoredSnapshot:
     """The row numbers of a snapshot; `chunks` are those of its points."""
 
     id: int
@@ -56,7 +56,7 @@ class HullRows:
     firsts: "array[int]" = field(default_factory=lambda: array("q"))
     ids: "array[int]" = field(default_factory=lambda: array("q"))
     last: int = 0
-    snapshots: list[Snapshot] = field(default_factory=list)
+    snapshots: list[StoredSnapshot] = field(default_factory=list)
 
     @property
     def oldest(self) -> int:

@@ -6,12 +6,12 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
-from ...state.records import Committed, Kept, Record
+from ...state.records import CommitStamp, Kept, Record
 from ..port import DamagedError
 from .batch_rows import batch_records, commit_columns, is_whole
 from .chunks import joined, state_from
 from .encoding import checksum
-from .ledger import HullRows, Snapshot
+from .ledger import HullRows, StoredSnapshot
 from .tables import Reader, UnreadableError
 
 
@@ -66,12 +66,12 @@ def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
         yield kept
 
 
-def commit_of(reader: Reader, hull: HullRows, revision: int) -> Committed | None:
+def commit_of(reader: Reader, hull: HullRows, revision: int) -> CommitStamp | None:
     """The commit of a revision; None where it is not known, because the row is damaged, or of an earlier format."""
     for first, last, stored, payload, *commit in batch_rows(reader, hull.between(revision - 1, revision)):
         if first <= revision <= last and None not in commit:
             whole = is_whole(stored, payload, hull.row.number, first, last, *commit)
-            return Committed(*commit) if whole else None
+            return CommitStamp(*commit) if whole else None
     for snapshot in hull.snapshots:
         if snapshot.revision == revision:
             kept = snapshot_state(reader, hull.row.number, snapshot)
@@ -110,13 +110,13 @@ def _newest_snapshot(reader: Reader, hull: HullRows, until: int) -> Kept:
     return Kept()
 
 
-def snapshot_state(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
+def snapshot_state(reader: Reader, number: int, snapshot: StoredSnapshot) -> Kept | None:
     """A snapshot without its contents, None if it is damaged."""
     state = _state(reader, number, snapshot)
     return None if state is None else state_from(state)[0]
 
 
-def _state(reader: Reader, number: int, snapshot: Snapshot) -> bytes | None:
+def _state(reader: Reader, number: int, snapshot: StoredSnapshot) -> bytes | None:
     keys = snapshot.id, number, snapshot.revision, len(snapshot.chunks)
     row = next(
         reader.some("snapshots", "state, checksum, snapshots.id, hull, revision, chunks", array("q", [snapshot.id])),
@@ -128,7 +128,7 @@ def _state(reader: Reader, number: int, snapshot: Snapshot) -> bytes | None:
     return state
 
 
-def _snapshot(reader: Reader, number: int, snapshot: Snapshot) -> Kept | None:
+def _snapshot(reader: Reader, number: int, snapshot: StoredSnapshot) -> Kept | None:
     """A snapshot, None if it is damaged."""
     state = _state(reader, number, snapshot)
     if state is None:

@@ -11,7 +11,7 @@ from itertools import pairwise, takewhile
 from ...state.changes import Change
 from ...state.fences.events.block import AppendEvents, EventBlock, joined
 from ...state.fences.model.records import AddFence, DropFence
-from ..port import Step
+from ..port import StorageStep
 from .fence_ledger import EVENTS_A_ROW, AppendFirst, CountStaged, StageEvents
 
 # Events that are committed together with other changes, about: of more, some are written ahead of these.
@@ -21,8 +21,8 @@ EVENTS_AT_ONCE = 4 * EVENTS_A_ROW
 
 
 def staging(
-    changes: Sequence[Change | Step], place: Callable[[], int]
-) -> tuple[list[StageEvents], Sequence[Change | Step]]:
+    changes: Sequence[Change | StorageStep], place: Callable[[], int]
+) -> tuple[list[StageEvents], Sequence[Change | StorageStep]]:
     """What of many events is written ahead, and the changes that follow: with the first events of each fence.
 
     Args:
@@ -33,7 +33,7 @@ def staging(
     others = {change.row.number for change in changes if isinstance(change, AddFence)}
     others |= {change.number for change in changes if isinstance(change, DropFence)}
     steps: list[StageEvents] = []
-    then: list[Change | Step] = []
+    then: list[Change | StorageStep] = []
     for change in changes:
         then.append(change)
         if not isinstance(change, AppendEvents) or len(change.block) <= EVENTS_TOGETHER:

@@ -11,8 +11,8 @@ from typing import Protocol, TypeVar
 from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
-from ...state.records import Committed, HullRow, Kept, Record
-from ..port import NEWEST, Contents, DamagedError, NotCommittedError, Step, StorageError
+from ...state.records import CommitStamp, HullRow, Kept, Record
+from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from . import chunks
 from .divided import newest_rows
 from .encoding import weight
@@ -20,7 +20,7 @@ from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
 from .group import Chunk, DropBatches, DropDead, DropSnapshot, Finish, Group
-from .ledger import DROPPED, KEPT, HullRows, Ledger, Snapshot
+from .ledger import DROPPED, KEPT, HullRows, Ledger, StoredSnapshot
 from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader
@@ -64,18 +64,20 @@ class RowStorage(ABC):
 
     # Committing
 
-    def ahead(self, changes: Sequence[Change | Step]) -> tuple[Sequence[Step], Sequence[Change | Step]]:
+    def ahead(
+        self, changes: Sequence[Change | StorageStep]
+    ) -> tuple[Sequence[StorageStep], Sequence[Change | StorageStep]]:
         """What of many events can be written before the changes."""
         return staging(changes, lambda: next(self._ledger.event_ids))
 
-    def _contents(self, notes: list[str]) -> Contents:
+    def _contents(self, notes: list[str]) -> StoredContents:
         """What was found, with messages about what was lost or repaired."""
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
         totals = self._ledger.totals
-        return Contents(rows, totals.next_number, notes, fences, totals.committed, totals.commits)
+        return StoredContents(rows, totals.next_number, notes, fences, totals.committed, totals.commits)
 
-    def _group(self, changes: Sequence[Change | Step], now: int) -> Group:
+    def _group(self, changes: Sequence[Change | StorageStep], now: int) -> Group:
         """The statements of a commit, and what it does to the ledger."""
         if self._unsettled:
             raise StorageError("the outcome of the previous commit is not known yet")
@@ -146,7 +148,7 @@ class RowStorage(ABC):
         with self._visible:
             return self._settled().fences[number].boundary(first)
 
-    def inside(self, number: int, inside: Inside) -> Iterator[Step]:
+    def inside(self, number: int, inside: Inside) -> Iterator[StorageStep]:
         """Write who is inside, then drop what that supersedes."""
         yield from inside_steps(number, inside, lambda: next(self._ledger.inside_ids))
         while (fence := self._ledger.fences.get(number)) and (
@@ -170,12 +172,12 @@ class RowStorage(ABC):
 
     # Snapshots, and the removal of superseded rows
 
-    def snapshot(self, number: int, kept: Kept) -> Iterator[Step]:
+    def snapshot(self, number: int, kept: Kept) -> Iterator[StorageStep]:
         """Write a snapshot, then drop the rows it supersedes."""
         contents = kept.contents
         cuts = chunks.cuts(contents)
         ids = [next(self._ledger.chunk_ids) for _ in cuts]
-        snapshot = Snapshot(next(self._ledger.snapshot_ids), kept.revision, array("q", ids))
+        snapshot = StoredSnapshot(next(self._ledger.snapshot_ids), kept.revision, array("q", ids))
         self._under_way[snapshot.id] = set(ids)
         try:
             for i, (place, cut) in enumerate(zip(ids, cuts, strict=True)):
@@ -186,7 +188,7 @@ class RowStorage(ABC):
             del self._under_way[snapshot.id]
         yield from self._trim(number)
 
-    def _commit_of(self, number: int, revision: int) -> Committed | None:
+    def _commit_of(self, number: int, revision: int) -> CommitStamp | None:
         """The commit of a revision, None where it is not known."""
         with self._reading(lambda ledger: [hull.copy() for hull in [ledger.hulls.get(number)] if hull]) as (
             reader,
@@ -194,7 +196,7 @@ class RowStorage(ABC):
         ):
             return next((commit_of(reader, hull, revision) for hull in found), None)
 
-    def _trim(self, number: int) -> Iterator[Step]:
+    def _trim(self, number: int) -> Iterator[StorageStep]:
         while (hull := self._ledger.hulls.get(number)) and len(hull.snapshots) > KEPT:
             yield DropSnapshot(number, hull.snapshots[0])
         yield from self._drop_dead("chunks")
@@ -205,12 +207,12 @@ class RowStorage(ABC):
             weights = sum(weight(stored, number, first, last) for _, first, last, stored in rows)
             yield DropBatches(number, ids[: len(rows)], weights)
 
-    def cut(self, number: int, last: int) -> Step | None:
+    def cut(self, number: int, last: int) -> StorageStep | None:
         """The step that drops the revisions after `last`."""
         with self._reading(lambda ledger: ledger.hulls[number].copy()) as (reader, hull):
             return newest_rows(reader, hull, last)
 
-    def sweep(self) -> Iterator[Step]:
+    def sweep(self) -> Iterator[StorageStep]:
         """Drop the rows of deleted hulls and unfinished snapshots."""
         self._look_for_dead_chunks()
         for table in DROPPED:
@@ -232,7 +234,7 @@ class RowStorage(ABC):
         ):
             return shrunk(reader, place, firsts)
 
-    def _drop_dead(self, table: str) -> Iterator[Step]:
+    def _drop_dead(self, table: str) -> Iterator[StorageStep]:
         while ids := self._ledger.dead[table][:DROPPED_ROWS]:
             yield DropDead(table, ids[: max(1, len(self._few(table, ids)))])
 

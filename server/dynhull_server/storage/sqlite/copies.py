@@ -9,7 +9,7 @@ from pathlib import Path
 from ...state.records import HullRow, HullSettings, Kept
 from ..port import NEWEST, DamagedError, FormatError, LockedError, Progress, StorageError
 from ..rows import divided
-from ..rows.divided import NoLongerKeptError, Part, Whole, dropping
+from ..rows.divided import DatabaseView, NoLongerKeptError, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
 from ..rows.group import AnyStep
@@ -18,7 +18,7 @@ from ..rows.ledger import Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
-from .disk import Access, Disk, make_durable
+from .disk import Disk, OpenMode, make_durable
 from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
 from .migration import begin_anew, change, make_tables, migrate
@@ -65,7 +65,7 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class HullInFolder:
     """A hull in the folders of a server.
 
     Attributes:
@@ -168,7 +168,7 @@ def _together(paths: Sequence[Path], *, accept_loss: bool = False) -> Iterator["
         with ExitStack() as stack:
             sources = [stack.enter_context(_opened(path, accept_loss=accept_loss)) for path in paths]
             ledgers = [load(each.connection, each.version) for each in sources]
-            parts = [Part(each.reader, ledger) for each, ledger in zip(sources, ledgers, strict=True)]
+            parts = [DatabaseView(each.reader, ledger) for each, ledger in zip(sources, ledgers, strict=True)]
             if len(parts) == 1:
                 before = divided.revisions(ledgers[0])
             try:
@@ -224,7 +224,7 @@ def write(source: str, target: Path, rows: Iterable[Insert], totals: Totals) -> 
     return findings
 
 
-def read(paths: Sequence[Path], name: str) -> Found:
+def read(paths: Sequence[Path], name: str) -> HullInFolder:
     """A hull as of the last commit; a hull over shards as `copy_all` copies it.
 
     Args:
@@ -241,13 +241,13 @@ def read(paths: Sequence[Path], name: str) -> Found:
             for hull in part.ledger.hulls.values():
                 if hull.row.name == name and not hull.row.settings.divided:
                     kept = read_hull(part.reader, hull, NEWEST)
-                    return Found(hull.row, kept.last_revision, [(hull.row.settings, kept)], notes)
+                    return HullInFolder(hull.row, kept.last_revision, [(hull.row.settings, kept)], notes)
         for whole in together.wholes:
             if whole.row.name == name:
                 shards = [(parts[of], parts[of].ledger.hulls[number], last) for of, number, last in whole.shards]
                 nothing = replace(whole.row.settings, shards=0), Kept()  # says which columns there are
                 kepts = [(hull.row.settings, read_hull(part.reader, hull, last)) for part, hull, last in shards]
-                return Found(whole.row, whole.revision, [nothing, *kepts], notes)
+                return HullInFolder(whole.row, whole.revision, [nothing, *kepts], notes)
     raise StorageError(f"there is no hull {name!r} in {paths[0] if len(paths) == 1 else paths[0].parent}")
 
 
@@ -278,7 +278,7 @@ class _Together:
     """The databases of one server, and what they have in common of hulls over shards."""
 
     sources: list[_Opened]
-    parts: list[Part]
+    parts: list[DatabaseView]
     wholes: list[Whole]
 
     def lasts(self, place: int) -> dict[int, int]:
@@ -346,7 +346,7 @@ def _opened(
         if not folder.disk.size(folder.database):
             raise StorageError(f"{path} is no data folder: it has no {DATABASE}")
         # Without a log, SQLite need not create files to read the database.
-        access = Access.READ if folder.disk.size(folder.log) else Access.RAW
+        access = OpenMode.READ if folder.disk.size(folder.log) else OpenMode.RAW
         try:
             connection = stack.enter_context(closing(folder.connect(access)))
             connection.execute("BEGIN")

@@ -13,7 +13,7 @@ from .birth import birth
 LOCK_SECONDS = 30
 
 
-class Access(StrEnum):
+class OpenMode(StrEnum):
     """The mode in which a database is opened.
 
     WRITE: for reading and writing; a missing database is created. READ: nothing is changed, not even on closing. RAW:
@@ -84,7 +84,7 @@ class Disk:
         """Make a file durable."""
         os.fsync(file.fileno())
 
-    def connect(self, database: Path, access: Access) -> sqlite3.Connection:
+    def connect(self, database: Path, access: OpenMode) -> sqlite3.Connection:
         """A connection to a database, usable from any thread, by one at a time."""
         address = f"{database.absolute().as_uri()}?{access.value}"
         return sqlite3.connect(address, uri=True, isolation_level=None, check_same_thread=False, timeout=LOCK_SECONDS)

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..port import DamagedError, FormatError, LockedError, StorageError
 from ..rows.tables import UnreadableError
 from ..rows.totals import Totals, totals_from
-from .disk import Access, Disk
+from .disk import Disk, OpenMode
 from .log import check_log
 from .log_index import read_index
 from .readers import SQLiteReader
@@ -74,7 +74,7 @@ class Folder:
         with lock or nullcontext():
             yield lock is not None
 
-    def connect(self, access: Access, lock_ms: int | None = None) -> sqlite3.Connection:
+    def connect(self, access: OpenMode, lock_ms: int | None = None) -> sqlite3.Connection:
         """A connection, which waits that long for locks; by default as the disk says.
 
         The size of its cache is set here, because that in the header could be damaged.
@@ -140,7 +140,7 @@ class Folder:
                 raise DamagedError(f"{self.database} is missing or empty, but its log exists: restore a backup")
             return None
         try:
-            with closing(self.connect(Access.RAW)) as connection:
+            with closing(self.connect(OpenMode.RAW)) as connection:
                 return totals_from(SQLiteReader(connection).totals())[0]
         except (sqlite3.Error, UnreadableError):
             return None  # format 1, or damaged, which the examination reports

@@ -17,9 +17,9 @@ from threading import Lock
 
 from ...state.changes import Change
 from ...state.errors import words
-from ...state.records import Committed
+from ...state.records import CommitStamp
 from ..durability import Durability
-from ..port import Contents, DamagedError, LockedError, NotCommittedError, Progress, Step, StorageError
+from ..port import DamagedError, LockedError, NotCommittedError, Progress, StorageError, StorageStep, StoredContents
 from ..refusals import Meaning
 from ..rows.examine import Findings
 from ..rows.group import Group
@@ -28,7 +28,7 @@ from ..rows.ledger import Ledger
 from ..rows.storage import RowStorage
 from ..rows.tables import FORMAT
 from ..rows.totals import MODES, STOPPED, Totals, totals_from
-from .disk import LOCK_SECONDS, Access, Disk
+from .disk import LOCK_SECONDS, Disk, OpenMode
 from .examination import examine, format_of, load
 from .folder import Folder
 from .migration import begin_anew, make_tables, migrate
@@ -91,7 +91,7 @@ class SQLiteStorage(RowStorage):
 
     # Opening and closing
 
-    def open(self, progress: Progress) -> Contents:
+    def open(self, progress: Progress) -> StoredContents:
         """Examine the folder, repair what can be repaired, and load it."""
         with ExitStack() as stack:
             try:
@@ -103,7 +103,7 @@ class SQLiteStorage(RowStorage):
                     raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
                 stack.callback(self._disconnect)
                 self._load(findings, version)
-                self._checkpointer = stack.enter_context(closing(self._folder.connect(Access.WRITE)))
+                self._checkpointer = stack.enter_context(closing(self._folder.connect(OpenMode.WRITE)))
                 self._restart_log(own)
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
                 self._log = stack.enter_context(self._folder.disk.open(self._folder.log))
@@ -137,7 +137,7 @@ class SQLiteStorage(RowStorage):
     # Committing
 
     @_as_storage_errors()
-    def commit(self, changes: Sequence[Change | Step], now: int = 0) -> Committed:
+    def commit(self, changes: Sequence[Change | StorageStep], now: int = 0) -> CommitStamp:
         """Commit all of the changes or none."""
         if self._gone is not None and not self._unsettled:
             raise NotCommittedError(_gone(self._gone))
@@ -273,7 +273,7 @@ class SQLiteStorage(RowStorage):
         """
         if not self._folder.disk.size(self._folder.database):
             self._make_database()
-        connection = self._guard = stack.enter_context(closing(self._folder.connect(Access.READ, START_PATIENCE_MS)))
+        connection = self._guard = stack.enter_context(closing(self._folder.connect(OpenMode.READ, START_PATIENCE_MS)))
         version = format_of(connection, self._folder.database)
         if version == 0:  # a server was killed before it created the tables
             self._make_database()
@@ -326,7 +326,7 @@ class SQLiteStorage(RowStorage):
         self._checkpointer.execute(f"PRAGMA busy_timeout = {PATIENCE_MS}")
 
     def _connect_writer(self) -> sqlite3.Connection:
-        connection = self._folder.connect(Access.WRITE)
+        connection = self._folder.connect(OpenMode.WRITE)
         try:
             connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
             connection.execute("PRAGMA journal_mode = WAL")
@@ -341,7 +341,7 @@ class SQLiteStorage(RowStorage):
 
     def _connect_reader(self) -> sqlite3.Connection:
         """A connection that has read once, so that its files are open."""
-        connection = self._folder.connect(Access.READ)
+        connection = self._folder.connect(OpenMode.READ)
         try:
             connection.execute("SELECT id FROM totals").fetchone()
         except BaseException:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..index.subjects import Subjects
 
 
-class Tally:
+class FenceCount:
     """An integer of a fence in a column of its tallies."""
 
     __slots__ = ("_column",)
@@ -58,8 +58,8 @@ class Fence:
         tallies, place: where the integers above are: with those of other fences, once it has been created.
     """
 
-    first, last, time = Tally(Column.FIRST), Tally(Column.LAST), Tally(Column.TIME)
-    inside, unsaved = Tally(Column.INSIDE), Tally(Column.UNSAVED)
+    first, last, time = FenceCount(Column.FIRST), FenceCount(Column.LAST), FenceCount(Column.TIME)
+    inside, unsaved = FenceCount(Column.INSIDE), FenceCount(Column.UNSAVED)
 
     def __init__(self, row: FenceRow) -> None:
         self.tallies = Tallies(room=1)

@@ -79,7 +79,7 @@ class ReadFence(FenceRequest):
 
 
 @dataclass(slots=True, eq=False)
-class PutConsumer(FenceRequest):
+class Acknowledge(FenceRequest):
     """Create a consumer if it is new, and acknowledge events. The result is the Consumer.
 
     Attributes:
@@ -94,14 +94,14 @@ class PutConsumer(FenceRequest):
 
 
 @dataclass(slots=True, eq=False)
-class DropConsumer(FenceRequest):
+class DeleteConsumer(FenceRequest):
     """Delete a consumer."""
 
     consumer: str
 
 
 @dataclass(slots=True, eq=False)
-class DropEvents(FenceRequest):
+class TrimEvents(FenceRequest):
     """Drop the events before the sequence `first`, and count them as lost by consumers that have not acknowledged them.
 
     Attributes:
@@ -127,4 +127,4 @@ class PassTime(FenceRequest):
 
 # Requests that change which hulls share a queue, or what they are compared with.
 STRUCTURAL = (CreateFence, ReplaceFence, DeleteFence)
-FENCE_REQUESTS = (CreateFence, ReplaceFence, DeleteFence, ReadFence, PutConsumer, DropConsumer, DropEvents, PassTime)
+FENCE_REQUESTS = (CreateFence, ReplaceFence, DeleteFence, ReadFence, Acknowledge, DeleteConsumer, TrimEvents, PassTime)

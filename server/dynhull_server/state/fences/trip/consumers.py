@@ -2,11 +2,11 @@
 
 from ...errors import ConsumerNotFoundError, FenceReplacedError, LimitExceededError, SequenceAheadError
 from ..model.records import Consumer
-from ..model.requests import DropConsumer, DropEvents, PutConsumer
+from ..model.requests import Acknowledge, DeleteConsumer, TrimEvents
 from .leg import FenceLeg
 
 
-def put_consumer(request: PutConsumer, leg: FenceLeg, most: int) -> Consumer:
+def put_consumer(request: Acknowledge, leg: FenceLeg, most: int) -> Consumer:
     """Create a consumer if it is new, and acknowledge events; a fence has at most so many consumers."""
     fence = leg.fence
     if request.uid and request.uid != fence.row.uid:
@@ -24,14 +24,14 @@ def put_consumer(request: PutConsumer, leg: FenceLeg, most: int) -> Consumer:
     return consumer
 
 
-def drop_consumer(request: DropConsumer, leg: FenceLeg) -> None:
+def drop_consumer(request: DeleteConsumer, leg: FenceLeg) -> None:
     """Delete a consumer."""
     if request.consumer not in leg.consumers:
         raise ConsumerNotFoundError(leg.fence.name, request.consumer)
     leg.consumers = {name: each for name, each in leg.consumers.items() if name != request.consumer}
 
 
-def drop_events(request: DropEvents, leg: FenceLeg) -> None:
+def drop_events(request: TrimEvents, leg: FenceLeg) -> None:
     """Drop old events, and count them as lost by consumers that have not acknowledged them."""
     if leg.fence is not request.fence or request.first <= leg.first:
         return

@@ -17,15 +17,15 @@ from ..index.subjects import Subjects
 from ..model.records import Cause, KeptFence, Key
 from ..model.requests import (
     STRUCTURAL,
+    Acknowledge,
     CreateFence,
+    DeleteConsumer,
     DeleteFence,
-    DropConsumer,
-    DropEvents,
     FenceRequest,
     PassTime,
-    PutConsumer,
     ReadFence,
     ReplaceFence,
+    TrimEvents,
 )
 from .comparison import EXPIRY, Comparison, Ground
 from .consumers import drop_consumer, drop_events, put_consumer
@@ -161,7 +161,7 @@ class FencePart:
             return self._definition.create(request)
         fence, comparison = self._ground.fences[request.name], self._comparison
         if fence is None:
-            if isinstance(request, DropEvents):  # the deletion has overtaken it
+            if isinstance(request, TrimEvents):  # the deletion has overtaken it
                 return None
             if isinstance(request, PassTime):
                 return 0
@@ -174,14 +174,14 @@ class FencePart:
                 return self._definition.replace(request, fence)
             case DeleteFence():
                 self._definition.delete(request, fence)
-            case PutConsumer():
+            case Acknowledge():
                 return put_consumer(request, comparison.leg(fence), self._ground.limits.max_fence_consumers)
-            case DropConsumer():
+            case DeleteConsumer():
                 drop_consumer(request, comparison.leg(fence))
             case PassTime():
                 pass_time(request, fence, comparison)
                 return 0
-            case DropEvents():
+            case TrimEvents():
                 drop_events(request, comparison.leg(fence))
             case _:
                 raise AssertionError(f"not a request: {request}")
