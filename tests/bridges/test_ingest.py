@@ -398,7 +398,7 @@ def test_what_the_stream_removes_while_it_is_read(monkeypatch: pytest.MonkeyPatc
     publish(nats_port, name, [("p", {})], max_msgs=1)
 
     async def read() -> list[tuple[int, int]]:
-        feed = jetstream.JetStream(f"nats://127.0.0.1:{nats_port}/{name}", None, "mapping")
+        feed = jetstream.JetStreamSource(f"nats://127.0.0.1:{nats_port}/{name}", None, "mapping")
         await feed.begin(0)
         found = [*await feed.read()]
         while not found:

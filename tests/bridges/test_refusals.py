@@ -22,9 +22,9 @@ from dynhull_bridges.ingest.feed import DoubtfulError, Feed, FeedError
 from dynhull_bridges.ingest.jetstream import JetStreamSource
 from dynhull_bridges.ingest.kafka import Kafka
 from dynhull_bridges.ingest.mqtt import MqttSource
-from dynhull_bridges.jetstream import JetStreamSource as JetStreamTarget
+from dynhull_bridges.jetstream import JetStream as JetStreamTarget
 from dynhull_bridges.letters import Letter
-from dynhull_bridges.mqtt import MqttSource as MqttTarget
+from dynhull_bridges.mqtt import Mqtt as MqttTarget
 from dynhull_bridges.refusals.kafka import KAFKA
 from dynhull_bridges.refusals.mqtt import MQTT
 from dynhull_bridges.refusals.nats import NATS

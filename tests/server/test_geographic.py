@@ -120,7 +120,7 @@ def test_questions_about_places_that_are_none_are_refused_with_their_row(client,
         InvalidRequestError, match=r"targets row 0 is \(0\.0, 0\.0\): 162\.7\d+ degrees from the centre"
     ):
         client.intersect_lines(fiji, [(179, 0)], [(0, 0)])
-    with pytest.raises(InvalidRequestError, match=r"targets\[0\] is \(-180\.0, 0\.0\): .* no line"):
+    with pytest.raises(InvalidRequestError, match=r"targets row 0 is \(-180\.0, 0\.0\): .* no line"):
         client.intersect_lines(fiji, [(180, 0)], [(-180, 0)])
 
 

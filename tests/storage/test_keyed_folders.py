@@ -103,7 +103,10 @@ def test_backup_check_and_restore(data, tmp_path):
             kept.records = records
             found = copies.read([tmp_path / target], row.name)
             assert found.row.uid.partition(".")[0] == row.uid
-            same(found, copies.Found(replace(row, uid=found.row.uid), kept.last_revision, [(row.settings, kept)], []))
+            same(
+                found,
+                copies.HullInFolder(replace(row, uid=found.row.uid), kept.last_revision, [(row.settings, kept)], []),
+            )
 
 
 def exported(data, file, name):
