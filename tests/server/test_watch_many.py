@@ -134,7 +134,7 @@ RUNS = count()
 STEPS = st.lists(st.tuples(st.sampled_from(["apply", "create", "delete", "resume", "read"]), st.integers(0, 3)))
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=15)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=6)
 @given(STEPS)
 def test_copies_end_with_what_the_server_has(client: HullClient, name: str, steps: list[tuple[str, int]]) -> None:
     prefix = f"{name}/{next(RUNS)}/"

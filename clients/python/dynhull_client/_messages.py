@@ -113,7 +113,8 @@ class Measures(Value):
     degrees, west greater than east across the antimeridian, NaN from servers before 1.1.
 
     `diameter` is the greatest distance of two points, and `width` the least one of parallel lines with all points
-    between, on the globe NaN; both are NaN from servers before 1.1.
+    between, on the globe NaN. Both are NaN for hulls of more than 256 vertices (`get_measures` has them), and
+    from servers before 1.1.
     """
 
     area: float

@@ -2,6 +2,7 @@
 
 import math
 from functools import partial
+from itertools import compress
 from operator import attrgetter
 from typing import assert_never
 
@@ -44,6 +45,9 @@ IDENTITIES: dict[Identity, hull_pb2.Identity] = {
     "str": hull_pb2.IDENTITY_STRING_KEYS,
     "int": hull_pb2.IDENTITY_INTEGER_KEYS,
 }
+
+# The most vertices of a hull whose diameter and width are among its measures: of more they take far longer than others.
+MOST_MEASURED = 256
 
 CAUSES: dict[Cause | None, batch_pb2.Cause] = {
     None: batch_pb2.CAUSE_UNSPECIFIED,
@@ -228,42 +232,41 @@ def encode_held(
 
 
 async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
-    """The measures of the hull with these vertices: of many, one step per measure."""
-    if geographic:
-        return await _encode_measures_on_globe(vertices, run)
-    if len(vertices) <= measure.FEW:
-        found = measure.summary(vertices)
-    else:
-        found = measure.Summary(
-            *[await run(partial(getattr(measure, each), vertices)) for each in measure.Summary._fields]
-        )
-    min_x, min_y, max_x, max_y = found.bounds
+    """The measures of the hull with these vertices, one step per measure; at once of few vertices."""
+    if len(vertices) <= measure.FEW and not geographic:
+        return _measures(*measure.summary(vertices))
+    module = globe if geographic else measure
+    area, perimeter, bounds = [
+        await run(partial(each, vertices)) for each in (module.area, module.perimeter, module.bounds)
+    ]
+    centroid = (math.nan, math.nan) if geographic else await run(partial(measure.centroid, vertices))
+    diameter = width = None
+    if len(vertices) <= MOST_MEASURED:
+        diameter = await run(partial(module.diameter, vertices))
+        width = None if geographic else await run(partial(measure.width, vertices))
+    return _measures(area, perimeter, centroid, bounds, diameter, width)
+
+
+def _measures(
+    area: float,
+    perimeter: float,
+    centroid: tuple[float, float],
+    bounds: tuple[float, float, float, float],
+    diameter: float | None,
+    width: float | None,
+) -> hull_pb2.Measures:
+    min_x, min_y, max_x, max_y = bounds
     return hull_pb2.Measures(
-        area=found.area,
-        perimeter=found.perimeter,
-        centroid_x=found.centroid[0],
-        centroid_y=found.centroid[1],
+        area=area,
+        perimeter=perimeter,
+        centroid_x=centroid[0],
+        centroid_y=centroid[1],
         min_x=min_x,
         min_y=min_y,
         max_x=max_x,
         max_y=max_y,
-        diameter=found.diameter,
-        width=found.width,
-    )
-
-
-async def _encode_measures_on_globe(vertices: Points, run: Run) -> hull_pb2.Measures:
-    min_x, min_y, max_x, max_y = await run(partial(globe.bounds, vertices))
-    return hull_pb2.Measures(
-        area=await run(partial(globe.area, vertices)),
-        perimeter=await run(partial(globe.perimeter, vertices)),
-        centroid_x=math.nan,
-        centroid_y=math.nan,
-        min_x=min_x,
-        min_y=min_y,
-        max_x=max_x,
-        max_y=max_y,
-        diameter=await run(partial(globe.diameter, vertices)),
+        diameter=diameter,
+        width=width,
     )
 
 
@@ -275,9 +278,8 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
         result.hull_changed = True
     if applied.duplicate:
         result.duplicate = True
-    for name, count in zip(COUNTED, counts_of(applied), strict=True):
-        if count:
-            setattr(result, name, count)
+    for name in compress(COUNTED, counts_of(applied)):
+        setattr(result, name, getattr(applied, name))
     if applied.held:
         result.held = len(applied.held)
         result.held_rows.extend(applied.held)
@@ -287,9 +289,8 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
 
 def add_counts(applied: Applied, summary: hull_service_pb2.IngestResponse) -> None:
     """Add the counts of a batch to those of an ingest."""
-    for name, count in zip(COUNTED, counts_of(applied), strict=True):
-        if count:
-            setattr(summary, name, getattr(summary, name) + count)
+    for name in compress(COUNTED, counts_of(applied)):
+        setattr(summary, name, getattr(summary, name) + getattr(applied, name))
     summary.held += len(applied.held)
 
 
