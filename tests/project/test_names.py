@@ -6,8 +6,9 @@ the same thing at two ends of a wire: an answer of the SDK and of the gateway, a
 
 import ast
 from collections import defaultdict
-from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 # Packages that are read together: a gateway of several workers is a server, too.
@@ -22,16 +23,19 @@ LONGEST = 60
 LONGER = {"clients/cli/dynhull_cli/load/command.py: load"}
 
 
-def modules() -> Iterator[tuple[str, str, ast.Module]]:
+@pytest.fixture(scope="module")
+def modules() -> list[tuple[str, str, ast.Module]]:
     """The package, the path and the contents of each module."""
-    for package in PACKAGES:
-        for path in sorted(package.rglob("*.py")):
-            yield TOGETHER.get(package.name, package.name), str(path.relative_to(ROOT)), ast.parse(path.read_text())
+    return [
+        (TOGETHER.get(package.name, package.name), str(path.relative_to(ROOT)), ast.parse(path.read_text()))
+        for package in PACKAGES
+        for path in sorted(package.rglob("*.py"))
+    ]
 
 
-def test_a_class_has_its_name_alone() -> None:
+def test_a_class_has_its_name_alone(modules: list[tuple[str, str, ast.Module]]) -> None:
     found = defaultdict(list)
-    for package, path, module in modules():
+    for package, path, module in modules:
         for each in module.body:
             if isinstance(each, ast.ClassDef):
                 found[package, each.name].append(path)
@@ -39,10 +43,10 @@ def test_a_class_has_its_name_alone() -> None:
     assert not twice
 
 
-def test_functions_are_short() -> None:
+def test_functions_are_short(modules: list[tuple[str, str, ast.Module]]) -> None:
     long = {
         f"{path}: {each.name}": lines
-        for _, path, module in modules()
+        for _, path, module in modules
         for each in ast.walk(module)
         if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef) and (lines := body_lines(each)) > LONGEST
     }
