@@ -45,7 +45,11 @@ def held(copies: HullCopies) -> dict[str, tuple[str, int, list[list[float]]]]:
     return {name: (copy.uid, copy.revision, copy.vertices.tolist()) for name, copy in copies.items()}
 
 
-@pytest.mark.parametrize("rounds", [1, pytest.param(34, marks=with_all_cases)])
+# The supervisor waits up to ten seconds before it starts a process again that ends again and again.
+MANY_KILLS = pytest.param(34, marks=[with_all_cases, pytest.mark.timeout(1500)])
+
+
+@pytest.mark.parametrize("rounds", [1, MANY_KILLS])
 def test_kills(server: Server, rounds: int) -> None:
     """Workers are killed while their hulls change, are deleted and made again, and then the gateway."""
     random = np.random.default_rng(5)
