@@ -12,7 +12,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from dynhull_client import DynhullError, ManyChange, ManyWatch
+from dynhull_client import ManyChange, ManyWatch
 
 from .closed_pipe import when_pipe_closes
 from .json_lines import json_line
@@ -33,7 +33,7 @@ class Followed:
         self._watch = watch
         self._states: dict[str, ManyChange] = {}
         self._complete = threading.Event()
-        self._error: DynhullError | None = None
+        self._error: Exception | None = None
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -53,7 +53,7 @@ class Followed:
                     self._states.pop(change.hull, None)
                 elif change.kind == "complete":
                     self._complete.set()
-        except DynhullError as error:
+        except Exception as error:  # whatever it is, who asks for the states must not wait for ever
             self._error = error
         self._complete.set()
 

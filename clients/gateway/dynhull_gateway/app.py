@@ -18,8 +18,7 @@ from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
 from .events import routes as events
 from .events.documents import FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
-from .events.feeds import Feeds
-from .events.many import ManyFeeds
+from .events.shared import SharedWatches
 from .figures import Figures, Measured
 from .gathering import Gatherer
 from .heads import HeadAsGet
@@ -68,8 +67,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.client = client
     app.state.settings = settings
     app.state.gatherer = Gatherer()
-    app.state.feeds = Feeds()
-    app.state.many = ManyFeeds()
+    app.state.shared = SharedWatches()
     app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()

@@ -74,7 +74,7 @@ class GroupCommit:
 
     Attributes:
         since: the time by the clock when the commit in progress began; None while there is none.
-        latest: the last commit, while those are told of it that it has the changes of; None before the first.
+        latest: the last commit that has taken place, set before `done` is called for it; None before the first.
     """
 
     def __init__(

@@ -83,9 +83,6 @@ class Roster:
         self._heard: dict[object, int] = {}
         self._shared: OrderedDict[tuple[int, int, int], tuple[bytes, int]] = OrderedDict()
 
-    def __len__(self) -> int:
-        return len(self._entries) - self._gone
-
     def get(self, name: str) -> RosterEntry | None:
         """The entry of a name that is there."""
         entry = self._entries.get(name)

@@ -93,12 +93,16 @@ def decode_after(may_skip: bool, request: Any) -> int | None:
     return after
 
 
+def _require_prefix(prefix: str) -> None:
+    if not NAME_CHARACTERS.fullmatch(prefix):
+        raise InvalidFieldError("prefix", prefix, 'names consist of letters, digits and "._-/"')
+
+
 def decode_page(
     request: hull_service_pb2.ListHullsRequest | fence_service_pb2.ListFencesRequest,
 ) -> tuple[str, str, int]:
     """The prefix, the name before the page, and the size of the page."""
-    if not NAME_CHARACTERS.fullmatch(request.prefix):
-        raise InvalidFieldError("prefix", request.prefix, 'names consist of letters, digits and "._-/"')
+    _require_prefix(request.prefix)
     if request.page_token and not (
         NAME.fullmatch(request.page_token) and request.page_token.startswith(request.prefix)
     ):
@@ -249,10 +253,14 @@ def decode_layer_count(count: int) -> int:
     return count
 
 
+def _require_sketch(most: int) -> None:
+    if most > LARGEST_SKETCH:
+        raise InvalidFieldError("max_vertices", most, f"must be at most {LARGEST_SKETCH}")
+
+
 def decode_max_vertices(request: hull_service_pb2.WatchRequest) -> int:
     """The most vertices of a sketch, 0 for all vertices."""
-    if request.max_vertices > LARGEST_SKETCH:
-        raise InvalidFieldError("max_vertices", request.max_vertices, f"must be at most {LARGEST_SKETCH}")
+    _require_sketch(request.max_vertices)
     for field in ("layer", "max_vertices"):
         for other in ("directions", "resume"):
             if getattr(request, field) and request.HasField(other):
@@ -264,8 +272,7 @@ def decode_max_vertices(request: hull_service_pb2.WatchRequest) -> int:
 def decode_many(request: hull_service_pb2.WatchManyRequest) -> Choice:
     """The hulls of a request about many."""
     if not request.names:
-        if not NAME_CHARACTERS.fullmatch(request.prefix):
-            raise InvalidFieldError("prefix", request.prefix, 'names consist of letters, digits and "._-/"')
+        _require_prefix(request.prefix)
         return Choice(request.prefix)
     if request.prefix:
         raise InvalidFieldError("names", f"{len(request.names)} names", "cannot be combined with prefix")
@@ -283,8 +290,7 @@ def decode_many_contents(request: hull_service_pb2.WatchManyRequest) -> tuple[bo
     if request.max_vertices and not outline:
         problem = "only with HULL_CONTENTS_OUTLINE: a summary has no vertices"
         raise InvalidFieldError("max_vertices", request.max_vertices, problem)
-    if request.max_vertices > LARGEST_SKETCH:
-        raise InvalidFieldError("max_vertices", request.max_vertices, f"must be at most {LARGEST_SKETCH}")
+    _require_sketch(request.max_vertices)
     return outline, request.max_vertices
 
 

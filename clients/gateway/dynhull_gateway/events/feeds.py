@@ -5,19 +5,15 @@ costs no more memory than a fast one.
 """
 
 import asyncio
-import json
-import logging
 from collections import deque
-from collections.abc import AsyncIterator
-from contextlib import suppress
+from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 from time import monotonic
 from typing import Any, Literal
 
-import grpc
-
 from dynhull_client import (
     AsyncHullClient,
+    AsyncWatch,
     Deleted,
     DynhullError,
     Event,
@@ -30,15 +26,12 @@ from dynhull_client import (
 )
 
 from ..figures import Figures
-from ..refusals import of_refusal
-from .messages import COMMENT, message
-
-log = logging.getLogger(__name__)
+from .messages import COMMENT, message, problem
+from .shared import SharedWatch
 
 Form = Literal["changes", "vertices", "geojson"]
 
 KEPT = 64
-RETRY_SECONDS = 0.5
 # A reader that comes from another gateway may know a revision that this one is about to receive.
 PATIENCE_SECONDS = 5.0
 
@@ -63,17 +56,11 @@ class _Sent:
     text: bytes
 
 
-class Feed:
-    """The events of a hull in one view.
-
-    Attributes:
-        readers: the number of those who read it.
-        failure: why it has ended; None while it has not.
-    """
+class Feed(SharedWatch[Event]):
+    """The events of a hull in one view; also of one that is deleted and created again."""
 
     def __init__(self, client: AsyncHullClient, view: View) -> None:
-        self.readers = 0
-        self.failure: DynhullError | None = None
+        super().__init__(f"hull {view.name!r}")
         self._client = client
         self._view = view
         self._copy = HullCopy()
@@ -83,21 +70,15 @@ class Feed:
         self._events: deque[_Sent] = deque(maxlen=KEPT)
         self._count = 0
         self._snapshot: bytes | None = None
-        self._news = asyncio.Event()
-        self._task = asyncio.create_task(self._follow(), name=f"events of {view.name}")
 
-    async def close(self) -> None:
-        """End the watch."""
-        self._task.cancel()
-        with suppress(asyncio.CancelledError):
-            await self._task
-
-    async def read(self, resume: tuple[str, int] | None, keepalive: float, figures: Figures) -> AsyncIterator[bytes]:
+    async def read(
+        self, resume: tuple[str, int] | None, keepalive: float, figures: Figures
+    ) -> AsyncGenerator[bytes, None]:
         """The events after the place that a reader has, or from a snapshot on; a comment after a long pause."""
         place: int | None = None
         begun = monotonic()
         while self.failure is None:
-            news = self._news
+            news = self.news
             if place is None and resume is not None:
                 place = self._place(*resume)
             ahead = resume is not None and resume[0] == self._copy.uid and resume[1] > self._copy.revision
@@ -118,7 +99,7 @@ class Feed:
                         await news.wait()
                 except TimeoutError:
                     yield COMMENT
-        yield message("problem", "", of_failure(self.failure))
+        yield problem(self.failure)
 
     def _place(self, uid: str, revision: int) -> int | None:
         """The count of events up to a revision; None if it is not known."""
@@ -130,38 +111,26 @@ class Feed:
         found = (number for number, sent in enumerate(self._events, first + 1) if sent.revision == revision)
         return next(found, None)
 
-    async def _follow(self) -> None:
-        """Watch the hull; also one that is deleted and created again, and over restarts of the server."""
+    def watch(self) -> AsyncWatch:
+        """The watch of the hull, which updates the copy."""
         view = self._view
-        while self.failure is None:
-            try:
-                watch = self._client.watch(
-                    view.name,
-                    copy=self._copy,
-                    max_rate=view.rate,
-                    keys=view.keys,
-                    measures=view.measures,
-                    layer=view.layer,
-                    max_vertices=view.max_vertices,
-                    follow=True,
-                )
-                async with watch:
-                    async for event in watch:
-                        self._add(event)
-            except DynhullError as error:
-                if error.code == grpc.StatusCode.UNAVAILABLE or isinstance(error, HullNotFoundError):
-                    await asyncio.sleep(RETRY_SECONDS)
-                    continue
-                self._fail(error)
-            except Exception:  # whatever it is, the readers must not wait for ever
-                log.exception("the events of hull %r ended", view.name)
-                self._fail(DynhullError("the gateway failed", grpc.StatusCode.INTERNAL, "", {}))
+        return self._client.watch(
+            view.name,
+            copy=self._copy,
+            max_rate=view.rate,
+            keys=view.keys,
+            measures=view.measures,
+            layer=view.layer,
+            max_vertices=view.max_vertices,
+            follow=True,
+        )
 
-    def _fail(self, error: DynhullError) -> None:
-        self.failure = error
-        self._tell()
+    def passes(self, error: DynhullError) -> bool:
+        """Whether the watch goes on later: also of a hull that is not there so far."""
+        return super().passes(error) or isinstance(error, HullNotFoundError)
 
-    def _add(self, event: Event) -> None:
+    def take(self, event: Event) -> None:
+        """Keep an event."""
         self._snapshot = None
         self._known = not isinstance(event, Deleted)
         if isinstance(event, Sketch):
@@ -177,11 +146,7 @@ class Feed:
             text = self._text(event)
         self._events.append(_Sent(event.revision, text))
         self._count += 1
-        self._tell()
-
-    def _tell(self) -> None:
-        self._news.set()
-        self._news = asyncio.Event()
+        self.tell()
 
     def _text(self, event: Event) -> bytes:
         whole = isinstance(event, Snapshot) or (self._view.form != "changes" and not isinstance(event, Progress))
@@ -214,40 +179,10 @@ class Feed:
         return f"{self._copy.uid}:{self._copy.revision}" if self._copy.uid else ""
 
 
-class Feeds:
-    """The feeds that are read."""
-
-    def __init__(self) -> None:
-        self._feeds: dict[View, Feed] = {}
-
-    async def read(
-        self, client: AsyncHullClient, view: View, resume: tuple[str, int] | None, keepalive: float, figures: Figures
-    ) -> AsyncIterator[bytes]:
-        """The events of a feed, which is there while somebody reads it."""
-        feed = self._feeds.get(view)
-        if feed is None or feed.failure is not None:
-            feed = self._feeds[view] = Feed(client, view)
-        feed.readers += 1
-        try:
-            async for text in feed.read(resume, keepalive, figures):
-                yield text
-        finally:
-            feed.readers -= 1
-            if not feed.readers:
-                if self._feeds.get(view) is feed:
-                    del self._feeds[view]
-                await feed.close()
-
-
 def shown(value: Any) -> dict[str, Any]:
     """A value of the SDK as JSON has it, without what is not there."""
     named = {name: getattr(value, name) for name in value.__dataclass_fields__}
     return {name: _plain(each) for name, each in named.items() if each is not None}
-
-
-def of_failure(error: DynhullError) -> Any:
-    """The problem details of what ends a stream."""
-    return json.loads(bytes(of_refusal(error).body))
 
 
 def _whole_sketch(sketch: Sketch) -> Snapshot:

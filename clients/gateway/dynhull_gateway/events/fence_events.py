@@ -9,8 +9,8 @@ import grpc
 
 from dynhull_client import AsyncHullClient, DynhullError, FenceEvent, FenceReplacedError
 
-from .feeds import RETRY_SECONDS, of_failure
-from .messages import COMMENT, message, place
+from .messages import COMMENT, message, place, problem
+from .shared import RETRY_SECONDS
 
 LISTS = "snapshot", "closed"  # events that list who is inside
 MAY_BE_EMPTY = "sequence", "key", "distance", "inside"  # what zero or nobody is a value of
@@ -50,7 +50,7 @@ async def events(client: AsyncHullClient, reading: Reading, keepalive: float) ->
             yield message("replaced", "", {"fence": reading.name})
         except DynhullError as error:
             if error.code != grpc.StatusCode.UNAVAILABLE:
-                yield message("problem", "", of_failure(error))
+                yield problem(error)
                 return
             yield COMMENT
             await asyncio.sleep(RETRY_SECONDS)

@@ -5,23 +5,18 @@ back with a position has a watch of its own until it has all, and then goes on w
 """
 
 import asyncio
-import logging
 from collections import OrderedDict
 from collections.abc import AsyncGenerator, AsyncIterator, Iterator
-from contextlib import aclosing, suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import grpc
 from pydantic_core import to_json
 
-from dynhull_client import AsyncHullClient, DynhullError, InvalidRequestError, ManyChange
+from dynhull_client import AsyncHullClient, AsyncManyWatch, DynhullError, InvalidRequestError, ManyChange
 
 from .documents import HullNow
-from .feeds import RETRY_SECONDS, of_failure
-from .messages import COMMENT, message, place
-
-log = logging.getLogger(__name__)
+from .messages import COMMENT, message, place, problem
+from .shared import SharedWatch
 
 # States in one event.
 TOGETHER = 500
@@ -61,17 +56,11 @@ class _Now:
     text: bytes | None
 
 
-class ManyFeed:
-    """The hulls of a view.
-
-    Attributes:
-        readers: the number of those who read it.
-        failure: why it has ended; None while it has not.
-    """
+class ManyFeed(SharedWatch[ManyChange]):
+    """The hulls of a view."""
 
     def __init__(self, client: AsyncHullClient, view: ManyView) -> None:
-        self.readers = 0
-        self.failure: DynhullError | None = None
+        super().__init__(f"the hulls {view.prefix!r}")
         self._client = client
         self._view = view
         self._hulls: OrderedDict[str, _Now] = OrderedDict()
@@ -80,14 +69,6 @@ class ManyFeed:
         self._gone = 0
         self._complete = self._restored = False
         self._position: bytes | None = None
-        self._news = asyncio.Event()
-        self._task = asyncio.create_task(self._follow(), name=f"events of {view.prefix}*")
-
-    async def close(self) -> None:
-        """End the watch."""
-        self._task.cancel()
-        with suppress(asyncio.CancelledError):
-            await self._task
 
     async def read(self, position: bytes | None, keepalive: float) -> AsyncGenerator[bytes, None]:
         """All hulls, or what differs from a position, then what changes; a comment after a long pause."""
@@ -101,12 +82,12 @@ class ManyFeed:
             except InvalidRequestError:  # an id of something else: all of it, then
                 version = generation = -1
             except DynhullError as error:
-                yield message("problem", "", of_failure(error))
+                yield problem(error)
                 return
         while self.failure is None:
-            news = self._news
+            news = self.news
             if self._complete and generation != self._generation:
-                for text in self._whole():
+                for text in self._whole(restored=self._restored and generation >= 0):
                     yield text
                 version, generation = self._version, self._generation
             elif self._complete and version < self._version:
@@ -122,10 +103,10 @@ class ManyFeed:
                         yield place(self._position.hex())
                 except TimeoutError:
                     yield COMMENT
-        yield message("problem", "", of_failure(self.failure))
+        yield problem(self.failure)
 
-    def _whole(self) -> Iterator[bytes]:
-        yield message("restored" if self._restored else "begin", "", {})
+    def _whole(self, *, restored: bool) -> Iterator[bytes]:
+        yield message("restored" if restored else "begin", "", {})
         found = [now.text for now in self._hulls.values() if now.text is not None]
         position = "" if self._position is None else self._position.hex()
         for first in range(0, len(found), TOGETHER):
@@ -148,27 +129,12 @@ class ManyFeed:
             last = first + TOGETHER >= len(states)
             yield packed(states[first : first + TOGETHER], gone if last else [], position if last else "")
 
-    async def _follow(self) -> None:
-        """Watch the hulls, also over restarts of the server."""
-        while self.failure is None:
-            try:
-                async with self._client.watch_many(**self._view.arguments(), position=self._position) as watch:
-                    async for change in watch:
-                        self._take(change)
-            except DynhullError as error:
-                if error.code == grpc.StatusCode.UNAVAILABLE:
-                    await asyncio.sleep(RETRY_SECONDS)
-                    continue
-                self._fail(error)
-            except Exception:  # whatever it is, the readers must not wait for ever
-                log.exception("the events of the hulls %r ended", self._view.prefix)
-                self._fail(DynhullError("the gateway failed", grpc.StatusCode.INTERNAL, "", {}))
+    def watch(self) -> AsyncManyWatch:
+        """A watch from the position on."""
+        return self._client.watch_many(**self._view.arguments(), position=self._position)
 
-    def _fail(self, error: DynhullError) -> None:
-        self.failure = error
-        self._tell()
-
-    def _take(self, change: ManyChange) -> None:
+    def take(self, change: ManyChange) -> None:
+        """Keep what has become of a hull, or how far the watch is."""
         if change.kind == "restored":
             self._begin_anew(restored=self._complete)
             self._complete = False
@@ -184,7 +150,7 @@ class ManyFeed:
         if change.position is not None:
             self._position = change.position
         if self._complete:
-            self._tell()
+            self.tell()
 
     def _begin_anew(self, *, restored: bool) -> None:
         """Have all readers get a whole picture: states go back, or too many names are kept of hulls that are gone."""
@@ -192,10 +158,6 @@ class ManyFeed:
             del self._hulls[name]
         self._gone, self._restored = 0, restored
         self._generation += 1
-
-    def _tell(self) -> None:
-        self._news.set()
-        self._news = asyncio.Event()
 
 
 async def _picture(watch: AsyncIterator[ManyChange]) -> AsyncIterator[bytes]:
@@ -234,29 +196,3 @@ def packed(states: list[bytes], gone: list[str], ident: str = "", same: list[str
         b'{"hulls":[' + b",".join(states) + b'],"gone":' + to_json(gone) + b',"unchanged":' + to_json(same or []) + b"}"
     )
     return b"event: hulls\n" + (f"id: {ident}\n".encode() if ident else b"") + b"data: " + data + b"\n\n"
-
-
-class ManyFeeds:
-    """The feeds that are read."""
-
-    def __init__(self) -> None:
-        self._feeds: dict[ManyView, ManyFeed] = {}
-
-    async def read(
-        self, client: AsyncHullClient, view: ManyView, position: bytes | None, keepalive: float
-    ) -> AsyncIterator[bytes]:
-        """The events of a feed, which is there while somebody reads it."""
-        feed = self._feeds.get(view)
-        if feed is None or feed.failure is not None:
-            feed = self._feeds[view] = ManyFeed(client, view)
-        feed.readers += 1
-        try:
-            async with aclosing(feed.read(position, keepalive)) as texts:
-                async for text in texts:
-                    yield text
-        finally:
-            feed.readers -= 1
-            if not feed.readers:
-                if self._feeds.get(view) is feed:
-                    del self._feeds[view]
-                await feed.close()

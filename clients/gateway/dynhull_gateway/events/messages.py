@@ -1,8 +1,13 @@
 """Events as text for EventSource."""
 
+import json
 from typing import Any
 
 from pydantic_core import to_json
+
+from dynhull_client import DynhullError
+
+from ..refusals import of_refusal
 
 RETRY_MILLISECONDS = 1000
 FIRST = f"retry: {RETRY_MILLISECONDS}\n\n".encode()
@@ -13,6 +18,11 @@ def message(kind: str, ident: str, data: Any) -> bytes:
     """An event with a name, an id to resume after, and data as JSON; null where a number is not finite."""
     lines = f"event: {kind}\n" + (f"id: {ident}\n" if ident else "") + "data: "
     return lines.encode() + to_json(data, inf_nan_mode="null") + b"\n\n"
+
+
+def problem(error: DynhullError) -> bytes:
+    """The event that ends a stream: the problem details of an error."""
+    return message("problem", "", json.loads(bytes(of_refusal(error).body)))
 
 
 # A browser passes on only events with data.

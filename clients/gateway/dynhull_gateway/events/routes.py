@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,10 +15,10 @@ from ..callers import Caller, token_of
 from ..problems import ProblemError
 from ..schemas import LARGEST, NAME, FencePath, HullPath, Prefix
 from . import documents
-from .feeds import PATIENCE_SECONDS, Form, View
+from .feeds import PATIENCE_SECONDS, Feed, Form, View
 from .fence_events import Reading
 from .fence_events import events as fence_events
-from .many import ManyView
+from .many import ManyFeed, ManyView
 from .messages import parted, position_of, resumed
 from .stream import EventStream
 
@@ -119,7 +120,10 @@ async def hull_events(
             await _require_keys(client, name)
     view = View(token_of(request), name, f or form or "changes", rate, keys, measures, layer, max_vertices)
     state = request.app.state
-    texts = state.feeds.read(client, view, resumed(last_event_id), state.settings.keepalive_seconds, state.figures)
+    place, keepalive = resumed(last_event_id), state.settings.keepalive_seconds
+    texts = state.shared.read(
+        view, partial(Feed, client, view), lambda feed: feed.read(place, keepalive, state.figures)
+    )
     return EventStream(texts, state.health, state.figures)
 
 
@@ -155,7 +159,8 @@ async def watch_many(
             await anext(allowed)  # whether these hulls may be read
     state = request.app.state
     position = None if last_event_id is None else position_of(last_event_id)
-    texts = state.many.read(client, view, position, state.settings.keepalive_seconds)
+    keepalive = state.settings.keepalive_seconds
+    texts = state.shared.read(view, partial(ManyFeed, client, view), lambda feed: feed.read(position, keepalive))
     return EventStream(texts, state.health, state.figures)
 
 

@@ -1,0 +1,113 @@
+"""Watches that are shared by all their readers, each for as long as somebody reads it."""
+
+import asyncio
+import logging
+from abc import ABC, abstractmethod
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Hashable
+from contextlib import AbstractAsyncContextManager, aclosing, suppress
+from typing import Any, Generic, TypeVar
+
+import grpc
+
+from dynhull_client import DynhullError
+
+log = logging.getLogger(__name__)
+
+RETRY_SECONDS = 0.5
+
+Happening = TypeVar("Happening")
+AnyFeed = TypeVar("AnyFeed", bound="SharedWatch[Any]")
+
+
+class SharedWatch(ABC, Generic[Happening]):
+    """A watch, which goes on over restarts of the server.
+
+    Args:
+        subject: what is watched, for people.
+
+    Attributes:
+        readers: the number of those who read it.
+        failure: why it has ended; None while it has not.
+        news: set, and replaced, when there is something to read.
+    """
+
+    def __init__(self, subject: str) -> None:
+        self.readers = 0
+        self.failure: DynhullError | None = None
+        self.news = asyncio.Event()
+        self._subject = subject
+        self._task = asyncio.create_task(self._follow(), name=f"events of {subject}")
+
+    @abstractmethod
+    def watch(self) -> "AbstractAsyncContextManager[AsyncIterator[Happening]]":
+        """A watch from where this one is."""
+
+    @abstractmethod
+    def take(self, happening: Happening) -> None:
+        """Keep what the watch has returned."""
+
+    def passes(self, error: DynhullError) -> bool:
+        """Whether a watch that has ended with this error goes on later."""
+        return error.code == grpc.StatusCode.UNAVAILABLE
+
+    async def close(self) -> None:
+        """End the watch."""
+        self._task.cancel()
+        with suppress(asyncio.CancelledError):
+            await self._task
+
+    def tell(self) -> None:
+        """Wake the readers."""
+        self.news.set()
+        self.news = asyncio.Event()
+
+    async def _follow(self) -> None:
+        while self.failure is None:
+            try:
+                async with self.watch() as watch:
+                    async for happening in watch:
+                        self.take(happening)
+            except DynhullError as error:
+                if self.passes(error):
+                    await asyncio.sleep(RETRY_SECONDS)
+                    continue
+                self._fail(error)
+            except Exception:  # whatever it is, the readers must not wait for ever
+                log.exception("the events of %s ended", self._subject)
+                self._fail(DynhullError("the gateway failed", grpc.StatusCode.INTERNAL, "", {}))
+
+    def _fail(self, error: DynhullError) -> None:
+        self.failure = error
+        self.tell()
+
+
+class SharedWatches:
+    """The watches that are read, by what they are of."""
+
+    def __init__(self) -> None:
+        self._feeds: dict[Hashable, SharedWatch[Any]] = {}
+
+    async def read(
+        self, view: Hashable, begin: Callable[[], AnyFeed], texts: Callable[[AnyFeed], AsyncGenerator[bytes, None]]
+    ) -> AsyncIterator[bytes]:
+        """The events of a watch, which is there while somebody reads it.
+
+        Args:
+            view: what it is of: the same for all who get the same.
+            begin: makes it.
+            texts: reads it.
+        """
+        feed: Any = self._feeds.get(view)
+        if feed is None or feed.failure is not None:
+            feed = self._feeds[view] = begin()
+        feed.readers += 1
+        try:
+            async with aclosing(texts(feed)) as read:
+                async for text in read:
+                    yield text
+        finally:
+            feed.readers -= 1
+            if not feed.readers:
+                if self._feeds.get(view) is feed:
+                    del self._feeds[view]
+                await feed.close()
