@@ -6,9 +6,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+CHANGELOG = (ROOT / "CHANGELOG.md").read_text()
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
 # The newest release comes first, below what is not released yet.
-RELEASES = re.findall(r"^## (\S+)(?: - (\d{4}-\d\d-\d\d))?$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+RELEASES = re.findall(r"^## (\S+)(?: - (\d{4}-\d\d-\d\d))?$", CHANGELOG, re.MULTILINE)
 
 
 def test_what_is_installed_is_this_version() -> None:
@@ -25,6 +26,12 @@ def test_releases_have_dates_and_the_newest_comes_first() -> None:
     dates = [date for _, date in RELEASES[1:]]
     assert all(dates)
     assert dates == sorted(dates, reverse=True)
+
+
+def test_each_version_is_told_for_users_in_200_lines_at_most() -> None:
+    for section in CHANGELOG.split("\n## ")[1:]:
+        lines = section.splitlines()
+        assert len(lines) <= 200, f"{lines[0]}: shorten it; or a merge has brought back lines that were replaced"
 
 
 def test_the_citation_names_this_version_and_its_date() -> None:
