@@ -39,7 +39,7 @@ from dynhull_cluster.shards.parts import divided
 from dynhull_cluster.shards.placement import point_hashes, shards_of
 from dynhull_cluster.shards.requests import RootWrite
 from dynhull_cluster.shards.root import Root
-from dynhull_server.state.batch import NO_POINTS, Applied, Batch
+from dynhull_server.state.batch import NO_POINTS, Applied, Batch, Write
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings
 from dynhull_server.state.requests import WriteBatch
@@ -200,7 +200,7 @@ def message_seconds() -> float:
 
     answer_all()
     batch = Batch(uniform(8 * SHARDS), NO_POINTS, 0, count_missing=False)
-    write = WriteBatch(rows=len(batch.inserts), make=lambda: batch)
+    write = WriteBatch(None, Write("hull", batch, 0, len(batch.inserts)))
     dividing = time.perf_counter()
     divided(batch, SHARDS)
     dividing = time.perf_counter() - dividing

@@ -24,12 +24,11 @@ from dynhull_server.engine.watch_fence import watch_fence
 from dynhull_server.rpc.access import EVERYTHING, Rights
 from dynhull_server.rpc.fence_service import FenceService
 from dynhull_server.rpc.metrics import Metrics
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.records import EventType
 from dynhull_server.state.limits import FenceLimits
 from dynhull_server.state.records import HullSettings
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.sqlite.storage import Durability, SQLiteStorage
 
 CIRCLE = FenceConfig(CircleArea(0.0, 0.0, 5.0), "hull", "fleet")
@@ -86,10 +85,8 @@ async def engine_on(folder: Path) -> AsyncIterator[Engine]:
 
 
 async def put(engine: Engine, key: str, x: float) -> None:
-    def batch() -> KeyedBatch:
-        return KeyedBatch("str", PackedKeys.pack([key]), np.array([[x, 0.0]]), PackedKeys.pack([]))
-
-    await engine.hulls.apply("fleet", WriteBatch(1, batch), create=False)
+    batch = KeyedBatch("str", PackedKeys.pack([key]), np.array([[x, 0.0]]), PackedKeys.pack([]))
+    await engine.hulls.apply(Write("fleet", batch, engine.driver.time()), create=False)
 
 
 async def settled(engine: Engine) -> None:

@@ -12,11 +12,10 @@ from dynhull.keys import PackedKeys
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.records import EventType
 from dynhull_server.state.records import HullSettings
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.memory import MemoryStorage
 
 HOUR, WAIT = 3600, 300_000
@@ -45,7 +44,7 @@ def test_nobody_waits_longer_or_less_over_a_restart_an_hour_ago():
                 await engine.fences.create(name, dataclasses.replace(config, initial="none"))
         for position in positions:
             made = KeyedBatch("str", PackedKeys.pack(["a"]), np.array([position]), PackedKeys.pack([]), ttl=None)
-            await engine.hulls.apply("fleet", WriteBatch(1, lambda made=made: made), create=False)
+            await engine.hulls.apply(Write("fleet", made, engine.driver.time()), create=False)
         fences = {name: engine.fences.get(name) for name in rules}
         if not positions:
             await fences["delays"].reached(1)

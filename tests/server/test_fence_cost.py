@@ -10,7 +10,7 @@ from live_engine import LIMITS
 
 from dynhull import FenceIndex
 from dynhull.keys import PackedKeys
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.contents import keyed as keyed_contents
 from dynhull_server.state.core import Core
 from dynhull_server.state.events import Commit, Committed, Compute, Computed, Event, Tick
@@ -40,9 +40,7 @@ def carry_out(core: Core, event: Event) -> None:
 
 
 def write(points: np.ndarray) -> WriteBatch:
-    request = WriteBatch(64, lambda: KeyedBatch("str", KEYS, points, PackedKeys.pack([])))
-    request.to, request.name, request.rows = None, "fleet", 64
-    return request
+    return WriteBatch(None, Write("fleet", KeyedBatch("str", KEYS, points, PackedKeys.pack([])), 0, 64))
 
 
 def instructions(core: Core) -> int:
@@ -114,8 +112,7 @@ def test_keys_that_expire_in_a_fence_are_not_compared_with_each_other(monkeypatc
     asked(core, CreateFence(None, "here", 1, config, Birth("here", 1.0)))
     ends = np.full(len(keys), 10**6)
     points = np.random.default_rng(0).random((len(keys), 2))
-    put = WriteBatch(64, lambda: KeyedBatch("int", keys, points, keys[:0], deadlines=ends))
-    put.to, put.name, put.rows = None, "fleet", 64
+    put = WriteBatch(None, Write("fleet", KeyedBatch("int", keys, points, keys[:0], deadlines=ends), 0, 64))
     monkeypatch.setattr(keyed_contents, "key_list", lambda some: [Counted(key) for key in some.tolist()])
     asked(core, put)
     Counted.compared = 0

@@ -8,7 +8,7 @@ import pytest
 from live_engine import LIMITS
 
 from dynhull_server.compiled import native
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.core import Core
 from dynhull_server.state.events import Arrived, Commit, Committed, Compute, Computed, Tick
 from dynhull_server.state.fences.events import log
@@ -54,9 +54,7 @@ def put(dice: random.Random, name: str, now: int) -> WriteBatch:
     points = np.array([[dice.uniform(-2, 2), dice.uniform(-2, 2)] for _ in keys])
     removes = np.array(sorted(set(range(KEYS)) - set(keys.tolist()))[:3], np.uint64)
     ttl = dice.choice([None, 40])
-    request = WriteBatch(len(keys), lambda: KeyedBatch("int", keys, points, removes, ttl=ttl))
-    request.to, request.name, request.arrived = Everyone(), name, now
-    return request
+    return WriteBatch(Everyone(), Write(name, KeyedBatch("int", keys, points, removes, ttl=ttl), now, len(keys)))
 
 
 def life(seed: str) -> tuple[list[Any], list[list[int]]]:

@@ -20,14 +20,13 @@ from dynhull_server.engine import fence_verification
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.fence_verification import verify_events
 from dynhull_server.engine.fences import LiveFence
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.fences.events.block import AppendEvents, block_of
 from dynhull_server.state.fences.events.recent import RecentEvents
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.faults import FenceFault
 from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME, HullSettings
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.sqlite.origin import NOTE
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
@@ -119,11 +118,9 @@ CIRCLE = FenceConfig(CircleArea(0.0, 0.0, 5.0), "hull", "fleet", margin=2.0, ini
 
 
 async def put(engine: Engine, **places: float) -> None:
-    def batch() -> KeyedBatch:
-        points = np.array([[x, 0.0] for x in places.values()])
-        return KeyedBatch("str", PackedKeys.pack(places), points, PackedKeys.pack([]))
-
-    await engine.hulls.apply("fleet", WriteBatch(1, batch), create=False)
+    points = np.array([[x, 0.0] for x in places.values()])
+    batch = KeyedBatch("str", PackedKeys.pack(places), points, PackedKeys.pack([]))
+    await engine.hulls.apply(Write("fleet", batch, engine.driver.time()), create=False)
 
 
 async def life(engine: Engine) -> LiveFence:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from quarantine_rules import SECOND, Model
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.errors import (
     InvalidBatchError,
     KeyMissingError,
@@ -20,7 +20,6 @@ from dynhull_server.state.errors import (
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import FOREVER, NO_TIME, HullSettings, Kept, QuarantineRules, Window
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.rows import chunks
 from dynhull_server.storage.rows.encoding import decode, encode
 
@@ -39,9 +38,7 @@ class Hull:
         self.now = START
 
     def write(self, batch):
-        request = WriteBatch(1, lambda: batch)
-        request.name, request.arrived = "fleet", self.now
-        return self.state.apply(request, 0.0, self.records)
+        return self.state.apply(Write("fleet", batch, self.now), 0.0, self.records)
 
     def put(self, rows, removes=(), **more):
         """Rows of a key, x, y and a time in seconds, or None for all."""

@@ -23,8 +23,8 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.rpc.decode_batch import decode_batch
+from dynhull_server.state.batch import Write
 from dynhull_server.state.records import HullSettings, Window
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.memory import MemoryStorage
 
 INVALID, FAILED = grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.FAILED_PRECONDITION
@@ -263,7 +263,7 @@ def test_a_wall_clock_that_is_set_back_makes_nothing_young_again() -> None:
         await engine.start(lambda *_: None)
         hull = engine.hulls.get("a") if engine.hulls.has("a") else await engine.hulls.create("a", settings)
         before = hull.counts.clock or 0
-        await engine.hulls.apply("a", WriteBatch(1, lambda: decode_batch(batch)), create=False)
+        await engine.hulls.apply(Write("a", decode_batch(batch), engine.driver.time()), create=False)
         await hull.reached(hull.counts.revision + 1)  # the expiry
         await supervisor.stop()
         await engine.close()

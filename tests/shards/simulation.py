@@ -23,6 +23,7 @@ from dynhull_cluster.shards.logs import FencedError
 from dynhull_cluster.shards.messages import Open, SampleOf, StaticHull
 from dynhull_cluster.shards.placement import ShardAddress
 from dynhull_cluster.shards.requests import ExpirePoints, Read, Reshard, RootRequest, RootWrite
+from dynhull_server.state.batch import Write
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Kept
 from dynhull_server.state.requests import WriteBatch
@@ -107,9 +108,9 @@ class World:
         self._reads: list[Read] = []
         self._expiries: list[ExpirePoints] = []
         self._reshards: list[Reshard] = []
-        self._batches: dict[tuple[str, int], WriteBatch] = {}
+        self._batches: dict[tuple[str, int], Write] = {}
         self._acknowledged: dict[tuple[str, int], Any] = {}
-        self._refused: list[tuple[int, WriteBatch, Exception]] = []
+        self._refused: list[tuple[int, Write, Exception]] = []
         self._read: list[tuple[int, Any, Any]] = []
 
     def _perhaps_die(self) -> None:
@@ -205,10 +206,10 @@ class World:
             client = draw.choice(self._clients)
             if client.may_send():
                 client.refused = False
-                write = self._workload.batch()
-                write.producer, write.sequence = client.name, client.sequence + len(client.waiting) + 1
+                sequence = client.sequence + len(client.waiting) + 1
+                write = self._workload.batch()._replace(producer=client.name, sequence=sequence)
                 self._batches[client.name, write.sequence] = write
-                client.waiting.append(RootWrite(write, now=0.0))
+                client.waiting.append(RootWrite(WriteBatch(None, write), now=0.0))
                 self._ask_root(client.waiting[-1])
 
     def _ask_root(self, request: RootRequest) -> None:
@@ -323,7 +324,7 @@ class World:
             answered = [request for request in client.waiting if request.answered]
             client.waiting = [request for request in client.waiting if not request.answered]
             for request in answered:
-                write = request.batch
+                write = request.batch.write
                 if request.error is None:
                     client.sequence = max(client.sequence, write.sequence)
                     self._acknowledged[client.name, write.sequence] = request.result
@@ -363,7 +364,7 @@ class World:
         reads: dict[int, list[tuple[Any, Any]]] = {}
         for revision, answer, question in self._read:
             reads.setdefault(revision, []).append((answer, question))
-        refused: dict[int, list[tuple[WriteBatch, Exception]]] = {}
+        refused: dict[int, list[tuple[Write, Exception]]] = {}
         for position, write, error in self._refused:
             refused.setdefault(position, []).append((write, error))
         for position in range(len(self._decisions.made) + 1):
@@ -414,7 +415,7 @@ class World:
             raise BrokenPromiseError(f"revision {decision.revision}, not {one.counts.revision}")
 
 
-def check_refused(one: HullState, write: WriteBatch, error: Exception) -> None:
+def check_refused(one: HullState, write: Write, error: Exception) -> None:
     try:
         one.apply(write, 0.0, None)
     except Exception:

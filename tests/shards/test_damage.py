@@ -7,6 +7,7 @@ from shards.workload import KINDS, LIMITS, Workload
 from dynhull_cluster.shards.messages import StaticHull
 from dynhull_cluster.shards.requests import Read, RootWrite
 from dynhull_cluster.shards.root import ShardsDifferError
+from dynhull_server.state.requests import WriteBatch
 
 
 @pytest.fixture
@@ -15,7 +16,7 @@ def cluster():
     cluster, workload = Cluster(settings, LIMITS, 2), Workload(settings, seed=1)
     while min(len(log.steps) for log in cluster.shard_logs) < 5:
         write = workload.batch()
-        if cluster.serve(RootWrite(write, now=0.0)).error is None:
+        if cluster.serve(RootWrite(WriteBatch(None, write), now=0.0)).error is None:
             workload.applied(write)
     return cluster
 

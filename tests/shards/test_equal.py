@@ -11,7 +11,7 @@ from shards.workload import KINDS, LIMITS, Workload, same_effect
 from dynhull_cluster.shards.messages import CountOf, PositionsOf, SampleOf, StaticHull
 from dynhull_cluster.shards.requests import ExpirePoints, Read, Reshard, RootWrite
 from dynhull_server.rpc.encode import CAUSES
-from dynhull_server.state.batch import NO_POINTS, KeyedBatch
+from dynhull_server.state.batch import NO_POINTS, KeyedBatch, Write
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import HullSettings, Kept, QuarantineRules, Window
@@ -42,7 +42,9 @@ def test_a_hull_over_shards_is_one_hull(kind, shards):
             if one.contents.clock is not None and one.contents.follows_server and draw.random() < 0.2:
                 workload.time += draw.choice((0, 10**6))
                 assert cluster.serve(ExpirePoints(workload.time)).result == one.expire(workload.time, None)
-            requests = [RootWrite(workload.batch(), now=0.0) for _ in range(draw.choice((1, 1, 2, 5)))]
+            requests = [
+                RootWrite(WriteBatch(None, workload.batch()), now=0.0) for _ in range(draw.choice((1, 1, 2, 5)))
+            ]
             cluster.serve(*requests)
             for request in requests:
                 met[compare(one, request, workload)] += 1
@@ -69,7 +71,7 @@ def compare(one, request, workload):
     """Apply the batch to one hull, and compare. Returns what came of it."""
     refusal, before = None, one.vertices()
     try:
-        applied = one.apply(request.batch, 0.0, None)
+        applied = one.apply(request.batch.write, 0.0, None)
     except Exception as error:
         refusal = error
     if refusal is not None:
@@ -79,7 +81,7 @@ def compare(one, request, workload):
         return "refused"
     assert request.error is None, request.error
     assert same_effect(request.result, applied, before, one.vertices()), (request.result, applied)
-    workload.applied(request.batch)
+    workload.applied(request.batch.write)
     return "duplicate" if applied.duplicate else "applied"
 
 
@@ -127,10 +129,8 @@ def test_what_cannot_be_divided_is_refused(settings, field):
 def test_a_batch_about_the_quarantine_is_refused():
     no_keys = np.empty(0, np.uint64)
     batch = KeyedBatch("int", no_keys, NO_POINTS, no_keys, drops=np.array([7], np.uint64))
-    write = WriteBatch(rows=1, make=lambda: batch)
-    write.name = "hull"
     cluster = Cluster(HullSettings("int"), LIMITS, 2)
-    request = cluster.serve(RootWrite(write, now=0.0))
+    request = cluster.serve(RootWrite(WriteBatch(None, Write("hull", batch, 0)), now=0.0))
     assert isinstance(request.error, HullUnsuitableError)
     assert "has shards, so it has no quarantine" in str(request.error)
     assert cluster.root.revision == 0

@@ -6,7 +6,7 @@ from shards.workload import LIMITS
 
 from dynhull_cluster.shards.messages import SampleOf
 from dynhull_cluster.shards.requests import Read, Reshard, RootWrite
-from dynhull_server.state.batch import NO_POINTS, Batch
+from dynhull_server.state.batch import NO_POINTS, Batch, Write
 from dynhull_server.state.errors import ShardAwayError
 from dynhull_server.state.records import HullSettings
 from dynhull_server.state.requests import Stream, WriteBatch
@@ -14,16 +14,15 @@ from dynhull_server.state.requests import Stream, WriteBatch
 POINTS = np.array([(x, y) for x in range(4) for y in range(4)], float)
 
 
-def write(points, stream=None):
-    batch = WriteBatch(rows=len(points), make=lambda: Batch(points, NO_POINTS, 0, count_missing=False))
-    batch.name, batch.stream = "hull", stream
-    return RootWrite(batch, now=0.0)
+def of_points(points, stream=None):
+    write = Write("hull", Batch(points, NO_POINTS, 0, count_missing=False), 0, len(points))
+    return RootWrite(WriteBatch(None, write, stream=stream), now=0.0)
 
 
 def test_what_is_given_up_has_not_happened():
     cluster = Cluster(HullSettings(), LIMITS, 2)
-    cluster.serve(write(POINTS[:1]))
-    begun, waiting = write(POINTS), write(POINTS)
+    cluster.serve(of_points(POINTS[:1]))
+    begun, waiting = of_points(POINTS), of_points(POINTS)
     cluster.root.submit(begun)
     cluster.root.submit(waiting)
     (place, message), _ = cluster.root.messages()
@@ -31,19 +30,19 @@ def test_what_is_given_up_has_not_happened():
     cluster.root.give_up(ShardAwayError("hull", 1))
     assert [type(each.error) for each in (begun, waiting)] == [ShardAwayError] * 2
     assert not cluster.root.waits
-    late = write(POINTS[:2])
+    late = of_points(POINTS[:2])
     cluster.root.submit(late)
     cluster.root.give_up(ShardAwayError("hull", 1))  # while the shards are being opened
     assert isinstance(late.error, ShardAwayError)
     cluster.deliver()
-    assert cluster.serve(write(POINTS[1:3])).result.revision == 2
+    assert cluster.serve(of_points(POINTS[1:3])).result.revision == 2
     _, points = cluster.serve(Read(SampleOf(100))).result
     assert np.array_equal(points, POINTS[:3])
 
 
 def test_a_division_that_is_given_up_has_not_happened():
     cluster = Cluster(HullSettings(), LIMITS, 2)
-    cluster.serve(write(POINTS))
+    cluster.serve(of_points(POINTS))
     for rounds in range(1, 9):
         reshard = Reshard(3)
         cluster.root.submit(reshard)
@@ -65,8 +64,8 @@ def test_a_division_that_is_given_up_has_not_happened():
 def test_a_stream_that_has_stopped_is_not_applied():
     cluster = Cluster(HullSettings(), LIMITS, 2)
     stream = Stream("hull")
-    first, second = write(POINTS[:1]), write(POINTS[1:2], stream)
-    third = write(POINTS[2:3])
+    first, second = of_points(POINTS[:1]), of_points(POINTS[1:2], stream)
+    third = of_points(POINTS[2:3])
     for each in (first, second, third):
         cluster.root.submit(each)
     stream.leave()
@@ -77,7 +76,7 @@ def test_a_stream_that_has_stopped_is_not_applied():
 
 def test_another_root_serves_what_waits():
     cluster = Cluster(HullSettings(), LIMITS, 2)
-    begun, waiting = write(POINTS[:1]), Read(SampleOf(9))
+    begun, waiting = of_points(POINTS[:1]), Read(SampleOf(9))
     cluster.root.submit(begun)
     cluster.root.submit(waiting)
     assert cluster.root.leave() == ([begun], [waiting])

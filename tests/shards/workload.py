@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.batch import Applied, Batch, KeyedBatch
+from dynhull_server.state.batch import Applied, Batch, KeyedBatch, Write
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import HullSettings, Window
-from dynhull_server.state.requests import WriteBatch
 
 SECOND = 1_000_000
 START = 10**9 * SECOND
@@ -45,19 +44,17 @@ class Workload:
         self._sequences: dict[str, int] = {}
         self._inserted: list[tuple[float, float]] = []
 
-    def batch(self) -> WriteBatch:
+    def batch(self) -> Write:
         draw = self._random
         self.time += draw.choice((0, 1000, 200_000, SECOND))
         content = self._points() if self._settings.identity == "multiset" else self._keys()
-        write = WriteBatch(rows=1, make=lambda: content, owner="somebody")
-        write.name, write.arrived = "hull", self.time
+        producer, sequence = "", 0
         if draw.random() < 0.5:
-            write.producer = draw.choice("abcde")
-            last = self._sequences.get(write.producer, 0)
-            write.sequence = max(1, last + draw.choice((1, 1, 1, 1, 0, 2)))
-        return write
+            producer = draw.choice("abcde")
+            sequence = max(1, self._sequences.get(producer, 0) + draw.choice((1, 1, 1, 1, 0, 2)))
+        return Write("hull", content, self.time, 1, producer, sequence, "somebody")
 
-    def applied(self, write: WriteBatch) -> None:
+    def applied(self, write: Write) -> None:
         if write.producer:
             self._sequences[write.producer] = max(write.sequence, self._sequences.get(write.producer, 0))
 

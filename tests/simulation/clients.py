@@ -14,7 +14,7 @@ from dynhull.arrays import Points
 from dynhull.keys import as_keys
 from dynhull_server.engine.batch_stream import BatchStream
 from dynhull_server.engine.watch_fence import Sent
-from dynhull_server.state.batch import Applied, Batch, KeyedBatch
+from dynhull_server.state.batch import Applied, Batch, KeyedBatch, Write
 from dynhull_server.state.contents.live import AnyKeyedHull
 from dynhull_server.state.errors import (
     ConsumerNotFoundError,
@@ -44,7 +44,6 @@ from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.records import Center, HullSettings, Identity, QuarantineRules, Times, Window
-from dynhull_server.state.requests import WriteBatch, WriteTogether
 
 from .entities import Key
 from .fence_model import PREFIX
@@ -79,10 +78,10 @@ class Server(Protocol):
     async def delete_at_once(self, name: str, times: int) -> None:
         """Remove a hull repeatedly, and ignore the answers."""
 
-    async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:
+    async def apply(self, write: Write, *, create: bool, uid: str = "") -> Applied:
         """Apply a batch, whose number may be one of the hull with a uid."""
 
-    async def apply_together(self, write: WriteTogether) -> list[Applied]:
+    async def apply_together(self, writes: Sequence[Write], rows: int) -> list[Applied]:
         """Apply a batch to each of several hulls."""
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
@@ -256,7 +255,7 @@ class Client:
         uid, least = self.uids.get(name + producer, "") if producer else "", self.model.kept_last(name, producer)
         asked = self.model.ask(name, makes=op["create"])
         try:
-            applied = await self.server.apply(name, write, create=op["create"], uid=uid)
+            applied = await self.server.apply(write, create=op["create"], uid=uid)
         except RestoredError as error:
             self.model.restored(asked, error, least)
             self.refused(asked, error, (RestoredError,), [attempt])
@@ -288,7 +287,7 @@ class Client:
             self.model.ask_rules(name, rules)
         asked = self.model.ask(name)
         try:
-            applied = await self.server.apply(name, WriteBatch(op["rows"], lambda: batch), create=False)
+            applied = await self.server.apply(Write(name, batch, self.server.time(), op["rows"]), create=False)
         except Exception as error:
             self.refused(asked, error, (HullNotFoundError,))
         else:
@@ -304,13 +303,12 @@ class Client:
             last = name == names[-1]
             part = {key: value for key, value in op.items() if last or key not in ("delete", "torn", "far")}
             attempt, write = self._batch(part | {"name": name}, producer, sequence)
-            write.name = name
             attempts.append(attempt)
             parts.append(write)
         self.model.bind(attempts)
         asked = [self.model.ask(name) for name in names]
         try:
-            results = await self.server.apply_together(WriteTogether(parts, rows=op["rows"]))
+            results = await self.server.apply_together(parts, op["rows"])
         except Exception as error:
             missing = error.name if isinstance(error, HullNotFoundError) else names[0]
             about = asked[names.index(missing)]
@@ -399,7 +397,7 @@ class Client:
             first = numbers[-1] + 1
         return numbers
 
-    def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, WriteBatch]:
+    def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, Write]:
         attempt = self.model.attempt()
         batch: Any
         match TIMED.get(op["name"]):
@@ -412,8 +410,8 @@ class Client:
         if "torn" in op and isinstance(batch, Batch):
             self.model.faulty = True
             batch = TornBatch(batch, op["torn"])
-        may_skip = producer.endswith(SKIPS)
-        return attempt, WriteBatch(op["rows"], lambda: batch, producer, sequence, self.producer, may_skip)
+        numbered = producer, sequence, self.producer, producer.endswith(SKIPS)
+        return attempt, Write(op["name"], batch, self.server.time(), op["rows"], *numbered)
 
     def _points(self, op: Operation, attempt: int) -> Batch:
         deletes = NO_POINTS

@@ -19,7 +19,7 @@ from dynhull_server.engine.server_time import ServerTime
 from dynhull_server.engine.threads import Clock, Threads
 from dynhull_server.engine.watch_fence import Sent, following
 from dynhull_server.state.admission import TICK
-from dynhull_server.state.batch import Applied
+from dynhull_server.state.batch import Applied, Write
 from dynhull_server.state.core import Core
 from dynhull_server.state.errors import (
     HullNotFoundError,
@@ -304,18 +304,12 @@ class CoreServer:
             self.dispatch(request)
         await Wait(lambda: all(request.to.answered for request in requests))
 
-    async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:  # noqa: ARG002
-        write.to, write.name, write.arrived = Answer(), name, self.time()
-        if create:
-            write.birth = self.birth()
-        applied: Applied = await self._ask(write)
+    async def apply(self, write: Write, *, create: bool, uid: str = "") -> Applied:  # noqa: ARG002
+        applied: Applied = await self._ask(WriteBatch(Answer(), write, self.birth() if create else None))
         return applied
 
-    async def apply_together(self, write: WriteTogether) -> list[Applied]:
-        write.to = Answer()
-        for part in write.parts:
-            part.arrived = self.time()
-        results: list[Applied] = await self._ask(write)
+    async def apply_together(self, writes: Sequence[Write], rows: int) -> list[Applied]:
+        results: list[Applied] = await self._ask(WriteTogether(Answer(), writes, rows=rows))
         return results
 
     def stream(self, name: str, *, create: bool) -> BatchStream:

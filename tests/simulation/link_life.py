@@ -26,9 +26,8 @@ from dynhull_server.rpc.methods import hull_handlers
 from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.places import Places, Unread
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
-from dynhull_server.state.batch import Applied, Batch
+from dynhull_server.state.batch import Applied, Batch, Write
 from dynhull_server.state.errors import HullNotFoundError, NotStoredError, OutcomeUnknownError, SequenceGapError
-from dynhull_server.state.requests import WriteBatch
 
 from .clients import Client, Outline
 from .network import TO_GATEWAY, TO_WORKER, NetworkLoop
@@ -88,9 +87,9 @@ class LinkedServer(ShellServer):
             raise _refusal(error.status, request) from error
         return response.FromString(answer)
 
-    async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:  # noqa: ARG002
-        request = pb.ApplyRequest(name=name, producer=write.producer, sequence=write.sequence, uid=uid)
-        batch = write.make()
+    async def apply(self, write: Write, *, create: bool, uid: str = "") -> Applied:  # noqa: ARG002
+        request = pb.ApplyRequest(name=write.name, producer=write.producer, sequence=write.sequence, uid=uid)
+        batch = write.batch
         assert isinstance(batch, Batch)
         request.batch.inserts.packed = batch.inserts.astype("<f8").tobytes()
         result = (await self._ask("Apply", request, pb.ApplyResponse)).result

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from contextlib import aclosing
 from typing import Any
 
@@ -15,15 +15,14 @@ from dynhull_server.engine.watch import watch
 from dynhull_server.engine.watch_fence import watch_fence
 from dynhull_server.rpc.writing import gap_explained, require_present
 from dynhull_server.state.admission import TICK
-from dynhull_server.state.batch import Applied
-from dynhull_server.state.errors import HullNotFoundError
+from dynhull_server.state.batch import Applied, Write
+from dynhull_server.state.errors import HullNotFoundError, PartRefusedError
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import Center, HullSettings
-from dynhull_server.state.requests import WriteBatch, WriteTogether
 
 from .clients import Client, Outline, outline
 from .core_life import compare
@@ -132,16 +131,19 @@ class ShellServer:
     async def delete_at_once(self, name: str, times: int) -> None:
         await asyncio.gather(*(self._engine.hulls.delete(name) for _ in range(times)), return_exceptions=True)
 
-    async def apply(self, name: str, write: WriteBatch, *, create: bool, uid: str = "") -> Applied:
+    async def apply(self, write: Write, *, create: bool, uid: str = "") -> Applied:
         try:
-            if uid and self._engine.hulls.has(name):
-                await require_present(self._engine.hulls.get(name), write.producer, uid)
-            return await self._engine.hulls.apply(name, write, create=create)
+            if uid and self._engine.hulls.has(write.name):
+                await require_present(self._engine.hulls.get(write.name), write.producer, uid)
+            return await self._engine.hulls.apply(write, create=create)
         except Exception as error:
-            raise gap_explained(error, self._engine.hulls, name, uid) from None
+            raise gap_explained(error, self._engine.hulls, write.name, uid) from None
 
-    async def apply_together(self, write: WriteTogether) -> list[Applied]:
-        return await self._engine.hulls.apply_together(write)
+    async def apply_together(self, writes: Sequence[Write], rows: int) -> list[Applied]:
+        try:
+            return await self._engine.hulls.apply_together(writes, rows)
+        except PartRefusedError as refusal:
+            raise refusal.reason from None
 
     def stream(self, name: str, *, create: bool) -> BatchStream:
         event = asyncio.Event()

@@ -11,9 +11,8 @@ from dynhull_server.engine.division import Divisions
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
-from dynhull_server.state.batch import Batch
+from dynhull_server.state.batch import Batch, Write
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.storage.memory import MemoryStorage
 
 LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, max_producers_per_caller=10, history_bytes=10**6)
@@ -36,4 +35,5 @@ async def engine_in_memory(
 
 async def insert(engine: Engine, name: str, points: np.ndarray) -> None:
     """Insert points, into a new hull where there is none."""
-    await engine.hulls.apply(name, WriteBatch(len(points), lambda: Batch(points, NONE, 0, False)), create=True)
+    write = Write(name, Batch(points, NONE, 0, False), engine.driver.time(), len(points))
+    await engine.hulls.apply(write, create=True)

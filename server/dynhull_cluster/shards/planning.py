@@ -3,12 +3,11 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from dynhull_server.state.batch import Batch, KeyedBatch
+from dynhull_server.state.batch import Batch, KeyedBatch, Write
 from dynhull_server.state.contents import gate, replayed
 from dynhull_server.state.errors import HullUnsuitableError, LimitExceededError, MisfitError, RefusedError
 from dynhull_server.state.producers import Producers
 from dynhull_server.state.records import HullSettings, Kept
-from dynhull_server.state.requests import WriteBatch
 from dynhull_server.state.taking import TRIP_ROWS
 
 from .messages import Effect, Step
@@ -90,7 +89,7 @@ class Planner:
         """The plan of the first batch of a round; None where it has already been applied; or raise what refuses it."""
         self._number, self._points, self._clock = number, points, clock
         self._rows, self._sequences, self._doubtful = 0, {}, False
-        write = request.batch
+        write = request.batch.write
         if write.producer and not self._producers.is_new(
             write.producer, write.sequence, write.owner, request.now, may_skip=write.may_skip, after=write.after
         ):
@@ -99,7 +98,7 @@ class Planner:
 
     def join(self, request: RootWrite) -> Plan | None:
         """The plan of a further batch of the round; None if it has to wait for the next one."""
-        write = request.batch
+        write = request.batch.write
         if write.producer:
             last = self._sequences.get(write.producer) or self._producers.last(write.producer)
             if not last or write.sequence != last + 1 or write.after not in (None, last):
@@ -122,16 +121,17 @@ class Planner:
         self._number += 1
         self._points += most_growth(admitted)
         self._clock = clock
-        self._rows += request.batch.rows
-        if request.batch.producer:
-            self._sequences[request.batch.producer] = request.batch.sequence
+        write = request.batch.write
+        self._rows += write.rows
+        if write.producer:
+            self._sequences[write.producer] = write.sequence
         self._doubtful = self._doubtful or suspect or refusable(admitted)
         return Plan(request, self._number, admitted, clock, parts, shards, undoable)
 
-    def _admitted(self, write: WriteBatch) -> tuple[Admitted, int | None]:
+    def _admitted(self, write: Write) -> tuple[Admitted, int | None]:
         """The batch, and the clock that it leads to; or raise what refuses it."""
         self._gate.clock = self._clock
-        batch = write.make()
+        batch = write.batch
         try:
             if isinstance(batch, KeyedBatch) and batch.of_quarantine:
                 raise MisfitError(batch.field, "has shards, so it has no quarantine")

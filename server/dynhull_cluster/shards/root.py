@@ -355,13 +355,13 @@ class Root:
         revision = self.revision
         for plan, own in zip(plans, effects, strict=False):
             revision += 2 if any(effect.expired for effect in own.values()) else 1
-            write = plan.request.batch
+            write = plan.request.batch.write
             numbered = write.producer, write.sequence, write.may_skip
             decisions.append(Decision(plan.number, revision, "batch", plan.clock, _logged(own), *numbered, own))
         if decisions:
             self._log.decide(self._epoch, decisions)
         for plan, own, decision in zip(plans, effects, decisions, strict=False):
-            write = plan.request.batch
+            write = plan.request.batch.write
             if write.producer:
                 number = write.producer, write.sequence, write.owner
                 self._producers.applied(*number, plan.request.now, may_skip=write.may_skip)

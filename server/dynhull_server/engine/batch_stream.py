@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from ..state.batch import Write
 from ..state.events import Arrived, Gone
 from ..state.hull import Hull
 from ..state.requests import Request, Stream, WriteBatch
@@ -34,21 +35,17 @@ class BatchStream:
         self._stream = Stream(name, hull)
         self._notify = notify
 
-    def write(self, requests: Sequence[WriteBatch]) -> None:
+    def write(self, writes: Sequence[Write]) -> None:
         """Send batches that have arrived together."""
         stream = self._stream
-        hull, name = stream.hull, stream.name
-        birth = self._driver.birth() if hull is None else None
-        arrived = self._driver.time() if hull is None or hull.timed else 0
-        for request in requests:
-            self.rows += request.rows
-            request.to, request.name, request.stream = self, name, stream
-            request.birth, request.arrived = birth, arrived
+        birth = self._driver.birth() if stream.hull is None else None
+        requests = [WriteBatch(self, write, birth, stream) for write in writes]
+        self.rows += sum(request.rows for request in requests)
         self.batches += len(requests)
         if len(requests) == 1:
             self._driver.dispatch(requests[0])
         elif requests:
-            self._driver.dispatch(Arrived(list(requests)))
+            self._driver.dispatch(Arrived(requests))
 
     def answer(self, request: Request) -> None:
         """Take the answer to a batch."""
@@ -56,7 +53,7 @@ class BatchStream:
         self.batches -= 1
         self.rows -= request.rows
         if request.error is None:
-            self.applied.append((request.sequence, request.result))
+            self.applied.append((request.write.sequence, request.result))
         else:
             self.refusal = request.error
         self._notify()

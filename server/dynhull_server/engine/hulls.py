@@ -3,8 +3,8 @@
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 
-from ..state.batch import Applied
-from ..state.errors import HullUnsuitableError
+from ..state.batch import Applied, Write
+from ..state.errors import HullUnsuitableError, PartRefusedError
 from ..state.hull import Hull
 from ..state.records import DEFAULT, HullSettings
 from ..state.registry import page_of
@@ -84,24 +84,28 @@ class Hulls:
         """Delete the hull of that name, or raise HullNotFoundError or NotStoredError."""
         await self._driver.ask(DeleteHull(Waiter(), name, self._driver.time()))
 
-    async def apply(self, name: str, request: WriteBatch, *, create: bool) -> Applied:
+    async def apply(self, write: Write, *, create: bool) -> Applied:
         """Apply a batch as the next revision of a hull, or raise the error that refuses it.
 
         With `create`, a missing hull is created.
         """
-        request.to, request.name = Waiter(), name
-        if create:
-            request.birth = self._driver.birth()
-        request.arrived = self._driver.time()
-        applied: Applied = await self._driver.ask(request)
+        birth = self._driver.birth() if create else None
+        applied: Applied = await self._driver.ask(WriteBatch(Waiter(), write, birth))
         return applied
 
-    async def apply_together(self, request: WriteTogether) -> list[Applied]:
-        """Apply a batch to each of several hulls, or raise the error that refuses one of them: then none is applied."""
-        request.to = Waiter()
-        for part in request.parts:
-            part.arrived = self._driver.time()
-        results: list[Applied] = await self._driver.ask(request)
+    async def apply_together(self, writes: Sequence[Write], rows: int) -> list[Applied]:
+        """Apply a batch to each of several hulls, which have about `rows` points together.
+
+        Raises:
+            PartRefusedError: one of them is refused: then none is applied.
+        """
+        request = WriteTogether(Waiter(), writes, rows=rows)
+        try:
+            results: list[Applied] = await self._driver.ask(request)
+        except Exception as error:
+            if request.refused is None:
+                raise
+            raise PartRefusedError(request.refused, error) from None
         return results
 
     def stream(self, name: str, notify: Callable[[], None], *, create: bool) -> BatchStream:

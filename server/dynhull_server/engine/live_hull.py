@@ -15,7 +15,7 @@ from dynhull import DynamicHull, globe
 from dynhull.arrays import Checked, Points
 from dynhull.keys import PackedKeys
 
-from ..state.batch import NO_POINTS, Applied, KeyedBatch
+from ..state.batch import NO_POINTS, Applied, KeyedBatch, Write
 from ..state.contents.keyed import KINDS
 from ..state.core import SMALL
 from ..state.errors import (
@@ -392,9 +392,8 @@ class LiveHull:
         kind, none = self.settings.identity, self.keys(None)
         assert kind != "multiset"  # it has keys
         batch = KeyedBatch(kind, none, NO_POINTS, none, rules=rules)
-        write = WriteBatch(0, lambda: batch)
-        write.to, write.name, write.arrived = Waiter(), self.name, self._driver.time()
-        applied: Applied = await self._driver.ask(write)
+        write = Write(self.name, batch, self._driver.time())
+        applied: Applied = await self._driver.ask(WriteBatch(Waiter(), write))
         counts, _ = await self.read(lambda _: None, min_revision=applied.revision)
         return counts
 

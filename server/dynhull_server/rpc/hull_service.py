@@ -22,7 +22,7 @@ from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..engine.watch_many import watch_many
-from ..state.errors import HullEmptyError, HullFencedError, LimitExceededError
+from ..state.errors import HullEmptyError, HullFencedError, LimitExceededError, PartRefusedError
 from ..state.frames import require_lines, require_reach
 from ..state.records import Contents
 from . import answers, decode, encode
@@ -33,7 +33,7 @@ from .many import MANY_INTERVAL, HullStates, encode_many, require_many
 from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
-from .status import ANSWERED, PartRefusedError
+from .status import ANSWERED
 from .vertex_pages import VertexPages, page_token
 from .writing import (
     MOST_IN_A_MESSAGE,
@@ -42,6 +42,7 @@ from .writing import (
     decode_write,
     gap_explained,
     require_present,
+    run_decoding,
 )
 
 # The side of a missing key.
@@ -65,6 +66,7 @@ class HullService:
         self, driver: Driver, hulls: Hulls, metrics: Metrics, *, create_on_write: bool, max_watch_lag: float
     ) -> None:
         self._hulls = hulls
+        self._driver = driver
         self._aside = driver.aside
         self._metrics = metrics
         self._create_on_write = create_on_write
@@ -122,11 +124,13 @@ class HullService:
         producer = decode.decode_producer(request.producer)
         may_skip = decode.decode_may_skip(producer, request.may_skip)
         owner = call.owner if producer else ""  # asking gRPC for the address takes longer than a batch of one point
-        write = decode_write(request, call.message_bytes, producer, owner, may_skip)
+        rows = call.message_bytes // decode.BYTES_PER_POINT  # an estimate: reading the points would copy them
+        run = run_decoding(self._driver, rows)
+        write = await run(partial(decode_write, name, request, self._driver.time(), rows, producer, owner, may_skip))
         try:
             if request.uid and self._hulls.has(name):
                 await require_present(self._hulls.get(name), producer, request.uid)
-            applied = await self._hulls.apply(name, write, create=self._create_on_write)
+            applied = await self._hulls.apply(write, create=self._create_on_write)
         except Exception as error:
             self._metrics.batches.refused()
             raise gap_explained(error, self._hulls, name, request.uid) from None
@@ -137,23 +141,29 @@ class HullService:
 
     async def ApplyTogether(self, request: pb.ApplyTogetherRequest, call: Call) -> pb.ApplyTogetherResponse:
         begun = time.perf_counter()
-        names = decode.decode_parts(request)
-        for name in names:
+        for name in decode.decode_parts(request):
             call.access.require_write(name)
-        write = decode_together(request, names, call.message_bytes, call.owner)
+        rows = call.message_bytes // decode.BYTES_PER_POINT
+        run = run_decoding(self._driver, rows)
+        writes = await run(partial(decode_together, request, self._driver.time(), call.owner))
         try:
             for index, each in enumerate(request.batches):
                 if each.uid and self._hulls.has(each.name):
-                    write.refused = index
-                    await require_present(self._hulls.get(each.name), request.producer, each.uid)
-            write.refused = None
-            results = await self._hulls.apply_together(write)
-        except ANSWERED as error:
+                    try:
+                        await require_present(self._hulls.get(each.name), request.producer, each.uid)
+                    except ANSWERED as error:
+                        raise PartRefusedError(index, error) from None
+            results = await self._hulls.apply_together(writes, rows)
+        except PartRefusedError as refusal:
+            if not isinstance(refusal.reason, ANSWERED):
+                raise refusal.reason from None
             self._metrics.batches.refused()
-            if write.refused is None:
-                raise
-            reason = gap_explained(error, self._hulls, names[write.refused], request.batches[write.refused].uid)
-            raise PartRefusedError(write.refused, reason) from None
+            part = request.batches[refusal.index]
+            reason = gap_explained(refusal.reason, self._hulls, part.name, part.uid)
+            raise PartRefusedError(refusal.index, reason) from None
+        except ANSWERED:
+            self._metrics.batches.refused()
+            raise
         response = pb.ApplyTogetherResponse()
         for applied in results:
             self._metrics.batches.applied(applied, time.perf_counter() - begun)
@@ -554,7 +564,11 @@ class HullService:
         name = self._written(call, first.name)
         if first.uid and self._hulls.has(name):
             await require_present(self._hulls.get(name), first.producer, first.uid)
-        return StreamedBatches(call, first, name, self._hulls, self._metrics, create=self._create_on_write)
+        streamed = StreamedBatches(
+            call, first, name, self._hulls, self._driver, self._metrics, create=self._create_on_write
+        )
+        await streamed.take(first)
+        return streamed
 
 
 @contextmanager

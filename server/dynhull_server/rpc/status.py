@@ -32,6 +32,7 @@ from ..state.errors import (
     NotStoredError,
     OutcomeUnknownError,
     PagesForgottenError,
+    PartRefusedError,
     PointMissingError,
     RefusedError,
     RestoredError,
@@ -117,20 +118,6 @@ class MethodUnknownError(RefusedError):
 
     def __init__(self) -> None:
         super().__init__("there is no such method in this version of the server")
-
-
-class PartRefusedError(Exception):
-    """One of the batches of a request to several hulls was refused, and so none was applied.
-
-    Attributes:
-        index: the index of the batch in the request.
-        reason: why it was refused.
-    """
-
-    def __init__(self, index: int, reason: Exception) -> None:
-        super().__init__(index, reason)
-        self.index = index
-        self.reason = reason
 
 
 ANSWERED = (

@@ -8,13 +8,14 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Self
 
-from dynhull_proto.v1 import hull_service_pb2
+from dynhull_proto.v1 import batch_pb2, hull_service_pb2
 
+from ..engine.driver import Driver
 from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
-from ..state.batch import Applied
+from ..engine.steps import Run, at_once
+from ..state.batch import Applied, Batch, KeyedBatch, Write
 from ..state.errors import HullNotFoundError, RestoredError, SequenceGapError
-from ..state.requests import WriteBatch, WriteTogether
 from . import decode
 from .calls import Call
 from .decode_batch import decode_batch
@@ -25,34 +26,35 @@ MOST_ROWS = 131_072
 MOST_BATCHES = 1_024
 # The most batches of a message: a trip runs them on the event loop, each in some 10 µs.
 MOST_IN_A_MESSAGE = 256
+# Batches of at most this many points are decoded on the event loop, in some 25 µs; strings, one by one, in 1.5 ms.
+SMALL = 16_384
 
 
-def decode_write(request: Any, message_bytes: int, producer: str, owner: str, may_skip: bool) -> WriteBatch:
-    """The batch of a request, decoded when it runs; `owner` is the caller that the producer belongs to."""
-    return WriteBatch(
-        message_bytes // decode.BYTES_PER_POINT,  # an estimate: reading the points would copy them
-        partial(decode_batch, request.batch),
-        producer,
-        decode.decode_sequence(producer, request.sequence),
-        owner,
-        may_skip,
-        decode.decode_after(may_skip, request),
-    )
+def decode_write(name: str, request: Any, arrived: int, rows: int, producer: str, owner: str, may_skip: bool) -> Write:
+    """The batch of a request to a hull; `owner` is the caller that the producer belongs to."""
+    sequence, after = decode.decode_sequence(producer, request.sequence), decode.decode_after(may_skip, request)
+    return Write(name, decoded(request.batch), arrived, rows, producer, sequence, owner, may_skip, after)
 
 
-def decode_together(
-    request: hull_service_pb2.ApplyTogetherRequest, names: Sequence[str], message_bytes: int, owner: str
-) -> WriteTogether:
-    """The batches of a request to the hulls of these names, decoded when they run."""
+def decode_together(request: hull_service_pb2.ApplyTogetherRequest, arrived: int, owner: str) -> list[Write]:
+    """The batches of a request to several hulls."""
     producer = decode.decode_producer(request.producer)
     sequence = decode.decode_sequence(producer, request.sequence)
-    may_skip = decode.decode_may_skip(producer, request.may_skip)
-    parts = []
-    for name, each in zip(names, request.batches, strict=True):
-        part = WriteBatch(0, partial(decode_batch, each.batch), producer, sequence, owner, may_skip)
-        part.name = name
-        parts.append(part)
-    return WriteTogether(parts, rows=message_bytes // decode.BYTES_PER_POINT)
+    numbered = producer, sequence, owner, decode.decode_may_skip(producer, request.may_skip)
+    return [Write(each.name, decoded(each.batch), arrived, 0, *numbered) for each in request.batches]
+
+
+def run_decoding(driver: Driver, rows: int) -> Run:
+    """The way to run the decoding of this many points."""
+    return at_once if rows <= SMALL else driver.in_turn
+
+
+def decoded(batch: batch_pb2.Batch) -> Batch | KeyedBatch | Exception:
+    """A batch; or the error that refuses it in its turn: not where its number has already been applied."""
+    try:
+        return decode_batch(batch)
+    except decode.InvalidFieldError as error:
+        return error.with_traceback(None)
 
 
 async def require_present(hull: LiveHull, producer: str, uid: str) -> None:
@@ -88,6 +90,7 @@ class StreamedBatches:
         first: its first message, which names the hull and may name a producer.
         name: the name of the hull.
         hulls: the hulls.
+        driver: has the clock and the threads.
         create: whether the first batch creates a missing hull.
         metrics: counts the batches.
 
@@ -99,13 +102,16 @@ class StreamedBatches:
         HullNotFoundError: no hull has that name, and `create` is False.
     """
 
-    def __init__(self, call: Call, first: Any, name: str, hulls: Hulls, metrics: Metrics, *, create: bool) -> None:
+    def __init__(
+        self, call: Call, first: Any, name: str, hulls: Hulls, driver: Driver, metrics: Metrics, *, create: bool
+    ) -> None:
         self._call = call
         self.name = name
         self._producer = decode.decode_producer(first.producer)
         self._may_skip = decode.decode_may_skip(self._producer, first.may_skip)
         self.several = isinstance(first, hull_service_pb2.StreamRequest) and first.accept_results
         self._hulls = hulls
+        self._driver = driver
         self._uid: str = first.uid
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
@@ -113,7 +119,6 @@ class StreamedBatches:
         self._batches = hulls.stream(name, self._notify, create=create)
         self._arrivals: deque[float] = deque()
         self._failure: Exception | None = None
-        self._take(first)
 
     def __enter__(self) -> Self:
         self._reading = asyncio.create_task(self._read())
@@ -151,12 +156,32 @@ class StreamedBatches:
             self._metrics.batches.applied(outcome, time.perf_counter() - self._arrivals.popleft())
             yield sequence, outcome
 
+    async def take(self, message: Any) -> None:
+        """Send the batches of a message; those before an invalid one, too."""
+        name, producer = message.name, message.producer
+        if name and name != self.name:
+            raise decode.InvalidFieldError("name", name, f"this call writes to {self.name!r}")
+        if producer and producer != self._producer:
+            raise decode.InvalidFieldError("producer", producer, f"the producer of this call is {self._producer!r}")
+        if message.may_skip and not self._may_skip:
+            raise decode.InvalidFieldError("may_skip", value=True, problem="the first message of the call decides it")
+        batches = self._several(message) or ([message] if _has_batch(message) else [])
+        rows = self._call.message_bytes // decode.BYTES_PER_POINT
+        writes: list[Write] = []
+        run = run_decoding(self._driver, rows)
+        try:
+            await run(partial(self._decode, batches, self._driver.time(), rows, writes))
+        except decode.InvalidFieldError:
+            self._send(writes)
+            raise
+        self._send(writes)
+
     def _notify(self) -> None:
         if self._news is not None and not self._news.done():
             self._news.set_result(None)
 
     async def _read(self) -> None:
-        """Read messages until the last, or until an invalid one."""
+        """Take messages until the last, or until an invalid one."""
         try:
             with self._call.cutoff():
                 while True:
@@ -166,31 +191,15 @@ class StreamedBatches:
                     message = await self._call.read()
                     if message is None:
                         return
-                    self._take(message)
+                    await self.take(message)
         except Exception as failure:  # raised after the batches before it are answered
             self._failure = failure
 
-    def _take(self, message: Any) -> None:
-        name, producer = message.name, message.producer
-        if name and name != self.name:
-            raise decode.InvalidFieldError("name", name, f"this call writes to {self.name!r}")
-        if producer and producer != self._producer:
-            raise decode.InvalidFieldError("producer", producer, f"the producer of this call is {self._producer!r}")
-        if message.may_skip and not self._may_skip:
-            raise decode.InvalidFieldError("may_skip", value=True, problem="the first message of the call decides it")
-        several = () if isinstance(message, hull_service_pb2.IngestRequest) else message.batches
-        if several:
-            self._take_several(message, several)
-            return
-        if not message.HasField("batch"):
-            if message.sequence:
-                raise decode.InvalidFieldError("sequence", message.sequence, "a sequence number needs a batch")
-            if message.HasField("after_sequence"):
-                raise decode.InvalidFieldError("after_sequence", message.after_sequence, "it needs a batch")
-            return
-        self._send([self._decoded(message, self._call.message_bytes)])
-
-    def _take_several(self, message: hull_service_pb2.StreamRequest, several: Sequence[Any]) -> None:
+    def _several(self, message: Any) -> Sequence[Any]:
+        """The batches of a message that may have several; empty where it has one alone, or none."""
+        several: Sequence[Any] = () if isinstance(message, hull_service_pb2.IngestRequest) else message.batches
+        if not several:
+            return ()
         if not self.several:
             problem = "only in a call whose first message has accept_results"
             raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
@@ -199,17 +208,25 @@ class StreamedBatches:
             raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
         if message.HasField("batch") or message.sequence or message.HasField("after_sequence"):
             raise decode.InvalidFieldError("batches", f"{len(several)} batches", "use batch or batches, not both")
-        size = self._call.message_bytes // len(several)
-        requests: list[WriteBatch] = []
-        try:
-            for each in several:
-                requests.append(self._decoded(each, size))  # noqa: PERF401  # those before an invalid one are sent
-        finally:
-            self._send(requests)
+        return several
 
-    def _decoded(self, request: Any, size: int) -> WriteBatch:
-        return decode_write(request, size, self._producer, self._call.owner, self._may_skip)
+    def _decode(self, batches: Sequence[Any], arrived: int, rows: int, writes: list[Write]) -> None:
+        """Decode batches of about `rows` points together."""
+        caller = self._producer, self._call.owner, self._may_skip
+        for each in batches:
+            writes.append(decode_write(self.name, each, arrived, rows // len(batches), *caller))  # noqa: PERF401  # those before an invalid one are sent
 
-    def _send(self, requests: list[WriteBatch]) -> None:
-        self._arrivals.extend([time.perf_counter()] * len(requests))
-        self._batches.write(requests)
+    def _send(self, writes: list[Write]) -> None:
+        self._arrivals.extend([time.perf_counter()] * len(writes))
+        self._batches.write(writes)
+
+
+def _has_batch(message: Any) -> bool:
+    """Whether a message has a batch; without one, it has no number."""
+    if message.HasField("batch"):
+        return True
+    if message.sequence:
+        raise decode.InvalidFieldError("sequence", message.sequence, "a sequence number needs a batch")
+    if message.HasField("after_sequence"):
+        raise decode.InvalidFieldError("after_sequence", message.after_sequence, "it needs a batch")
+    return False

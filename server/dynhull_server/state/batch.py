@@ -1,8 +1,8 @@
 """A batch: changes that are applied together or not at all."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -76,20 +76,37 @@ class KeyedBatch:
         return self.releases is not None or self.drops is not None or self.rules is not None
 
 
-class Write(Protocol):
-    """A batch as it was sent to a hull. `WriteBatch` describes the attributes."""
+class Write(NamedTuple):
+    """A batch as its caller has sent it to a hull.
+
+    Attributes:
+        name: the name of the hull.
+        content: the batch; or the error that refuses it in its turn, because it cannot be decoded.
+        arrived: the time of its arrival by the server's clock, in microseconds since 1970.
+        rows: the approximate number of its points.
+        producer: the producer that numbers it; empty where it is not numbered.
+        sequence: its number.
+        owner: the caller that the producer belongs to.
+        may_skip: whether numbers may be skipped.
+        after: the number of the batch that must be the producer's last one; None for any.
+    """
 
     name: str
-    producer: str
-    sequence: int
-    owner: str
-    may_skip: bool
-    after: int | None
+    content: Batch | KeyedBatch | Exception
     arrived: int
+    rows: int = 0
+    producer: str = ""
+    sequence: int = 0
+    owner: str = ""
+    may_skip: bool = False
+    after: int | None = None
 
     @property
-    def make(self) -> Callable[[], Batch | KeyedBatch]:
-        """What decodes it."""
+    def batch(self) -> Batch | KeyedBatch:
+        """The batch, or raise the error that refuses it."""
+        if isinstance(self.content, Exception):
+            raise self.content
+        return self.content
 
 
 @dataclass(slots=True)

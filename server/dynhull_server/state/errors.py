@@ -360,6 +360,20 @@ class ShardAwayError(RefusedError):
         self.shard = shard
 
 
+class PartRefusedError(Exception):
+    """One of the batches of a request to several hulls was refused, and so none was applied.
+
+    Attributes:
+        index: the index of the batch in the request.
+        reason: why it was refused.
+    """
+
+    def __init__(self, index: int, reason: Exception) -> None:
+        super().__init__(index, reason)
+        self.index = index
+        self.reason = reason
+
+
 class OutcomeUnknownError(Exception):
     """The storage failed in the middle of a change: it may have been applied or not.
 

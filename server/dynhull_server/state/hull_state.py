@@ -178,7 +178,7 @@ class HullState:
     def decoded(self, write: Write) -> Any:
         """The batch, admitted; raises the error that refuses it, unless that depends on the points of the hull."""
         try:
-            return self.contents.admit(write.make(), write.arrived)
+            return self.contents.admit(write.batch, write.arrived)
         except MisfitError as misfit:
             raise HullUnsuitableError(write.name, str(misfit), field=f"batch.{misfit.field}") from None
 

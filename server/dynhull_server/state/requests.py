@@ -1,14 +1,15 @@
 """Requests of callers. Each is answered once, by a `Reply` that lists it, unless it was abandoned."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from .batch import Write
 from .records import DEFAULT, Center, HullSettings, Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .batch import Batch, KeyedBatch
     from .hull import Hull
     from .hull_state import HullState
 
@@ -82,33 +83,25 @@ class Recenter(Request):
 
 @dataclass(slots=True, eq=False)
 class WriteBatch(Request):
-    """Apply a batch of about `rows` points. The result is an `Applied`.
+    """Apply a batch. The result is an `Applied`.
 
     Attributes:
-        make: decodes the batch, and raises an error where it is invalid.
-        producer: the producer that numbers it; empty where it is not numbered.
-        sequence: its number.
-        owner: the caller that the producer belongs to.
-        may_skip: whether numbers may be skipped.
-        after: the number of the batch that must be the producer's last one; None for any.
-        name: the name of the hull. The engine sets this, the attributes below and `to`.
-        arrived: the time of its arrival by the server's clock, in microseconds since 1970.
+        write: the batch.
         birth: the origin of the hull, if a missing hull shall be created; None if it shall be refused.
         stream: the stream that the batch is part of, or None.
     """
 
-    to: Any = field(default=None, init=False)
-    rows: int
-    make: "Callable[[], Batch | KeyedBatch]"
-    producer: str = ""
-    sequence: int = 0
-    owner: str = ""
-    may_skip: bool = False
-    after: int | None = None
-    name: str = field(default="", init=False)
-    arrived: int = field(default=0, init=False)
-    birth: Birth | None = field(default=None, init=False)
-    stream: "Stream | None" = field(default=None, init=False)
+    write: Write
+    birth: Birth | None = None
+    stream: "Stream | None" = None
+
+    def __post_init__(self) -> None:
+        self.rows = self.write.rows
+
+    @property
+    def name(self) -> str:
+        """The name of the hull."""
+        return self.write.name
 
 
 @dataclass(slots=True, eq=False)
@@ -120,8 +113,7 @@ class WriteTogether(Request):
         refused: the index of the part that was refused, once it is answered; None where the cause is not a part.
     """
 
-    to: Any = field(default=None, init=False)
-    parts: "list[WriteBatch]"
+    parts: Sequence[Write]
     refused: int | None = field(default=None, init=False)
     order: int = field(default=0, init=False)
 

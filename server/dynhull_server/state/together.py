@@ -4,12 +4,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import TypeVar
 
-from .batch import Applied
+from .batch import Applied, Write
 from .errors import SequencesDifferError
 from .hull import Hull
 from .hull_state import HullState
 from .records import Record
-from .requests import WriteBatch, WriteTogether
+from .requests import WriteTogether
 
 T = TypeVar("T")
 
@@ -52,7 +52,7 @@ def apply_together(
     return results
 
 
-def _of_each(request: WriteTogether, states: list[HullState], step: Callable[[WriteBatch, HullState], T]) -> list[T]:
+def _of_each(request: WriteTogether, states: list[HullState], step: Callable[[Write, HullState], T]) -> list[T]:
     """The results of a step for each part; the request records which part it refuses."""
     results = []
     for index, (part, state) in enumerate(zip(request.parts, states, strict=True)):

@@ -184,11 +184,11 @@ class Trip:
         elif hull.divided:  # it is created by the same trip, so the batch came before the hull
             raise HullNotFoundError(leg.name)
         fences = self.fences
-        expired = None if fences is None else partial(fences.expired, hull, request.arrived)
+        expired = None if fences is None else partial(fences.expired, hull, request.write.arrived)
         applied = write(request, hull, self._now, leg.records, expired)
         self.torn = hull.state.torn
         if fences is not None:
-            fences.wrote(leg, hull, applied, request.arrived)
+            fences.wrote(leg, hull, applied, request.write.arrived)
         if applied is None:
             return
         leg.after = hull
@@ -275,7 +275,7 @@ class Trip:
         if place.refusal is not None:
             raise place.refusal
         assert birth is not None  # otherwise the request was refused
-        settings = request.settings if isinstance(request, CreateHull) else settings_for(request.make())
+        settings = request.settings if isinstance(request, CreateHull) else settings_for(request.write.batch)
         row = HullRow(place.number, leg.name, birth.uid, birth.created, settings)
         hull = Hull(row, state_of(place.limits, settings, Kept(), self._now))
         if self.fences is not None:
@@ -310,7 +310,7 @@ def write(
     try:
         if stream is not None and stream.hull is not hull and stream.hull is not None:
             raise HullNotFoundError(hull.name)
-        request.result = applied = hull.state.apply(request, now, records, expired)
+        request.result = applied = hull.state.apply(request.write, now, records, expired)
     except Exception as error:  # any error is the answer to the caller
         refuse(request, error)
         return None

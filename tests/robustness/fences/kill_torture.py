@@ -38,7 +38,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.rpc.encode_fence import encode_config
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.fences.model.config import FenceConfig, HullArea
 from dynhull_server.state.fences.model.requests import Acknowledge, CreateFence, DeleteFence, ReplaceFence
 from dynhull_server.state.requests import CreateHull, DeleteHull, WriteBatch, WriteTogether
@@ -131,11 +131,9 @@ class Draw(Chance):
             PackedKeys.pack(keys[:removed]),
             ttl=rng.choice([None, None, None, TICK, 3 * TICK, 10 * TICK]),
         )
-        write = WriteBatch(3, lambda: made)
         # The hull's clock is that of the data: it stands still without puts.
-        write.to, write.name = to, name
-        write.arrived = time if puts else self._world.clocks.get(name) or 0
-        return write
+        arrived = time if puts else self._world.clocks.get(name) or 0
+        return WriteBatch(to, Write(name, made, arrived, 3))
 
     def config(self, before: FenceConfig | None = None) -> FenceConfig:
         while True:
@@ -232,7 +230,7 @@ class WorldClient:
         dice = rng.random()
         if dice < 0.7:
             names = rng.sample((*KEYED[:2], ZONE), rng.choice([2, 2, 3]))
-            request: Any = WriteTogether([self._chance.batch(name, self._time, self) for name in names])
+            request: Any = WriteTogether(self, [self._chance.batch(name, self._time, self).write for name in names])
             self._write_together(request)
         elif dice < 0.88:
             self._write(self._chance.batch(rng.choice(HULLS), self._time, self))
@@ -251,7 +249,7 @@ class WorldClient:
         producer = f"single{self._guests}" if write.name == GUEST else "single"
         numbered = producer + write.name
         self._sequences[numbered] += 1
-        batch, rows = self._batch(write)
+        batch, rows = self._batch(write.write)
         request = pb.ApplyRequest(
             name=self.prefix + write.name, batch=batch, producer=producer, sequence=self._sequences[numbered]
         )
@@ -282,9 +280,9 @@ class WorldClient:
         revision = self._world.revisions[name]
         must(result.revision == revision, name, "is at revision", result.revision, "instead of", revision)
 
-    def _batch(self, write: WriteBatch) -> tuple[batch_pb2.Batch, int]:
+    def _batch(self, write: Write) -> tuple[batch_pb2.Batch, int]:
         """A batch as a message, and the number of keys or points that it names."""
-        made: Any = write.make()
+        made: Any = write.batch
         if write.name == ZONE:
             message = batch_pb2.Batch(
                 inserts=points_pb2.Points(coordinates=made.inserts.ravel()),

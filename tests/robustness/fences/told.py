@@ -13,10 +13,9 @@ from sides import Disk, Point, Shape, apart, edges, squared, turn
 from world import GUEST, FenceModel, World, exact
 
 from dynhull_proto.v1 import fence_pb2
-from dynhull_server.state.batch import KeyedBatch
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent, Key, Origin
 from dynhull_server.state.records import NO_TIME
-from dynhull_server.state.requests import WriteBatch
 
 # Microseconds after which a subject that stays must have made its event, also on a busy machine.
 PATIENT = 30_000_000
@@ -131,9 +130,9 @@ class ToldWorld(World):
             fence.events.clear()
             self.expected.setdefault(name, [])
 
-    def _apply(self, part: WriteBatch) -> None:
+    def _apply(self, part: Write) -> None:
         super()._apply(part)
-        batch = part.make()
+        batch = part.batch
         if isinstance(batch, KeyedBatch):
             self.event_times |= {(part.name, key): part.arrived for key in batch.keys}
             self.places[part.name, self.revisions[part.name]] = dict(self.positions[part.name])

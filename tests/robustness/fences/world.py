@@ -1,7 +1,7 @@
 """A model of hulls with keys and of fences, and random requests to them."""
 
 import random
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 from sides import Disk, Point, Rings, Shape, apart, hull, shape_of_hull
 
 from dynhull.keys import PackedKeys
-from dynhull_server.state.batch import Batch, KeyedBatch
+from dynhull_server.state.batch import Batch, KeyedBatch, Write
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.model.records import Cause, EventType, FenceEvent, Origin
 from dynhull_server.state.fences.model.requests import Acknowledge, CreateFence, DeleteFence, PassTime, ReplaceFence
@@ -132,7 +132,7 @@ class World:
         self.time = request.parts[0].arrived if isinstance(request, WriteTogether) else _time_of(request)
         match request:
             case WriteBatch():
-                self._write([request])
+                self._write([request.write])
             case WriteTogether():
                 self._write(request.parts, together=True)
             case Expire():
@@ -158,7 +158,7 @@ class World:
                 known = fence.consumers.get(request.consumer, 0)
                 fence.consumers[request.consumer] = max(known, request.sequence or 0)
 
-    def _write(self, parts: list[WriteBatch], *, together: bool = False) -> None:
+    def _write(self, parts: Sequence[Write], *, together: bool = False) -> None:
         before = self._now()
         removed: dict[str, set[str]] = {}
         for part in parts:
@@ -168,7 +168,7 @@ class World:
                     self._judge(before)
                     before = self._now()
         for part in parts:
-            batch = part.make()
+            batch = part.batch
             if isinstance(batch, KeyedBatch):  # who has expired is not removed
                 removed[part.name] = set(batch.removes) & self.positions[part.name].keys()
             self._apply(part)
@@ -199,7 +199,7 @@ class World:
     def corners(self, name: str | None) -> list[Point]:
         return hull(self.zone if name == ZONE else self.positions[str(name)].values())
 
-    def _ends(self, part: WriteBatch) -> bool:
+    def _ends(self, part: Write) -> bool:
         clock = self.clocks.get(part.name)
         return clock is not None and any(end <= part.arrived for end in self.deadlines[part.name].values())
 
@@ -210,8 +210,8 @@ class World:
         self.revisions[name] += 1
         self.clocks[name] = max(self.clocks[name] or 0, time)
 
-    def _apply(self, part: WriteBatch) -> None:
-        batch, name = part.make(), part.name
+    def _apply(self, part: Write) -> None:
+        batch, name = part.batch, part.name
         if name not in self.there:  # the batch has created it
             self._come(name)
         self.revisions[name] += 1
@@ -474,7 +474,7 @@ class World:
 
 
 def _time_of(request: Any) -> int:
-    time: int = getattr(request, "arrived" if isinstance(request, WriteBatch) else "time", 0)
+    time: int = request.write.arrived if isinstance(request, WriteBatch) else getattr(request, "time", 0)
     return time
 
 
@@ -482,8 +482,8 @@ def _in_order(subject: Subject) -> tuple[str, bytes]:
     return subject[0], subject[1].encode()
 
 
-def _put(part: WriteBatch) -> set[str]:
-    batch = part.make()
+def _put(part: Write) -> set[str]:
+    batch = part.batch
     return set(batch.keys) if isinstance(batch, KeyedBatch) else set()
 
 
@@ -517,10 +517,8 @@ class Chance:
             made = KeyedBatch(
                 "str", PackedKeys.pack(puts), self._points(len(puts)), PackedKeys.pack(keys[:removed]), ttl=ttl
             )
-        write = WriteBatch(3, lambda: made)
-        write.to, write.name, write.arrived = to, name, time
-        write.birth = self.birth() if name == GUEST and rng.random() < 0.5 else None
-        return write
+        birth = self.birth() if name == GUEST and rng.random() < 0.5 else None
+        return WriteBatch(to, Write(name, made, time, 3), birth)
 
     def of_guest(self, time: int, to: Any) -> Any:
         """The creation or the deletion of a hull."""
@@ -533,15 +531,11 @@ class Chance:
 
     def together(self, time: int, to: Any) -> WriteTogether:
         if self._rng.random() < 0.4:
-            request = WriteTogether(self._transfer(time, to))
-            request.to = to
-            return request
+            return WriteTogether(to, self._transfer(time, to))
         names = self._rng.sample(HULLS, self._rng.choice([2, 2, 3]))
-        request = WriteTogether([self.batch(name, time, to) for name in names])
-        request.to = to
-        return request
+        return WriteTogether(to, [self.batch(name, time, to).write for name in names])
 
-    def _transfer(self, time: int, to: Any) -> list[WriteBatch]:
+    def _transfer(self, time: int, to: Any) -> list[Write]:
         """Keys that change hulls, and perhaps others that move."""
         source, target = self._rng.sample(sorted(self._world.there - {ZONE}), 2)
         there = sorted(self._world.positions[source])
@@ -549,11 +543,14 @@ class Chance:
         points = self._points(len(keys))
         if self._rng.random() < 0.3:
             points = np.array([self._world.positions[source][key] for key in keys], float).reshape(-1, 2) / 2
-        parts = [self.batch(source, time, to), self.batch(target, time, to)]
-        parts[0].make = lambda: KeyedBatch("str", NO_KEYS, NONE, PackedKeys.pack(keys))
-        parts[1].make = lambda: KeyedBatch("str", PackedKeys.pack(keys), points, NO_KEYS)
+        packed = PackedKeys.pack(keys)
+        leaving, coming = (self.batch(name, time, to).write for name in (source, target))
+        parts = [
+            leaving._replace(content=KeyedBatch("str", NO_KEYS, NONE, packed)),
+            coming._replace(content=KeyedBatch("str", packed, points, NO_KEYS)),
+        ]
         if self._rng.random() < 0.3:
-            parts.append(self.batch(ZONE, time, to))
+            parts.append(self.batch(ZONE, time, to).write)
         return self._rng.sample(parts, len(parts))
 
     def birth(self) -> Birth:
