@@ -13,7 +13,7 @@ occupies all of these queues. The hulls that a fence depends on share one queue:
 """
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from .errors import (
     DiskFullError,
@@ -47,7 +47,7 @@ from .fences.core import FenceCore
 from .fences.index.components import SPANNING
 from .fences.index.line import Line
 from .fences.model.fence import Fence
-from .fences.model.requests import FENCE_REQUESTS, CreateFence, FenceRequest, PassTime, ReadFence
+from .fences.model.requests import AnyFenceRequest, CreateFence, FenceRequest, PassTime, ReadFence
 from .fences.model.tallies import Tallies
 from .hull import Hull
 from .hull_state import HullState
@@ -132,7 +132,7 @@ class Core:
             DeleteHull: self._asked,
             Recenter: self._asked,
             Follow: self._asked,
-            **dict.fromkeys(FENCE_REQUESTS, self._asked_of_fence),
+            **dict.fromkeys(get_args(AnyFenceRequest), self._asked_of_fence),
             Gone: self._gone,
             Computed: self._computed,
             Committed: self._committed,

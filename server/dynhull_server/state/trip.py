@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .batch import Applied, Batch, KeyedBatch
 from .changes import Change
 from .errors import HullExistsError, HullNotFoundError, HullUnsuitableError, MisfitError
-from .fences.model.requests import FenceRequest
+from .fences.model.requests import AnyFenceRequest
 from .hull import Hull
 from .hull_state import Counts, HullState
 from .leg import Leg
@@ -137,7 +137,7 @@ class Trip:
         return hulls and (self.fences is None or self.fences.landed(fences))
 
     def _do(self, request: Request) -> object:
-        if isinstance(request, FenceRequest):
+        if isinstance(request, AnyFenceRequest):
             assert self.fences is not None  # only the fences' room makes trips of them
             return self.fences.do(request)
         leg = self.legs[request.hull.name if isinstance(request, ReadHull) else request.name]  # type: ignore[attr-defined]

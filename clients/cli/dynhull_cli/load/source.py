@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, cast
+from typing import IO, TYPE_CHECKING, Any, assert_never, cast
 
 from ..peek import peek
 from ..reading.columns import LONGITUDE_LATITUDE, are_degrees
@@ -281,7 +281,9 @@ def _reader(kind: Format) -> Reader:
             from .read_nmea import read_nmea
 
             return read_nmea
-        case _:
+        case Format.GPKG | Format.SHP | Format.FGB | Format.GPX | Format.KML | Format.XLSX:
             from .read_layer import read_layer
 
             return read_layer
+        case _:
+            assert_never(kind)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, assert_never
 
 import numpy as np
 import numpy.typing as npt
@@ -116,6 +116,20 @@ class DropStaged:
 
 
 FenceStep = PutInside | DropInside | ShrinkEvents | StageEvents | AppendFirst | CountStaged | DropStaged
+# Those that are of one fence that exists.
+ChangeOfOne = (
+    ChangeFence
+    | DropFence
+    | PutDelays
+    | DropEvents
+    | PutConsumer
+    | DropConsumer
+    | PutInside
+    | DropInside
+    | StageEvents
+    | CountStaged
+    | DropStaged
+)
 
 
 @dataclass(slots=True)
@@ -232,7 +246,7 @@ class FenceChanges:
         for step in inside_steps(row.number, change.inside, lambda: next(self._ledger.inside_ids)):
             self._put_inside(step, now)
 
-    def _carry_out(self, change: FenceChange | FenceStep, now: _FenceNow) -> None:
+    def _carry_out(self, change: ChangeOfOne, now: _FenceNow) -> None:
         match change:
             case PutDelays():
                 self._put_delays(change, now)
@@ -258,6 +272,8 @@ class FenceChanges:
                 self._count_staged(change)
             case DropStaged():
                 self._drop_staged(change.number)
+            case _:
+                assert_never(change)
 
     def _follow(self, block: EventBlock) -> None:
         """Raise NotCommittedError if events do not follow the last ones of their fences."""

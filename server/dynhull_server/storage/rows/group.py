@@ -160,7 +160,7 @@ class Group:
             case ChangeHull():
                 self._change(change.row)
             case _:
-                self._fences.take(change)
+                self._fences.take(change)  # any other kind is an error of types
 
     def _hull(self, number: int) -> "_Now | None":
         """A hull after the changes so far, None if it does not exist."""

@@ -127,4 +127,6 @@ class PassTime(FenceRequest):
 
 # Requests that change which hulls share a queue, or what they are compared with.
 STRUCTURAL = (CreateFence, ReplaceFence, DeleteFence)
-FENCE_REQUESTS = (CreateFence, ReplaceFence, DeleteFence, ReadFence, Acknowledge, DeleteConsumer, TrimEvents, PassTime)
+AnyFenceRequest = (
+    CreateFence | ReplaceFence | DeleteFence | ReadFence | Acknowledge | DeleteConsumer | TrimEvents | PassTime
+)

@@ -1,6 +1,7 @@
 """The part of a trip that concerns fences: called where hulls have changed, and for requests about fences."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import assert_never
 
 from ...batch import Applied
 from ...changes import Change
@@ -18,10 +19,10 @@ from ..model.records import Cause, KeptFence, Key
 from ..model.requests import (
     STRUCTURAL,
     Acknowledge,
+    AnyFenceRequest,
     CreateFence,
     DeleteConsumer,
     DeleteFence,
-    FenceRequest,
     PassTime,
     ReadFence,
     ReplaceFence,
@@ -155,7 +156,7 @@ class FencePart:
 
     # Requests about fences
 
-    def do(self, request: FenceRequest) -> object:
+    def do(self, request: AnyFenceRequest) -> object:
         """Run a request about a fence. Returns its result."""
         if isinstance(request, CreateFence):
             return self._definition.create(request)
@@ -184,7 +185,7 @@ class FencePart:
             case TrimEvents():
                 drop_events(request, comparison.leg(fence))
             case _:
-                raise AssertionError(f"not a request: {request}")
+                assert_never(request)
         return None
 
     # After the requests
