@@ -19,7 +19,8 @@ from dynhull_server.starting import started
 from dynhull_server.storage.port import StorageError
 
 from .line import ProcessLine
-from .serving import Serving, serving
+from .storages.choice import storage_kind
+from .storages.kind import Begin, Serving
 
 
 def main(end: socket.socket) -> None:
@@ -46,7 +47,7 @@ async def _run(end: socket.socket) -> None:
         served: asyncio.Future[Serving] = asyncio.get_running_loop().create_future()
         listening = asyncio.create_task(_listen(line, served))
         try:
-            make = partial(serving, settings, begin)
+            make = partial(_made, settings, begin)
             server = await started(make, lambda made: made.start(), stop, settings.start_patience)
             if server is None:
                 return
@@ -60,6 +61,13 @@ async def _run(end: socket.socket) -> None:
         finally:
             listening.cancel()
     gc.unfreeze()
+
+
+async def _made(settings: Settings, begin: Begin) -> Serving:
+    """What the process is to serve. Raises StorageError or ValueError if the storage cannot be used."""
+    kind = storage_kind(settings)
+    role, _, number = begin["process"].partition("-")
+    return await (kind.worker(int(number), begin) if role == "worker" else kind.gateway(begin))
 
 
 def _name_process(name: str) -> None:

@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from itertools import count
 from multiprocessing.process import BaseProcess
@@ -27,15 +28,13 @@ METRICS_SECONDS = 5.0
 # Processes are forked from one that has imported what they run: this takes seconds, which a restart does not have.
 PROCESSES = multiprocessing.get_context("forkserver")
 IMPORTED = [child.__name__]
-# What workers and gateways on a database run besides; what is not installed is left out.
-ON_DATABASE = "dynhull_cluster.machines.member", "dynhull_cluster.machines.public"
 
 log = logging.getLogger(__name__)
 
 
-def prepare(*, on_database: bool) -> None:
-    """Have the process that forks others import what they will run; before the first is started."""
-    PROCESSES.set_forkserver_preload([*IMPORTED, *(ON_DATABASE if on_database else ())])
+def prepare(modules: Sequence[str]) -> None:
+    """Have the process that forks others import what they will run, with these modules; before the first is started."""
+    PROCESSES.set_forkserver_preload([*IMPORTED, *modules])
 
 
 class StartFailedError(Exception):

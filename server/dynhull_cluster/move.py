@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from dynhull_cli.plural import plural
-from dynhull_server.addresses import is_database
+from dynhull_server.storage.databases import is_database
 
 SOURCE_HELP = "A data folder, or the address of a database; no server may be using it."
 TARGET_HELP = "The address of an empty database, or the folder to create."

@@ -2,12 +2,9 @@
 
 import asyncio
 import logging
-import shutil
 import socket
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
 from dynhull_server import logs
 from dynhull_server.app import metrics_page, token_file
@@ -21,19 +18,14 @@ from dynhull_server.rpc.metrics import BUCKETS
 from dynhull_server.rpc.refusal_log import RefusalLog
 from dynhull_server.setting_sources import warn_of_service_links
 from dynhull_server.settings import Settings
-from dynhull_server.storage.port import LockedError, StorageError
-from dynhull_server.storage.sqlite.disk import Disk
-from dynhull_server.storage.sqlite.folder import Folder
-from dynhull_server.storage.worker_folders import begin_anew_if_copied, divide, worker_folder, write_manifest
+from dynhull_server.storage.port import StorageError
 
 from .child_process import ChildProcess, StartFailedError, prepare
 from .machines.entrance import checked_certificate, require_own_address
 from .metrics import registry_of
-from .postgres.processes import this_server
-from .sockets import socket_folder
+from .storages.choice import storage_kind
+from .storages.kind import StorageKind
 
-# Seconds in which the processes of a supervisor that was killed have ended, too.
-LOCK_SECONDS = 5.0
 # The name of the task that restarts all processes.
 RESTART = "restart"
 
@@ -44,16 +36,17 @@ def run(settings: Settings) -> None:
     """Serve with several processes, then return; what prevents that ends the process."""
     logs.configure(settings.log_level, settings.log_format, "supervisor")
     warn_of_service_links()
-    prepare(on_database=settings.journal is not None)
     try:
-        asyncio.run(_serve(settings))
+        kind = storage_kind(settings)
+        prepare(kind.preloads)
+        asyncio.run(_serve(settings, kind))
     except StartFailedError as error:  # that process has said why
         raise SystemExit(error.code) from None
     except (OSError, RuntimeError, ValueError, StorageError) as error:
         fail(f"cannot serve: {text_of(error)}", code_of(error))
 
 
-async def _serve(settings: Settings) -> None:
+async def _serve(settings: Settings, kind: StorageKind) -> None:
     again = asyncio.Event()
     with ExitStack() as opened, stop_signal(again) as stop:
         tokens = token_file(settings)
@@ -63,19 +56,9 @@ async def _serve(settings: Settings) -> None:
             require_own_address(settings)
         port = opened.enter_context(_reserved_port(settings.host, settings.port))
         workers, gateways = settings.workers or 1, settings.gateways or 1
-        in_folder = not settings.in_memory and settings.journal is None
-        if in_folder:
-            divide(settings.data, workers)
-            opened.enter_context(_locked(settings.data))
-            for number in range(workers):
-                with _locked(worker_folder(settings.data, number)):
-                    pass
-            for note in begin_anew_if_copied(settings.data, workers):
-                log.warning("lost", extra={"what": note})
-        sockets = socket_folder(settings.data if in_folder else None)
-        opened.callback(shutil.rmtree, sockets, ignore_errors=True)
+        shared = opened.enter_context(kind.shared())
         own = settings.model_copy(update={"port": port})
-        begin = {"settings": own.model_dump(mode="json"), "sockets": str(sockets), "site": this_server()}
+        begin = {"settings": own.model_dump(mode="json"), **shared.begin}
         processes = Processes(
             [ChildProcess(f"worker-{i}", begin, settings.grace) for i in range(workers)],
             [ChildProcess(f"gateway-{i}", begin, settings.grace) for i in range(gateways)],
@@ -88,8 +71,7 @@ async def _serve(settings: Settings) -> None:
             opened.callback(page.close)
         try:
             if await processes.start(stop):
-                if in_folder:
-                    write_manifest(settings.data, workers, complete=True)
+                shared.complete()
                 print(f"dynhull serving on {processes.address}", flush=True)  # noqa: T201  # output of the command
                 if page is not None:
                     print(f"metrics on {page.url}", flush=True)  # noqa: T201  # likewise
@@ -206,20 +188,3 @@ def _reserved_port(host: str, port: int) -> Iterator[int]:
         except OSError as error:
             raise OSError(f"cannot listen on {host}:{port}: {listening_error(error)}") from None
         yield reserved.getsockname()[1]
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder; wait for processes that are about to end. Raises LockedError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    deadline = time.monotonic() + LOCK_SECONDS
-    with ExitStack() as held:
-        while True:
-            try:
-                held.enter_context(Folder(folder, Disk()).held())
-                break
-            except LockedError:
-                if time.monotonic() > deadline:
-                    raise
-                time.sleep(0.05)
-        yield

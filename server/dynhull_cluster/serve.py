@@ -1,7 +1,5 @@
 """The command `dynhull serve`."""
 
-from functools import partial
-
 from dynhull_server.flags import with_settings
 from dynhull_server.settings import Settings
 
@@ -21,11 +19,15 @@ def serve(settings: Settings, _: dict[str, str]) -> None:
     A setting is taken from its flag, else from the environment (DYNHULL_PORT for --port), else from the --config file.
     """
     if settings.workers is None and not settings.cluster:
+        from dynhull_server.process import Alone
         from dynhull_server.process import run as run_one
 
-        from .alone import serving_alone
+        from .storages.choice import storage_kind
 
-        run_one(settings, partial(serving_alone, settings))
+        async def alone() -> Alone:
+            return storage_kind(settings).alone()
+
+        run_one(settings, alone)
     else:
         from .process import run
 

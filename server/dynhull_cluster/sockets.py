@@ -1,8 +1,10 @@
 """Where the workers listen: Unix sockets in a folder that only the user of the server can open."""
 
 import asyncio
+import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +50,17 @@ class Sockets:
         """Workers have their sockets for good."""
 
 
-def socket_folder(data: Path | None) -> Path:
-    """Make a private folder: in the data folder, or a temporary one, without data or if the name would be too long."""
+@contextmanager
+def socket_folder(data: Path | None = None) -> Iterator[Path]:
+    """A private folder for the block: in the data folder, or a temporary one, without data or for too long a name."""
+    folder = _made_folder(data)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _made_folder(data: Path | None) -> Path:
     if data is None or len(str(data.absolute())) > LONGEST_FOLDER:
         return Path(tempfile.mkdtemp(prefix="dynhull-"))
     folder = data.absolute() / "sockets"

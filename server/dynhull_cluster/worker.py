@@ -1,4 +1,4 @@
-"""A worker: the server of one process, reached through private sockets, on its own part of a folder."""
+"""A worker on a folder or in memory: the server of one process, reached through private sockets."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -9,7 +9,7 @@ from dynhull_server.rpc.access import Caller, TokenFile
 from dynhull_server.rpc.calls import Context
 from dynhull_server.rpc.methods import RunHandler
 from dynhull_server.settings import Settings
-from dynhull_server.storage.worker_folders import worker_folder
+from dynhull_server.storage.port import Storage
 
 from .callers import authenticator
 from .divisions.divisions import ServedDivisions
@@ -21,13 +21,12 @@ from .sockets import Sockets
 HEALTH_CALLS = 1024
 
 
-def worker_server(settings: Settings, number: int, sockets: Sockets) -> Server:
-    """The server of a worker on a folder, or in memory."""
-    own = own_settings(settings).model_copy(update={"data": worker_folder(settings.data, number)})
+def worker_server(settings: Settings, number: int, sockets: Sockets, storage: Storage) -> Server:
+    """The server of a worker, on its own storage."""
     peers = Peers(sockets)
     divisions = ServedDivisions(settings, number, settings.workers or 1, peers)
     entrance = PrivateEntrance(number, sockets, peer_handler(divisions.receive), peers)
-    return Server(own, entrance, divisions=divisions)
+    return Server(own_settings(settings), storage, entrance, divisions)
 
 
 def own_settings(settings: Settings) -> Settings:

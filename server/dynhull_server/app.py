@@ -44,10 +44,7 @@ from .settings import Settings, is_loopback
 from .state.fences.model.faults import FenceFault
 from .state.limits import FenceLimits, Limits
 from .storage.durability import Durability
-from .storage.memory import MemoryStorage
 from .storage.port import FollowedStorage, Progress, Storage, StorageError
-from .storage.sqlite.storage import SQLiteStorage
-from .storage.worker_folders import require_one_process
 
 SERVICES = DESCRIPTOR.full_name, FENCES.full_name
 # SERVING until the scrub finds a hull that differs from Chan's algorithm, or a fence that differs from a recomputation.
@@ -78,8 +75,8 @@ class Server:
 
     Args:
         settings: the settings.
+        storage: what keeps the hulls.
         entrance: how callers reach it; by default, as the settings say.
-        storage: what keeps the hulls; by default, memory or a folder, as the settings say.
         divisions: runs hulls over shards; None for a server that has none.
 
     Attributes:
@@ -91,8 +88,8 @@ class Server:
     def __init__(
         self,
         settings: Settings,
+        storage: Storage,
         entrance: Entrance | None = None,
-        storage: Storage | None = None,
         divisions: Divisions | None = None,
     ) -> None:
         self._settings = settings
@@ -113,7 +110,7 @@ class Server:
                 fence_history_bytes=settings.fence_history_bytes,
             ),
         )
-        self._storage = storage = _storage(settings) if storage is None else storage
+        self._storage = storage
         self._engine = Engine(limits, storage, self._supervisor, machine, divisions)
         self._metrics = Metrics()
         self.registry = self._metrics.registry
@@ -166,10 +163,10 @@ class Server:
         if self._tokens is not None:
             self._tokens.changed = partial(self._calls.recheck, self._tokens.known)
             self._supervisor.every(LOOK_SECONDS, "tokens", self._tokens.run)
-        if not self._settings.in_memory:
+        if self._storage.keeps:
             interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
             self._engine.keep_house(self._settings.snapshot_points, interval)
-        if self._settings.journal is not None:
+        if self._storage.epoch:
             self._supervisor.every(ENTITLED_SECONDS, "lease", self._look_at_lease)
         if self._settings.scrub_cpu:
             engine, cpu = self._engine, self._settings.scrub_cpu
@@ -319,10 +316,3 @@ def end_process(reason: str) -> None:
     """End the process at once, because its state is not reliable. All acknowledged batches are stored."""
     print(f"the server stops: {reason}", file=sys.stderr, flush=True)  # noqa: T201  # logging itself may have failed
     os._exit(os.EX_SOFTWARE)
-
-
-def _storage(settings: Settings) -> Storage:
-    if settings.in_memory:
-        return MemoryStorage(keeps=False)
-    require_one_process(settings.data)
-    return SQLiteStorage(settings.data, settings.durability)

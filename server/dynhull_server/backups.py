@@ -8,7 +8,7 @@ import typer
 
 from dynhull_cli.connected import Connect, connecting
 
-from .addresses import is_database
+from .storage.databases import is_database
 
 DATA = Path("dynhull-data")
 

@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from .addresses import is_database
+from .storage.databases import examples, is_database, kind_of, names
 from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"  # of environment variables
@@ -23,7 +23,7 @@ class Settings(BaseModel):
     data: Path = Field(Path("dynhull-data"), description="Folder of the data.")
     journal: str | None = Field(
         None,
-        description="Address of a PostgreSQL database for the data, in place of a folder: postgresql://user@host/database.",
+        description=f"Address of a {names()} database for the data, in place of a folder: {examples()}.",
     )
     start_patience: float = Field(
         30.0,
@@ -168,6 +168,8 @@ class Settings(BaseModel):
     def _consistent(self) -> Self:
         if is_database(self.data):
             raise ValueError("--data is a folder: give the address of a database as --journal")
+        if self.journal is not None:
+            _require_known(self.journal)
         if (self.tls_cert is None) != (self.tls_key is None):
             raise ValueError("--tls-cert and --tls-key must be given together")
         if self.tls_client_ca and not self.tls_cert:
@@ -196,6 +198,13 @@ class Settings(BaseModel):
                     "--insecure to serve without them"
                 )
         return self
+
+
+def _require_known(journal: str) -> None:
+    try:
+        kind_of(journal)
+    except ValueError as error:
+        raise ValueError(f"--journal: {error}") from None
 
 
 def is_loopback(host: str) -> bool:

@@ -2,9 +2,9 @@
 
 import typer
 
-from .addresses import without_password
 from .flags import as_toml, with_settings
 from .settings import Settings
+from .storage.databases import without_password
 
 
 @with_settings

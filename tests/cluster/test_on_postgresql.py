@@ -190,7 +190,6 @@ def apply(stub: HullServiceStub, sequence: int) -> Any:
 REFUSED = {
     "no address": ("postgresql://?what=1", "--journal: no address of a PostgreSQL database: "),
     "no server": ("postgresql://tester@127.0.0.1:1/hulls", "cannot connect to the database hulls on 127.0.0.1:1: "),
-    "another database": ("mysql://me:secret@host/hulls", "mysql:// is not one of its schemes; write postgresql://"),
     "no rights": ("{url}&user=guarded&password=right", 'have its owner say GRANT CREATE ON DATABASE "test'),
     "no database": ("{url}&dbname=missing", 'database "missing" does not exist'),
     "a wrong password": ("{url}&user=guarded&password=secret", "password authentication failed"),
@@ -229,6 +228,8 @@ def test_commands_for_folders_say_what_to_use_instead(url: str) -> None:
         ("--data", url): "--data is a folder: give the address of a database as --journal",
         ("--journal", url, "--data", "x"): "--journal takes the place of the folder",
         ("--journal", url, "--in-memory"): "--in-memory stores nothing, so --journal has no effect",
+        ("--journal", "mysql://me:secret@host/hulls"): "--journal: mysql:// is no database that can have hulls: write "
+        "postgresql://user@host/database\n",
     }.items():
         refused = dynhull("config", *options)
         assert refused.exit_code == 2

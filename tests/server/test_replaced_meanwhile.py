@@ -50,7 +50,7 @@ class Lent(MemoryStorage):
 async def replaced(ask: Ask) -> Any:
     """What a caller gets of a server that is replaced after the call was admitted."""
     storage = Lent()
-    server = Server(Settings(in_memory=True, port=0, create_on_write=True, scrub_cpu=0), storage=storage)
+    server = Server(Settings(in_memory=True, port=0, create_on_write=True, scrub_cpu=0), storage)
     await server.start()
     try:
         async with grpc.aio.insecure_channel(server.address) as channel:

@@ -31,14 +31,17 @@ COMMAND = str(Path(sys.executable).with_name("dynhull"))
 
 # What the commands import when they run, and those that serve with several processes.
 RUN_BY = {
-    "serve": ["dynhull_server.process", "dynhull_cluster.alone"],
+    "serve": [
+        "dynhull_server.process",
+        *(f"dynhull_cluster.storages.{each}" for each in ("choice", "folder", "memory")),
+    ],
     "gateway": ["dynhull_client", "dynhull_gateway.serve"],
     "dashboard": ["dynhull_client", "dynhull_dashboard.serve"],
     "ingest": ["dynhull_client", "dynhull_bridges.ingest.ingest", "dynhull_bridges.ingest.jetstream"],
     "relay": ["dynhull_client", "dynhull_bridges.relay", "dynhull_bridges.webhook"],
 }
 RUN_BY_SEVERAL = ["dynhull_cluster.process", "dynhull_cluster.child"]
-RUN_ON_DATABASE = ["dynhull_cluster.machines.only_member"]
+RUN_ON_DATABASE = ["dynhull_cluster.storages.postgresql", "dynhull_cluster.machines.only_member"]
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
 
 CHILD_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl

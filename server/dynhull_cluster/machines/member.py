@@ -29,8 +29,8 @@ from dynhull_server.storage.port import LockedError, StorageError, TakenOverErro
 
 from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
-from ..journal import database_of
 from ..merged_metrics import merged
+from ..postgres.database import Database
 from ..postgres.ownership import Leases
 from ..postgres.processes import is_known_dead
 from ..postgres.storage import PostgresStorage
@@ -79,6 +79,7 @@ class Member:
 
     Args:
         settings: the settings.
+        database: the database.
         worker: its name in the tables.
 
     Attributes:
@@ -86,10 +87,10 @@ class Member:
         registry: its metrics: those of each partition, with a label.
     """
 
-    def __init__(self, settings: Settings, worker: str) -> None:
+    def __init__(self, settings: Settings, database: Database, worker: str) -> None:
         self._settings = settings
         self._worker = worker
-        self._database = database_of(settings)
+        self._database = database
         self._host = settings.cluster_host if settings.cluster else ""
         self._leases = Leases()
         self._board = Board(self._database, self._decide, self._leases, worker, self._host)
@@ -299,7 +300,7 @@ class Member:
             worker=self._worker,
             leases=self._leases,
         )
-        return Served(Server(own_settings(self._settings), entrance, storage, divisions), storage, entrance)
+        return Served(Server(own_settings(self._settings), storage, entrance, divisions), storage, entrance)
 
     async def _take(self, number: int) -> None:
         """Own a partition, and serve it; if that fails, others may, and this worker tries again later."""

@@ -36,7 +36,7 @@ class OnlyMember:
         self._supervisor = Supervisor(Clock(), self._turn_health, end_process)
         self._board = Board(database, self._look, self._leases, self._worker)
         storage = PostgresStorage(database, end_process, settings.durability, worker=self._worker, leases=self._leases)
-        self._server = Server(settings, storage=storage, divisions=ServedDivisions(settings))
+        self._server = Server(settings, storage, divisions=ServedDivisions(settings))
         self._joined = False
 
     @property

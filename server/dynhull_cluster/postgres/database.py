@@ -13,13 +13,13 @@ from weakref import WeakSet
 import psycopg
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
+from dynhull_server.storage.databases import POSTGRESQL, kind_of
 from dynhull_server.storage.port import FormatError, StorageError
 from dynhull_server.storage.rows.tables import UnreadableError
 
 from .refusals import meaning_of
 
 SCHEMA = "dynhull"
-SCHEMES = "postgresql", "postgres"
 EXAMPLES = "write postgresql://USER@HOST:PORT/DATABASE, or host=HOST dbname=DATABASE"
 OLDEST_VERSION = 15
 # Seconds until a connection attempt ends; milliseconds until data that nobody acknowledges ends a connection.
@@ -83,9 +83,8 @@ class Database:
     """
 
     def __init__(self, address: str) -> None:
-        scheme, mark, _ = address.partition("://")
-        if mark and scheme not in SCHEMES:
-            raise ValueError(f"no address of a PostgreSQL database: {scheme}:// is not one of its schemes; {EXAMPLES}")
+        if kind_of(address) is not POSTGRESQL:
+            raise ValueError(f"no address of a PostgreSQL database; {EXAMPLES}")
         try:
             given: dict[str, Any] = {**DEFAULTS, **conninfo_to_dict(address)}
         except psycopg.ProgrammingError as error:
