@@ -30,6 +30,12 @@ class Standing(NamedTuple):
         """
         return commit is None or (commit.number <= self.number and commit.time <= self.time)
 
+    def before(self, commit: CommitStamp | None) -> "Standing":
+        """This one, or an earlier one that has nothing of a commit."""
+        if commit is None:
+            return self
+        return self._replace(number=min(self.number, max(commit.number - 1, 0)), time=min(self.time, commit.time))
+
 
 def incarnation_of(hulls: Sequence[HullRow]) -> str:
     """What the last copy of a storage has added to the uids of all hulls there were; "" for none."""

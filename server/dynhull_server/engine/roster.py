@@ -1,7 +1,8 @@
 """The newest states of many hulls, in the order in which they last changed.
 
 Whoever follows them remembers how far it is, and takes what has changed since: the newest state of each. So there are
-no queues, and a state is encoded once, however many follow.
+no queues, and a state is encoded once, however many follow. A hull that is busy, as with a long batch, is left out: its
+state comes when it may be read, and the others do not wait for it.
 """
 
 import asyncio
@@ -9,12 +10,13 @@ from collections import OrderedDict
 from collections.abc import AsyncGenerator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from ..state.records import CommitStamp
 from .positions import Standing
 
-# Bytes of the states in one message, unless there is but one, and seconds of encoding after which it is sent.
+# Bytes of the states in one message, unless there is but one, and seconds of encoding after which it is sent: a state
+# that is not there by then comes later.
 MESSAGE_BYTES, MESSAGE_SECONDS = 2**18, 0.05
 # Names that are gone, and kept for those who have yet to hear of it, before it is looked who has.
 SOME_GONE = 1_000
@@ -45,6 +47,20 @@ class RosterEntry:
     new: bool = False
     gone: bool = False
     state: bytes | None = None
+
+
+class RosterMessage(NamedTuple):
+    """States that are sent at once.
+
+    Attributes:
+        states: the states.
+        entries: those whose states these are, and those that are late.
+        late: those whose states come later: they get a new version with it.
+    """
+
+    states: bytes
+    entries: Sequence[RosterEntry]
+    late: Sequence[RosterEntry]
 
 
 class Source(Protocol):
@@ -81,7 +97,8 @@ class Roster:
         self._moved = asyncio.Event()
         self._encoding = asyncio.Lock()
         self._heard: dict[object, int] = {}
-        self._shared: OrderedDict[tuple[int, int, int], tuple[bytes, int]] = OrderedDict()
+        self._shared: OrderedDict[tuple[int, int, int], RosterMessage] = OrderedDict()
+        self._late: dict[RosterEntry, asyncio.Task[None]] = {}
 
     def get(self, name: str) -> RosterEntry | None:
         """The entry of a name that is there."""
@@ -115,6 +132,11 @@ class Roster:
         self._gone += 1
         if self._gone > self._most_gone:
             self._forget_gone()
+
+    def close(self) -> None:
+        """Wait for no states any more."""
+        for waiting in self._late.values():
+            waiting.cancel()
 
     def begin_anew(self) -> None:
         """Note that states may have gone back: all who follow begin anew."""
@@ -176,7 +198,7 @@ class Roster:
         found.reverse()
         return found
 
-    async def changes(self, since: int) -> AsyncGenerator[bytes, None]:
+    async def changes(self, since: int) -> AsyncGenerator[RosterMessage, None]:
         """The states of what has changed after a version, many to a message.
 
         Those who are equally far share the messages. A hull that changes meanwhile is sent as it is then, and again.
@@ -186,20 +208,21 @@ class Roster:
         while first < len(entries):
             key = since, until, first
             async with self._encoding:
-                shared = self._shared.get(key)
-                if shared is None:
-                    shared = self._shared[key] = await self._message(entries, first)
+                message = self._shared.get(key)
+                if message is None:
+                    message = self._shared[key] = await self._message(entries, first)
                     while len(self._shared) > SHARED:
                         self._shared.popitem(last=False)
-            message, first = shared
+            first += len(message.entries)
             yield message
 
-    async def states(self, entries: Sequence[RosterEntry]) -> AsyncGenerator[bytes, None]:
+    async def states(self, entries: Sequence[RosterEntry]) -> AsyncGenerator[RosterMessage, None]:
         """The states of some entries, many to a message."""
         first = 0
         while first < len(entries):
             async with self._encoding:
-                message, first = await self._message(entries, first)
+                message = await self._message(entries, first)
+            first += len(message.entries)
             yield message
 
     async def names(self, entries: Sequence[RosterEntry]) -> AsyncGenerator[bytes, None]:
@@ -215,29 +238,58 @@ class Roster:
         if waiting:
             yield b"".join(waiting)
 
-    async def _message(self, entries: Sequence[RosterEntry], first: int) -> tuple[bytes, int]:
-        """The next message, and the number of the first entry after it."""
+    async def _message(self, entries: Sequence[RosterEntry], first: int) -> RosterMessage:
+        """The next message, which begins with an entry."""
         loop = asyncio.get_running_loop()
         begun = slice_begun = loop.time()
-        size = 0
+        size, number = 0, first
         states: list[bytes] = []
-        while first < len(entries) and not (states and loop.time() - begun > MESSAGE_SECONDS):
-            state = entries[first].state
+        late: list[RosterEntry] = []
+        while number < len(entries) and not (number > first and loop.time() - begun > MESSAGE_SECONDS):
+            entry = entries[number]
+            state = entry.state
             if state is None:
-                state = await self._encoded(entries[first])
+                state = await self._encoded(entry, begun + MESSAGE_SECONDS)
                 if loop.time() - slice_begun > SLICE:
                     await asyncio.sleep(0)
                     slice_begun = loop.time()
-            if states and size + len(state) > MESSAGE_BYTES:
-                break
-            states.append(state)
-            size += len(state)
-            first += 1
-        return b"".join(states), first
+            if state is None:
+                late.append(entry)
+            else:
+                if states and size + len(state) > MESSAGE_BYTES:
+                    break
+                states.append(state)
+                size += len(state)
+            number += 1
+        return RosterMessage(b"".join(states), entries[first:number], late)
 
-    async def _encoded(self, entry: RosterEntry) -> bytes:
+    async def _encoded(self, entry: RosterEntry, until: float) -> bytes | None:
+        """The state of an entry; None if it is not there at a time: it comes later."""
+        if entry in self._late:
+            return None
         version = entry.version
-        state = await self._source.encode(entry)
+        try:
+            async with asyncio.timeout_at(until):
+                state = await self._source.encode(entry)
+        except TimeoutError:
+            self._late[entry] = asyncio.create_task(self._come_later(entry))
+            return None
         if entry.version == version:  # otherwise it comes again, with what has changed meanwhile
             entry.state = state
         return state
+
+    async def _come_later(self, entry: RosterEntry) -> None:
+        """Have all who follow get the state of an entry as soon as it is there."""
+        try:
+            newest = False
+            while not newest and not entry.gone:
+                version = entry.version
+                state = await self._source.encode(entry)
+                newest = entry.version == version
+                if not entry.gone:
+                    self._at_end(entry.name).state = state
+        except Exception:  # those who follow get it when they ask for the state again
+            if not entry.gone:
+                self._at_end(entry.name)
+        finally:
+            del self._late[entry]

@@ -80,6 +80,7 @@ class Rosters:
         return roster
 
     def _forget(self, choice: Choice, roster: Roster) -> None:
+        roster.close()
         index, keys = (self._by_name, choice.names) if choice.prefix is None else (self._by_prefix, {choice.prefix})
         for key in keys:
             index[key].remove(roster)

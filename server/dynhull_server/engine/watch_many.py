@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from .positions import Standing, encode_position
-from .roster import Roster, RosterEntry
+from .roster import Roster, RosterEntry, RosterMessage
 
 # Seconds between positions.
 MARK_SECONDS = 1.0
@@ -51,48 +51,95 @@ async def watch_many(
         interval: the least number of seconds between two states of a hull.
     """
     loop = asyncio.get_running_loop()
-    with roster.following() as follower:
+    with roster.following() as key:
         while True:
-            generation, version = roster.generation, roster.version
-            standings = roster.standings()
-            marked = encode_position(standings)
-            entries = roster.entries()
-            goes_on = position is not None and _go_on(position, standings)
-            yield ManyPart(picture=Picture.BEGINS if goes_on or position is None else Picture.BEGINS_ANEW)
-            changed, same = _apart(entries, position if goes_on else None)
-            async with aclosing(roster.states(changed)) as messages:
-                async for message in messages:
-                    yield ManyPart(message)
-            async with aclosing(roster.names(same)) as messages:
-                async for message in messages:
-                    yield ManyPart(message)
-            del entries, changed, same
-            yield ManyPart(picture=Picture.COMPLETE, position=marked)
+            follower = _Follower(roster)
+            async with aclosing(follower.picture(position)) as parts:
+                async for part in parts:
+                    yield part
+            unpictured, complete = follower.late.copy(), False
             marked_at, slot = loop.time(), -1
-            while roster.generation == generation:
-                roster.heard(follower, version)
+            while not follower.begins_anew:
+                if not complete and unpictured.isdisjoint(follower.late):
+                    complete, marked_at = True, loop.time()
+                    yield ManyPart(picture=Picture.COMPLETE, position=follower.position())
+                roster.heard(key, follower.version)
                 due = False
                 with suppress(TimeoutError):
                     async with asyncio.timeout_at(marked_at + MARK_SECONDS):
-                        await roster.beyond(version, generation)
+                        await roster.beyond(follower.version, follower.generation)
                         # Once in each slot of time: those who are equally far share what they get.
                         await asyncio.sleep((slot + 1) * interval - loop.time())
                         due = True
-                if roster.generation != generation:
+                if follower.begins_anew:
                     break
                 if due:
                     slot = int(loop.time() // interval)
-                    now, until = encode_position(roster.standings()), roster.version
-                    async with aclosing(roster.changes(version)) as messages:
-                        async for message in messages:
-                            yield ManyPart(message)
-                    marked, version = now, until
-                elif version == roster.version:
-                    marked = encode_position(roster.standings())
+                    async with aclosing(follower.changes()) as parts:
+                        async for part in parts:
+                            yield part
                 if loop.time() >= marked_at + MARK_SECONDS:
-                    yield ManyPart(position=marked)
                     marked_at = loop.time()
+                    if complete:
+                        yield ManyPart(position=follower.position())
             position = ()
+
+
+class _Follower:
+    """How far a watcher is in a roster, from a picture on.
+
+    Attributes:
+        generation: of the roster, at the picture.
+        version: that of what it has been sent last.
+        late: what it has to be sent yet of what changed before.
+    """
+
+    def __init__(self, roster: Roster) -> None:
+        self.generation, self.version = roster.generation, roster.version
+        self.late: set[RosterEntry] = set()
+        self._roster = roster
+        self._standings = roster.standings()
+
+    @property
+    def begins_anew(self) -> bool:
+        """Whether all is to be pictured anew."""
+        return self._roster.generation != self.generation
+
+    async def picture(self, position: Sequence[Standing] | None) -> AsyncGenerator[ManyPart, None]:
+        """All hulls, but for those that are late."""
+        entries = self._roster.entries()
+        goes_on = position is not None and _go_on(position, self._standings)
+        yield ManyPart(picture=Picture.BEGINS if goes_on or position is None else Picture.BEGINS_ANEW)
+        changed, same = _apart(entries, position if goes_on else None)
+        async for part in self._sent(self._roster.states(changed)):
+            yield part
+        async with aclosing(self._roster.names(same)) as messages:
+            async for message in messages:
+                yield ManyPart(message)
+
+    async def changes(self) -> AsyncGenerator[ManyPart, None]:
+        """What has changed since."""
+        standings, version = self._roster.standings(), self._roster.version
+        async for part in self._sent(self._roster.changes(self.version)):
+            yield part
+        self._standings, self.version = standings, version
+
+    async def _sent(self, messages: AsyncGenerator[RosterMessage, None]) -> AsyncGenerator[ManyPart, None]:
+        async with aclosing(messages):
+            async for message in messages:
+                self.late.difference_update(message.entries)
+                self.late.update(message.late)
+                if message.states:
+                    yield ManyPart(message.states)
+
+    def position(self) -> bytes:
+        """How far it is: of what it has been sent, and of what it has to be sent yet."""
+        if self.version == self._roster.version:
+            self._standings = self._roster.standings()
+        standings = list(self._standings)
+        for entry in self.late:
+            standings[entry.partition] = standings[entry.partition].before(entry.commit)
+        return encode_position(standings)
 
 
 def _go_on(position: Sequence[Standing], standings: Sequence[Standing]) -> bool:
