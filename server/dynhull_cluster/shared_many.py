@@ -12,7 +12,7 @@ from functools import partial
 from google.rpc import code_pb2
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_server.engine.positions import Standing, decode_position
+from dynhull_server.engine.positions import NOWHERE, Position, Standing, decode_standings
 from dynhull_server.engine.roster import Roster, RosterEntry
 from dynhull_server.engine.watch_many import watch_many
 from dynhull_server.rpc import decode
@@ -68,13 +68,13 @@ class SharedMany:
                 try:
                     await self._follow(call, request, position, interval, watcher)
                 except RetiredError:  # the names are divided among others: all is pictured anew
-                    position = []
+                    position = NOWHERE
 
     async def _follow(
         self,
         call: Call,
         request: pb.WatchManyRequest,
-        position: list[Standing] | None,
+        position: Position | None,
         interval: float,
         watcher: object,
     ) -> None:
@@ -205,7 +205,7 @@ class ManyFeed:
                 await asyncio.sleep(0)
         if response.position:
             part.position = response.position
-            part.standing = decode_position(response.position)[0]
+            part.standing = decode_standings(response.position)[0]
         if response.picture == pb.PICTURE_COMPLETE:
             self._complete(part)
 

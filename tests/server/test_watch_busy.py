@@ -14,7 +14,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 from dynhull_server.engine import watch_many as module
 from dynhull_server.engine.engine import Engine
-from dynhull_server.engine.positions import Standing, decode_position
+from dynhull_server.engine.positions import Position, decode_position
 from dynhull_server.engine.roster import Roster
 from dynhull_server.engine.rosters import Choice
 from dynhull_server.engine.watch_many import ManyPart, Picture, watch_many
@@ -72,7 +72,7 @@ async def seen(parts: AsyncIterator[ManyPart], name: str) -> int:
     raise AssertionError("the watch has ended")
 
 
-async def marked(parts: AsyncIterator[ManyPart]) -> list[Standing]:
+async def marked(parts: AsyncIterator[ManyPart]) -> Position:
     """The next position."""
     async for part in parts:
         if part.position:

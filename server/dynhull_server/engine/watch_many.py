@@ -5,12 +5,12 @@ slow client therefore gets newer states, and memory does not grow.
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator
 from contextlib import aclosing, suppress
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from .positions import Standing, encode_position
+from .positions import NOWHERE, Position, encode_position
 from .roster import Roster, RosterEntry, RosterMessage
 
 # Seconds between positions.
@@ -40,9 +40,7 @@ class ManyPart:
     position: bytes = b""
 
 
-async def watch_many(
-    roster: Roster, position: Sequence[Standing] | None, interval: float
-) -> AsyncGenerator[ManyPart, None]:
+async def watch_many(roster: Roster, position: Position | None, interval: float) -> AsyncGenerator[ManyPart, None]:
     """The states of the hulls of a roster, or of those that are not as at a position, then of all that change.
 
     Args:
@@ -82,7 +80,7 @@ async def watch_many(
                     marked_at = loop.time()
                     if complete:
                         yield ManyPart(position=follower.position())
-            position = ()
+            position = NOWHERE
 
 
 class _Follower:
@@ -105,10 +103,10 @@ class _Follower:
         """Whether all is to be pictured anew."""
         return self._roster.generation != self.generation
 
-    async def picture(self, position: Sequence[Standing] | None) -> AsyncGenerator[ManyPart, None]:
+    async def picture(self, position: Position | None) -> AsyncGenerator[ManyPart, None]:
         """All hulls, but for those that are late."""
         entries = self._roster.entries()
-        goes_on = position is not None and _go_on(position, self._standings)
+        goes_on = position is not None and position.precedes(self._standings)
         yield ManyPart(picture=Picture.BEGINS if goes_on or position is None else Picture.BEGINS_ANEW)
         changed, same = _apart(entries, position if goes_on else None)
         async for part in self._sent(self._roster.states(changed)):
@@ -142,23 +140,13 @@ class _Follower:
         return encode_position(standings)
 
 
-def _go_on(position: Sequence[Standing], standings: Sequence[Standing]) -> bool:
-    """Whether what is there now follows what there was at a position."""
-    return len(position) == len(standings) and all(
-        before.incarnation == now.incarnation and before.number <= now.number
-        for before, now in zip(position, standings, strict=True)
-    )
-
-
-def _apart(
-    entries: list[RosterEntry], position: Sequence[Standing] | None
-) -> tuple[list[RosterEntry], list[RosterEntry]]:
+def _apart(entries: list[RosterEntry], position: Position | None) -> tuple[list[RosterEntry], list[RosterEntry]]:
     """What has changed since a position, and the rest."""
     if position is None:
         return entries, []
     changed: list[RosterEntry] = []
     same: list[RosterEntry] = []
     for entry in entries:
-        as_before = not entry.new and position[entry.partition].has(entry.commit)
+        as_before = not entry.new and position.standings[entry.partition].has(entry.commit)
         (same if as_before else changed).append(entry)
     return changed, same

@@ -13,7 +13,7 @@ from dynhull.arrays import Points, packed_points, plain_points
 from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
 
 from ..engine.layers import MOST_LAYERS
-from ..engine.positions import Standing, decode_position
+from ..engine.positions import Position, decode_position
 from ..engine.rosters import Choice
 from ..state.contents.deadlines import Key
 from ..state.frames import off_globe
@@ -294,7 +294,7 @@ def decode_many_contents(request: hull_service_pb2.WatchManyRequest) -> tuple[bo
     return outline, request.max_vertices
 
 
-def decode_many_position(request: hull_service_pb2.WatchManyRequest) -> list[Standing] | None:
+def decode_many_position(request: hull_service_pb2.WatchManyRequest) -> Position | None:
     """The position to go on from, None for the beginning."""
     if not request.position:
         return None

@@ -27,6 +27,9 @@ router = APIRouter(tags=["events"])
 LastEventId = Annotated[
     str | None, Header(alias="Last-Event-ID", max_length=300, description="The id of the last event that was received.")
 ]
+LastPosition = Annotated[
+    str | None, Header(alias="Last-Event-ID", max_length=2000, description="The id of the last event that was received.")
+]
 ONE_A_DAY = 1 / 86400  # the least that a watch takes
 Rate = Annotated[
     float, Query(ge=ONE_A_DAY, le=100, description="The most events a second, each with all changes before it.")
@@ -136,7 +139,7 @@ async def watch_many(
     outlines: WithOutlines = False,
     max_vertices: MaxVertices = None,
     rate: Rate = 10.0,
-    last_event_id: LastEventId = None,
+    last_event_id: LastPosition = None,
 ) -> Response:
     """Follow many hulls: those of a prefix, or those with the given names, which may come later.
 
