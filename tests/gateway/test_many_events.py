@@ -1,13 +1,16 @@
 """Many hulls as server-sent events: whoever reads them holds the newest state of each."""
 
+import asyncio
 import json
-from collections.abc import Iterator
+from collections.abc import AsyncGenerator, AsyncIterator, Iterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 from gateway_process import Events, Gateway
 
-from dynhull_client import HullClient
+from dynhull_client import HullClient, ManyChange
+from dynhull_gateway.events.many import ManyFeed, ManyView
 
 SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]
 
@@ -16,6 +19,21 @@ SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]
 def client(address: str) -> Iterator[HullClient]:
     with HullClient(address) as client:
         yield client
+
+
+class ScriptedClient:
+    """A client whose watch says what a test tells it."""
+
+    def __init__(self) -> None:
+        self.told: asyncio.Queue[ManyChange] = asyncio.Queue()
+
+    @asynccontextmanager
+    async def watch_many(self, **_: object) -> AsyncIterator[AsyncIterator[ManyChange]]:
+        async def changes() -> AsyncIterator[ManyChange]:
+            while True:
+                yield await self.told.get()
+
+        yield changes()
 
 
 class Reader:
@@ -113,6 +131,32 @@ def test_an_id_of_something_else_begins_with_all(gateway: Gateway, client: HullC
         reader.until("complete")
         assert set(reader.hulls) == {name}
         reader.close()
+
+
+def test_restores_before_a_reader_are_none_of_its_own() -> None:
+    view = ManyView(None, "", (), False, None, 10.0)
+    picture = ManyChange("state", "a"), ManyChange("complete", position=b"1")
+
+    async def kinds(texts: AsyncGenerator[bytes, None]) -> list[bytes]:
+        return [(await anext(texts)).partition(b"\n")[0] for _ in range(3)]
+
+    async def main() -> None:
+        client = ScriptedClient()
+        feed = ManyFeed(client, view)  # type: ignore[arg-type]
+        for change in picture:
+            client.told.put_nowait(change)
+        early = feed.read(None, 60)
+        assert await kinds(early) == [b"event: begin", b"event: hulls", b"event: complete"]
+        for change in (ManyChange("restored"), *picture):
+            client.told.put_nowait(change)
+        assert await kinds(early) == [b"event: restored", b"event: hulls", b"event: complete"]
+        late = feed.read(None, 60)
+        assert await kinds(late) == [b"event: begin", b"event: hulls", b"event: complete"]
+        for reading in (early, late):
+            await reading.aclose()
+        await feed.close()
+
+    asyncio.run(main())
 
 
 @pytest.mark.parametrize(
