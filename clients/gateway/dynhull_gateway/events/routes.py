@@ -28,7 +28,8 @@ LastEventId = Annotated[
     str | None, Header(alias="Last-Event-ID", max_length=300, description="The id of the last event that was received.")
 ]
 LastPosition = Annotated[
-    str | None, Header(alias="Last-Event-ID", max_length=2000, description="The id of the last event that was received.")
+    str | None,
+    Header(alias="Last-Event-ID", max_length=2000, description="The id of the last event that was received."),
 ]
 ONE_A_DAY = 1 / 86400  # the least that a watch takes
 Rate = Annotated[
