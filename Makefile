@@ -129,10 +129,10 @@ workers: .venv/.test  ## the tests of server, client, command line and dashboard
 SHARDED = stream watch entities windows verification resume query deadlines queries
 
 shards: .venv/.test  ## tests of the server whose promises a hull over shards keeps, run on such hulls
-	$(BIN)/pytest $(SHARDED:%=tests/server/test_%.py) --shape shards -n 2
+	$(BIN)/pytest $(SHARDED:%=tests/server/*/test_%.py) --shape shards -n 2
 
 fuzz-server: .venv/.test  ## many more bad requests than `make test` sends
-	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/test_fuzz.py --timeout 0 --hypothesis-show-statistics
+	FUZZ_EXAMPLES=20000 $(BIN)/pytest tests/server/writes/test_fuzz.py --timeout 0 --hypothesis-show-statistics
 
 fuzz-gateway: .venv/.test  ## many more bad HTTP requests than `make test` sends
 	FUZZ_EXAMPLES=200 $(BIN)/pytest tests/gateway/test_schema.py --timeout 0

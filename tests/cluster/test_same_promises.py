@@ -13,14 +13,23 @@ FOLDER = Path(__file__).parents[1] / "server"
 
 
 def loaded(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"against_workers_{name}", FOLDER / f"{name}.py")
+    path = FOLDER / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"against_workers_{path.stem}", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
 fixtures, hulls, query, resume, stream, watch = map(
-    loaded, ("conftest", "test_hulls", "test_query", "test_resume", "test_stream", "test_watch")
+    loaded,
+    (
+        "conftest",
+        "writes/test_hulls",
+        "reads/test_query",
+        "watches/test_resume",
+        "writes/test_stream",
+        "watches/test_watch",
+    ),
 )
 
 

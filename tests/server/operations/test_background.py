@@ -19,7 +19,7 @@ from server_process import Server, server_process
 
 from dynhull_client import DynhullError, HullClient, OutcomeUnknownError, UnavailableError
 
-FAULTY = str(Path(__file__).with_name("faulty.py"))
+FAULTY = str(Path(__file__).parents[2] / "support/faulty_storage.py")
 SERVING, NOT_SERVING = health_pb2.HealthCheckResponse.SERVING, health_pb2.HealthCheckResponse.NOT_SERVING
 
 

@@ -310,7 +310,7 @@ def test_a_commit_that_fails_makes_no_second_event(tmp_path: Path, name: str, fa
     faults = tmp_path / "faults"
     faults.mkdir()
     clock = SetTime(tmp_path)
-    wrap = (*clock.wrap, str(Path(__file__).with_name("faulty.py")), str(faults))
+    wrap = (*clock.wrap, str(Path(__file__).parents[2] / "support/faulty_storage.py"), str(faults))
     with (
         server_process("--data", str(tmp_path / "data"), wrap=wrap, complaints="Input/output error") as server,
         grpc.insecure_channel(server.address) as channel,

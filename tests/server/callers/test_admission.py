@@ -29,7 +29,7 @@ from dynhull_client import HullClient
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-FLOOD = str(Path(__file__).parents[1] / "support/flood.py")
+FLOOD = str(Path(__file__).parents[2] / "support/flood.py")
 CALLS, BYTES = 48, 4 * 2**20
 MOST_BYTES = 100 * 10**6
 SERVICE = "/dynhull.v1.HullService/"
