@@ -26,6 +26,7 @@ from .rpc.access import LOOK_SECONDS, TokenFile
 from .rpc.calls import Calls
 from .rpc.fence_service import FenceService
 from .rpc.health import Health
+from .rpc.hull_families import HullFamilies
 from .rpc.hull_service import HullService
 from .rpc.methods import (
     DESCRIPTOR,
@@ -254,8 +255,10 @@ class Server:
 
     def _serve_metrics(self) -> None:
         registry, engine = self.registry, self._engine
+        settings = self._settings
+        hulls = HullFamilies(engine.driver, engine.hulls, settings.metrics_prefix, settings.metrics_hulls)
         registry.register(
-            StateCollector(engine.driver, engine.hulls, engine.fences, self._metrics, asyncio.get_running_loop())
+            StateCollector(engine.driver, hulls, engine.fences, self._metrics, asyncio.get_running_loop())
         )
         page = metrics_page(self._settings, registry, self._tokens, self._calls.refused_elsewhere())
         if page is not None:

@@ -4,7 +4,7 @@ import inspect
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_origin
 
 import typer
 
@@ -18,7 +18,7 @@ def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callab
         from .failure import fail
         from .setting_sources import SettingsError, load, origins
 
-        flags = {name: value for name, value in given.items() if value is not None}
+        flags = {name: value for name, value in given.items() if value not in (None, [])}
         try:
             settings, where = load(flags, config), origins(flags, config)
         except SettingsError as error:
@@ -28,9 +28,10 @@ def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callab
     file_help = "TOML file of settings; the names are those of the flags, with _ for -."
     parameters = [_parameter("config", Path, typer.Option(help=file_help, envvar=f"{PREFIX}CONFIG", dir_okay=False))]
     for name, field in Settings.model_fields.items():
-        default = False if field.default is None or field.annotation is bool else str(field.default)
+        default = False if field.default in (None, ()) or field.annotation is bool else str(field.default)
         option = typer.Option(help=field.description, show_default=default)
-        parameters.append(_parameter(name, field.annotation, option))
+        several = get_origin(field.annotation) is tuple
+        parameters.append(_parameter(name, list[str] if several else field.annotation, option))
     run.__doc__ = command.__doc__
     run.__name__ = command.__name__
     run.__annotations__ = {each.name: each.annotation for each in parameters}

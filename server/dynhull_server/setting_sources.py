@@ -40,7 +40,7 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
     ignored = set(service_links())
 
     class Sources(Settings, BaseSettings):
-        model_config = SettingsConfigDict(env_prefix=PREFIX, toml_file=file)
+        model_config = SettingsConfigDict(env_prefix=PREFIX, toml_file=file, enable_decoding=False)
 
         @classmethod
         def settings_customise_sources(

@@ -4,7 +4,7 @@ import ipaddress
 from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from .storage.databases import examples, is_database, kind_of, names
 from .storage.durability import Durability
@@ -160,9 +160,23 @@ class Settings(BaseModel):
     metrics_port: int | None = Field(
         None, ge=0, le=65535, description="Port of the metrics page for Prometheus; without it, no metrics."
     )
+    metrics_prefix: tuple[str, ...] = Field(
+        (),
+        description="Hulls whose names begin with this have their measures on the metrics page: area, perimeter, "
+        "diameter, width, points, vertices, the time of the last change and the number of revisions. Can be given "
+        "several times; in the environment separated by commas.",
+    )
+    metrics_hulls: int = Field(
+        1_000, ge=0, description="Largest number of hulls with their measures on the metrics page: the oldest."
+    )
     log_level: Literal["debug", "info", "warning", "error"] = Field("info", description="Least level to log.")
     log_format: Literal["text", "json"] = Field("text", description="Format of the log.")
     grace: float = Field(30.0, ge=0, description="Seconds that calls in progress get to finish at shutdown.")
+
+    @field_validator("metrics_prefix", mode="before")
+    @classmethod
+    def _separated(cls, value: object) -> object:
+        return value.split(",") if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

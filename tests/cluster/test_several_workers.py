@@ -60,6 +60,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     tokens = tmp_path_factory.mktemp("tokens") / "tokens.toml"
     tokens.write_text(entry("all", "") + entry("north", "north/"))
     options = ("--workers", "2", "--gateways", "2", "--tokens", str(tokens), "--log-level", "error")
+    options += ("--metrics-prefix", "fleet/")
     with measured(*options) as (server, metrics), HullClient(server.address, token="all") as client:
         for name, shift in ((ZERO, 0.0), (ONE, 10.0), (WITH_ONE, 20.0)):
             client.create_hull(name)
@@ -207,6 +208,8 @@ def test_health_of_each_worker_and_metrics_of_all(place: Place) -> None:
         sum(1 for name in found if "dynhull_hull_points" in name and f"worker-{i}" in name) for i in (0, 1)
     ]
     assert sum(count for name, count in found.items() if name.startswith("dynhull_calls_total{") and "gateway" in name)
+    areas = {name: area for name, area in found.items() if name.startswith("dynhull_hull_area{")}
+    assert areas == {f'dynhull_hull_area{{hull="{name}",process="worker-1"}}': 16 for name in (ONE, WITH_ONE)}
 
 
 def test_tokens_hold_for_calls_through_a_gateway(place: Place, client: HullClient) -> None:

@@ -12,9 +12,9 @@ PROCESS = re.compile(r',?process="([^"]*)"')
 
 
 @contextmanager
-def measured(*options: str, wrap: Sequence[str] = ()) -> Iterator[tuple[Server, str]]:
+def measured(*options: str, wrap: Sequence[str] = (), complaints: str = "") -> Iterator[tuple[Server, str]]:
     """A server, and the address of its metrics."""
-    with server_process("--metrics-port", "0", *options, wrap=wrap) as server:
+    with server_process("--metrics-port", "0", *options, wrap=wrap, complaints=complaints) as server:
         line = server.process.stdout.readline()
         yield server, re.fullmatch(r"metrics on http://(.*)/metrics\n", line).group(1)
 

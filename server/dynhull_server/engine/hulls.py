@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable, Iterator, Sequence
 
 from ..state.batch import Applied, Write
-from ..state.errors import HullUnsuitableError, PartRefusedError
+from ..state.errors import HullNotFoundError, HullUnsuitableError, PartRefusedError
 from ..state.hull import Hull
 from ..state.records import DEFAULT, HullSettings
 from ..state.registry import page_of
@@ -56,6 +56,12 @@ class Hulls:
     def get(self, name: str) -> LiveHull:
         """The hull of that name, or raise HullNotFoundError."""
         return self._live_hull(self._driver.core.get(name))
+
+    def of(self, hull: Hull) -> LiveHull:
+        """A hull of the core as its callers use it, or raise HullNotFoundError if it is there no more."""
+        if hull.ended:
+            raise HullNotFoundError(hull.name)
+        return self._live_hull(hull)
 
     def has(self, name: str) -> bool:
         """Whether a hull of that name exists."""

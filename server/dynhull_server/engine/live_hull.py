@@ -1,12 +1,12 @@
 """One hull as its callers use it: reads at one revision, waits for the next, and earlier revisions."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +39,7 @@ from .driver import Driver
 from .fence_verification import MOST_FAULTS, verify_events, verify_sides
 from .fences import Fences
 from .layers import Peeling
+from .measures import HullMeasures, measures_of
 from .recalls import Recalls
 from .steps import BLOCK, FEW_ROWS, at_once, in_blocks
 from .verification import Verification, verify
@@ -78,7 +79,7 @@ class LiveHull:
         self._outlined: asyncio.Event | None = None
         self._last_outlined = hull.counts.outlined
         self._outline: tuple[Points, Center | None, Outline] | None = None
-        self._measures: tuple[Points, Any] | None = None
+        self._measures: tuple[Points, HullMeasures] | None = None
         self._measuring: asyncio.Lock | None = None  # made for those of ten thousand hulls that are measured
 
     @property
@@ -453,15 +454,15 @@ class LiveHull:
             self._outlined = None
         self._last_outlined = self.counts.outlined
 
-    async def measured(self, vertices: Points, measure: Callable[[], Awaitable[T]]) -> T:
-        """The measures of these vertices: measured once, however many ask, until the vertices change."""
+    async def measures(self, vertices: Points) -> HullMeasures:
+        """The measures of these vertices: made once, however many ask, until the vertices change."""
         if self._measuring is None:
             self._measuring = asyncio.Lock()
         async with self._measuring:
             if self._measures is None or self._measures[0] is not vertices:
-                self._measures = vertices, await measure()
-            measures: T = self._measures[1]
-            return measures
+                run = at_once if len(vertices) <= FEW_ROWS else self._driver.aside
+                self._measures = vertices, await measures_of(vertices, run, geographic=self.geographic)
+            return self._measures[1]
 
     async def outline(self, counts: Counts, vertices: Points) -> Outline:
         """A separate hull with these vertices, shared by large reads of one revision."""

@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 
 from ..state.records import CommitStamp
 from .positions import Standing
+from .steps import Slices
 
 # Bytes of the states in one message, unless there is but one, and seconds of encoding after which it is sent: a state
 # that is not there by then comes later.
@@ -22,8 +23,6 @@ MESSAGE_BYTES, MESSAGE_SECONDS = 2**18, 0.05
 SOME_GONE = 1_000
 # Messages that are kept for others who are equally far.
 SHARED = 4
-# Seconds of encoding before others may run.
-SLICE = 0.005
 
 
 @dataclass(slots=True, eq=False)
@@ -241,7 +240,8 @@ class Roster:
     async def _message(self, entries: Sequence[RosterEntry], first: int) -> RosterMessage:
         """The next message, which begins with an entry."""
         loop = asyncio.get_running_loop()
-        begun = slice_begun = loop.time()
+        begun = loop.time()
+        slices = Slices()
         size, number = 0, first
         states: list[bytes] = []
         late: list[RosterEntry] = []
@@ -250,9 +250,7 @@ class Roster:
             state = entry.state
             if state is None:
                 state = await self._encoded(entry, begun + MESSAGE_SECONDS)
-                if loop.time() - slice_begun > SLICE:
-                    await asyncio.sleep(0)
-                    slice_begun = loop.time()
+                await slices.others()
             if state is None:
                 late.append(entry)
             else:

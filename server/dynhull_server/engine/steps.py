@@ -1,5 +1,6 @@
 """Large reads in short steps, one after another: after a caller disconnects, only the present step still runs."""
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
@@ -13,6 +14,24 @@ Run = Callable[[Callable[[], Any]], Awaitable[Any]]
 BLOCK = 8192
 # With so few rows, passing them to another thread would take a large part of the time.
 FEW_ROWS = 16
+
+
+# Seconds of work on the event loop before others may run.
+SLICE = 0.005
+
+
+class Slices:
+    """Work on the event loop in slices, between which others run."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._begun = self._loop.time()
+
+    async def others(self) -> None:
+        """Let others run if the slice is over."""
+        if self._loop.time() - self._begun > SLICE:
+            await asyncio.sleep(0)
+            self._begun = self._loop.time()
 
 
 async def at_once(function: Callable[[], Any]) -> Any:

@@ -14,6 +14,7 @@ from dynhull.margin import max_margin
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1 import points_pb2
 
+from ..engine.measures import HullMeasures
 from ..engine.steps import BLOCK, Run, in_blocks
 from ..state.batch import NO_POINTS
 from ..state.frames import out_of_reach
@@ -25,17 +26,20 @@ Encoding = points_pb2.PointEncoding
 
 
 async def measures(
-    counts: Counts, vertices: Points, encoding: Encoding, run: Run, *, geographic: bool
+    counts: Counts, vertices: Points, found: HullMeasures, encoding: Encoding, run: Run, *, geographic: bool
 ) -> pb.GetMeasuresResponse:
-    """All measures of a hull."""
+    """All measures of a hull, `found` among them."""
+    diameter, width = found.diameter, found.width
+    if diameter is None:
+        diameter = await run(partial((globe if geographic else measure).diameter, vertices))
     if geographic:
         x = y = math.nan
         if counts.center is not None:
             x, y = await run(partial(globe.label_point, vertices, counts.center))
         return pb.GetMeasuresResponse(
             revision=counts.revision,
-            measures=await encode_measures(vertices, run, geographic=True),
-            diameter=await run(partial(globe.diameter, vertices)),
+            measures=encode_measures(found),
+            diameter=diameter,
             width=math.nan,
             min_circle_x=math.nan,
             min_circle_y=math.nan,
@@ -48,9 +52,9 @@ async def measures(
     label_x, label_y = await run(partial(measure.label_point, vertices))
     return pb.GetMeasuresResponse(
         revision=counts.revision,
-        measures=await encode_measures(vertices, run, geographic=False),
-        diameter=await run(partial(measure.diameter, vertices)),
-        width=await run(partial(measure.width, vertices)),
+        measures=encode_measures(found),
+        diameter=diameter,
+        width=await run(partial(measure.width, vertices)) if width is None else width,
         min_box=encode_points(await run(partial(measure.min_box, vertices)), encoding),
         min_perimeter_box=encode_points(await run(partial(measure.min_perimeter_box, vertices)), encoding),
         min_circle_x=x,

@@ -1,6 +1,6 @@
 """Conversion of values to messages."""
 
-import math
+from collections.abc import Awaitable, Callable
 from functools import partial
 from itertools import compress
 from operator import attrgetter
@@ -9,7 +9,6 @@ from typing import assert_never
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import globe, measure
 from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, hull_pb2, hull_service_pb2, points_pb2
@@ -18,6 +17,7 @@ from dynhull_surface.counts import COUNTS
 from ..engine.difference import Difference
 from ..engine.layers import Layers
 from ..engine.live_hull import LiveHull
+from ..engine.measures import HullMeasures
 from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Sketch, Snapshot
@@ -40,14 +40,15 @@ from ..state.records import (
     Times,
 )
 
+# Makes the measures of some vertices.
+Measure = Callable[[Points], Awaitable[HullMeasures]]
+
 IDENTITIES: dict[Identity, hull_pb2.Identity] = {
     "multiset": hull_pb2.IDENTITY_MULTISET,
     "str": hull_pb2.IDENTITY_STRING_KEYS,
     "int": hull_pb2.IDENTITY_INTEGER_KEYS,
 }
 
-# The most vertices of a hull whose diameter and width are among its measures: of more they take far longer than others.
-MOST_MEASURED = 256
 
 CAUSES: dict[Cause | None, batch_pb2.Cause] = {
     None: batch_pb2.CAUSE_UNSPECIFIED,
@@ -231,42 +232,20 @@ def encode_held(
     )
 
 
-async def encode_measures(vertices: Points, run: Run, *, geographic: bool) -> hull_pb2.Measures:
-    """The measures of the hull with these vertices, one step per measure; at once of few vertices."""
-    if len(vertices) <= measure.FEW and not geographic:
-        return _measures(*measure.summary(vertices))
-    module = globe if geographic else measure
-    area, perimeter, bounds = [
-        await run(partial(each, vertices)) for each in (module.area, module.perimeter, module.bounds)
-    ]
-    centroid = (math.nan, math.nan) if geographic else await run(partial(measure.centroid, vertices))
-    diameter = width = None
-    if len(vertices) <= MOST_MEASURED:
-        diameter = await run(partial(module.diameter, vertices))
-        width = None if geographic else await run(partial(measure.width, vertices))
-    return _measures(area, perimeter, centroid, bounds, diameter, width)
-
-
-def _measures(
-    area: float,
-    perimeter: float,
-    centroid: tuple[float, float],
-    bounds: tuple[float, float, float, float],
-    diameter: float | None,
-    width: float | None,
-) -> hull_pb2.Measures:
-    min_x, min_y, max_x, max_y = bounds
+def encode_measures(found: HullMeasures) -> hull_pb2.Measures:
+    """The message of measures."""
+    min_x, min_y, max_x, max_y = found.bounds
     return hull_pb2.Measures(
-        area=area,
-        perimeter=perimeter,
-        centroid_x=centroid[0],
-        centroid_y=centroid[1],
+        area=found.area,
+        perimeter=found.perimeter,
+        centroid_x=found.centroid[0],
+        centroid_y=found.centroid[1],
         min_x=min_x,
         min_y=min_y,
         max_x=max_x,
         max_y=max_y,
-        diameter=diameter,
-        width=width,
+        diameter=found.diameter,
+        width=found.width,
     )
 
 
@@ -349,9 +328,9 @@ def encode_event(event: Event, encoding: points_pb2.PointEncoding) -> hull_servi
 
 
 async def encode_watched(
-    event: Event, encoding: points_pb2.PointEncoding, run: Run, *, measures: bool, geographic: bool
+    event: Event, encoding: points_pb2.PointEncoding, run: Run, measure: Measure | None
 ) -> hull_service_pb2.WatchResponse:
-    """The message of an event; with `measures`, those of the hull if the event has its vertices.
+    """The message of an event, with the measures of its vertices if it has them and `measure` makes them.
 
     `run` encodes large events, which would delay every other call.
     """
@@ -360,8 +339,8 @@ async def encode_watched(
         message = await run(partial(encode_event, event, encoding))
     else:
         message = encode_event(event, encoding)
-    if measures and not isinstance(event, Progress) and event.vertices is not None:
-        message.measures.CopyFrom(await encode_measures(event.vertices, run, geographic=geographic))
+    if measure is not None and not isinstance(event, Progress) and event.vertices is not None:
+        message.measures.CopyFrom(encode_measures(await measure(event.vertices)))
     return message
 
 

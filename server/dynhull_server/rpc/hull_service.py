@@ -353,9 +353,7 @@ class HullService:
             vertex_keys=None if found.keys is None else encode.encode_keys(found.keys[rows], encoding),
         )
         if not rows.start:
-            run = self._run(len(found.vertices))
-            measures = await encode.encode_measures(found.vertices, run, geographic=hull.geographic)
-            response.measures.CopyFrom(measures)
+            response.measures.CopyFrom(encode.encode_measures(await hull.measures(found.vertices)))
         if rows.stop < len(found.vertices):
             response.next_vertex_page_token = page_token(hull.uid, found.counts.revision, rows.stop)
         return response
@@ -387,7 +385,9 @@ class HullService:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
         counts, vertices = await hull.vertices(request.min_revision, decode.decode_layer(request))
-        return await answers.measures(counts, vertices, encoding, self._run(len(vertices)), geographic=hull.geographic)
+        found = await hull.measures(vertices)
+        run = self._run(len(vertices))
+        return await answers.measures(counts, vertices, found, encoding, run, geographic=hull.geographic)
 
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
         hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
@@ -487,19 +487,14 @@ class HullService:
             progress_interval=decode.decode_interval(request),
             outline_only=request.outline_only,
         )
+        measure = hull.measures if request.include_measures else None
         with self._metrics.watcher() as watcher:
             async with aclosing(events):
                 while True:
                     with call.cutoff():
                         event = await anext(events)
                         call.require_entitled()
-                        message = await encode.encode_watched(
-                            event,
-                            encoding,
-                            self._aside,
-                            measures=request.include_measures,
-                            geographic=hull.geographic,
-                        )
+                        message = await encode.encode_watched(event, encoding, self._aside, measure)
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
                         await call.write_within(self._max_watch_lag, message)
 
@@ -510,7 +505,7 @@ class HullService:
         outline, most = decode.decode_many_contents(request)
         position = decode.decode_many_position(request)
         interval = decode.decode_rate(request.max_events_per_second) or MANY_INTERVAL
-        states = HullStates(self._hulls, self._aside, encoding, outline=outline, most=most)
+        states = HullStates(self._hulls, encoding, outline=outline, most=most)
         kind = encoding, outline, most
         with (
             self._hulls.rosters.use(kind, choice, lambda: Roster(states)) as roster,

@@ -1,17 +1,14 @@
 """The states of many hulls, as their watchers get them."""
 
-from functools import partial
-
 from dynhull.arrays import Points
-from dynhull_proto.v1 import hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1 import points_pb2
 
 from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.positions import Standing
 from ..engine.roster import RosterEntry
 from ..engine.rosters import Choice
-from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.watch_many import ManyPart, Picture
 from ..state.errors import HullNotFoundError
 from ..state.hull_state import Counts
@@ -32,17 +29,13 @@ class HullStates:
 
     Args:
         hulls: the hulls.
-        aside: runs what takes long.
         encoding: that of vertices.
         outline: whether to send vertices.
         most: the most vertices of each hull, 0 for all.
     """
 
-    def __init__(
-        self, hulls: Hulls, aside: Run, encoding: points_pb2.PointEncoding, *, outline: bool, most: int
-    ) -> None:
+    def __init__(self, hulls: Hulls, encoding: points_pb2.PointEncoding, *, outline: bool, most: int) -> None:
         self._hulls = hulls
-        self._aside = aside
         self._encoding = encoding
         self._outline = outline
         self._most = most
@@ -70,12 +63,8 @@ class HullStates:
         counts, vertices = await hull.vertices()
         encode_counts(hull, counts, now)
         now.vertex_count = len(vertices)
-        run = at_once if len(vertices) <= FEW_ROWS else self._aside
         if len(vertices):
-            measures: hull_pb2.Measures = await hull.measured(
-                vertices, partial(encode_measures, vertices, run, geographic=hull.geographic)
-            )
-            now.measures.CopyFrom(measures)
+            now.measures.CopyFrom(encode_measures(await hull.measures(vertices)))
         if self._outline:
             chosen, now.error = await self._chosen(hull, counts, vertices)
             now.vertices.CopyFrom(encode_points(chosen, self._encoding))

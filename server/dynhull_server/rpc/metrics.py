@@ -1,7 +1,6 @@
 """The metrics for Prometheus."""
 
 import asyncio
-import heapq
 import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
@@ -15,19 +14,15 @@ from prometheus_client.registry import Collector
 
 from ..engine.driver import Driver
 from ..engine.fences import Fences
-from ..engine.hulls import Hulls
-from ..engine.live_hull import LiveHull
-from ..engine.server_time import MICROSECONDS
 from .background import background_families
 from .batch_counts import BatchCounts
 from .call_counts import CallCounts
 from .fence_families import fence_families
+from .hull_families import HullFamilies
 from .places import Unread
 
 # Seconds, from the delay of a small batch to that of a batch that fills a message.
 BUCKETS = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-# The number of largest hulls with metrics of their own; for all hulls there would be too many for Prometheus.
-NAMED_HULLS = 100
 # Seconds to wait for the event loop.
 PATIENCE = 5.0
 
@@ -137,7 +132,7 @@ class StateCollector(Collector):
     """Collects hulls, watchers and counts of calls and batches on the event loop, when called from another thread."""
 
     def __init__(
-        self, driver: Driver, hulls: Hulls, fences: Fences, metrics: Metrics, loop: asyncio.AbstractEventLoop
+        self, driver: Driver, hulls: HullFamilies, fences: Fences, metrics: Metrics, loop: asyncio.AbstractEventLoop
     ) -> None:
         self._driver = driver
         self._hulls = hulls
@@ -147,47 +142,17 @@ class StateCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """The gauges of the state, and the counts."""
-        yield from _on(self._loop, self._all)
+        yield from asyncio.run_coroutine_threadsafe(self._hulls.look(), self._loop).result(PATIENCE)
+        yield from _on(self._loop, self._counts)
 
-    def _all(self) -> list[Metric]:
+    def _counts(self) -> list[Metric]:
         return [
-            *self._gauges(),
+            *self._metrics.watch_families(),
             *self._metrics.calls.families(),
             *self._metrics.batches.families(self._driver.expired),
             *background_families(self._driver.supervisor),
             *fence_families(self._fences, self._driver.time()),
         ]
-
-    def _gauges(self) -> list[GaugeMetricFamily]:
-        hulls = list(self._hulls)
-        points = GaugeMetricFamily("dynhull_hull_points", "Points of the largest hulls.", labels=["hull"])
-        vertices = GaugeMetricFamily(
-            "dynhull_hull_vertices", "Vertices of the largest hulls when last read.", labels=["hull"]
-        )
-        for hull in heapq.nlargest(NAMED_HULLS, hulls, key=lambda hull: hull.counts.points):
-            points.add_metric([hull.name], hull.counts.points)
-            vertices.add_metric([hull.name], hull.vertex_count)
-        total = sum(hull.counts.points for hull in hulls)
-        entities = sum(hull.counts.points for hull in hulls if hull.settings.identity != "multiset")
-        behind = "Seconds by which the slowest clock that event times drive is behind the server's; 0 without any."
-        return [
-            GaugeMetricFamily("dynhull_hulls", "Hulls.", value=len(hulls)),
-            GaugeMetricFamily("dynhull_points", "Points of all hulls.", value=total),
-            GaugeMetricFamily("dynhull_entities", "Points of all keyed hulls.", value=entities),
-            GaugeMetricFamily(
-                "dynhull_held_keys", "Keys in quarantine.", value=sum(hull.counts.held for hull in hulls)
-            ),
-            GaugeMetricFamily("dynhull_clock_lag_seconds", behind, value=self._clock_lag(hulls)),
-            *self._metrics.watch_families(),
-            points,
-            vertices,
-        ]
-
-    def _clock_lag(self, hulls: list[LiveHull]) -> float:
-        """The lag of the slowest clock that follows event times."""
-        clocks = [hull.counts.clock for hull in hulls if hull.settings.window and hull.settings.window.clock == "data"]
-        slowest = min((clock for clock in clocks if clock is not None), default=None)
-        return 0.0 if slowest is None else max(self._driver.time() - slowest, 0) / MICROSECONDS
 
 
 def _on(loop: asyncio.AbstractEventLoop, function: Any) -> Any:

@@ -120,8 +120,51 @@ def test_the_quarantine_is_counted() -> None:
     assert {each: samples[f'dynhull_quarantine_total{{outcome="{each}"}}'] for each in counted} == counted
 
 
+@pytest.mark.one_process("each process has a limit of its own")
+def test_the_oldest_hulls_under_a_prefix_have_measures() -> None:
+    options = ("--metrics-prefix", "fleet/", "--metrics-prefix", "tram/", "--metrics-hulls", "3", "--scrub-cpu", "0")
+    left_out = "hulls have no measures on the metrics page: there are more than --metrics-hulls"
+    with measured(*options, complaints=left_out) as (server, address), HullClient(server.address) as client:
+
+        def of(name: str) -> dict[str, float]:
+            label = f'{{hull="{name}"}}'
+            found = {key.removesuffix(label): value for key, value in scrape(address).items() if label in key}
+            return {key.removeprefix("dynhull_hull_"): value for key, value in found.items()}
+
+        for name in ("other", "fleet/b", "tram/a"):
+            client.create_hull(name)
+        client.create_hull("fleet/globe", geographic=True)
+        client.create_hull("fleet/a")
+        before = time.time()
+        client.apply("fleet/b", insert=[[0, 0], [4, 0], [4, 3], [0, 3]])
+        client.apply("fleet/globe", insert=[[0, 0], [1, 0], [0, 1]])
+        found = of("fleet/b")
+        changed = found.pop("changed_timestamp_seconds")
+        assert before - 1 < changed < before + PATIENCE
+        sizes = {"points": 4, "vertices": 4, "revisions_total": 1}
+        assert found == {"area": 12, "perimeter": 14, "diameter": 5, "width": 3, **sizes}
+        measures = client.get_hull("fleet/globe").measures
+        found = of("fleet/globe")
+        units = {"area_square_meters": measures.area, "perimeter_meters": measures.perimeter}
+        assert {key: found[key] for key in units} == units
+        assert found["diameter_meters"] == measures.diameter
+        assert "area" not in found
+        assert of("tram/a")["area"] == 0
+        sizes_alone = {"points", "vertices"}  # of the largest hulls
+        assert of("fleet/a").keys() == of("other").keys() == sizes_alone
+        assert scrape(address)["dynhull_metrics_hulls_left_out"] == 1
+        client.delete_hull("fleet/b")
+        client.create_hull("fleet/b")
+        assert "revisions_total" in of("fleet/a")
+        assert of("fleet/b").keys() == sizes_alone
+        client.delete_hull("tram/a")
+        assert not of("tram/a")
+        assert of("fleet/b")["revisions_total"] == 0
+        assert scrape(address)["dynhull_metrics_hulls_left_out"] == 0
+
+
 def test_promtool_has_nothing_to_complain_about() -> None:
-    with measured() as (server, address), HullClient(server.address) as client:
+    with measured("--metrics-prefix", "") as (server, address), HullClient(server.address) as client:
         work(client)
         text = fetch(f"http://{address}/metrics")
     command = [program("promtool"), "check", "metrics"]
@@ -130,8 +173,9 @@ def test_promtool_has_nothing_to_complain_about() -> None:
 
 
 def test_a_real_prometheus_scrapes_it(tmp_path: Path) -> None:
-    with measured() as (server, address), HullClient(server.address) as client:
+    with measured("--metrics-prefix", "a") as (server, address), HullClient(server.address) as client:
         work(client)
+        area = client.get_hull("a").measures.area
         config = tmp_path / "prometheus.yml"
         config.write_text(CONFIG.format(target=address))
         command = [program("prometheus"), f"--config.file={config}", f"--storage.tsdb.path={tmp_path / 'data'}"]
@@ -154,6 +198,7 @@ def test_a_real_prometheus_scrapes_it(tmp_path: Path) -> None:
                 wait_until(has_scraped)
                 assert found["up"] == 1
                 assert found["dynhull_hulls"] == 1
+                assert found["dynhull_hull_area"] == area
             finally:
                 prometheus.terminate()
 

@@ -48,6 +48,17 @@ def test_what_config_shows_is_a_file_for_config(tmp_path: Path) -> None:
     assert settings["create_on_write"] == ("true", str(file))
 
 
+def test_a_setting_of_several_values_comes_from_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "dynhull.toml"
+    file.write_text('metrics_prefix = ["fleet/"]\n')
+    assert shown()["metrics_prefix"] == ("[]", "default")
+    assert shown("--config", str(file))["metrics_prefix"] == ('["fleet/"]', str(file))
+    monkeypatch.setenv("DYNHULL_METRICS_PREFIX", "fleet/,tram/")
+    assert shown("--config", str(file))["metrics_prefix"] == ('["fleet/", "tram/"]', "DYNHULL_METRICS_PREFIX")
+    flags = ("--metrics-prefix", "a/", "--metrics-prefix", "")
+    assert shown("--config", str(file), *flags)["metrics_prefix"] == ('["a/", ""]', "flag")
+
+
 def test_links_of_kubernetes_to_services_are_no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DYNHULL_PORT", "tcp://10.96.0.12:50051")
     monkeypatch.setenv("DYNHULL_PORT_50051_TCP", "tcp://10.96.0.12:50051")
