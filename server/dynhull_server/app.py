@@ -169,6 +169,8 @@ class Server:
             self._engine.keep_house(self._settings.snapshot_points, interval)
         if self._storage.epoch:
             self._supervisor.every(ENTITLED_SECONDS, "lease", self._look_at_lease)
+        if self._settings.series_kept and self._settings.series_bytes:
+            self._engine.keep_series(self._settings.series_kept, self._settings.series_bytes)
         if self._settings.scrub_cpu:
             engine, cpu = self._engine, self._settings.scrub_cpu
             scrub = Scrub(engine.driver, engine.hulls, engine.fences, cpu, self._compared, self._followed)

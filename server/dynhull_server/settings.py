@@ -132,6 +132,17 @@ class Settings(BaseModel):
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds that a watcher may take to receive one event.")
     history_bytes: int = Field(4 * 2**20, ge=0, description="Memory per hull for the history that watches resume from.")
 
+    series_kept: float = Field(
+        3600.0,
+        ge=0,
+        le=86400,
+        description="Seconds for which the measures of hulls are kept in memory, every ten seconds in which a hull "
+        "changes; 0 for none.",
+    )
+    series_bytes: int = Field(
+        256 * 2**20, ge=0, description="Memory for these measures of all hulls; the oldest ones go when it is full."
+    )
+
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
     max_fence_corners: int = Field(100_000, ge=3, description="Largest number of corners of the area of a fence.")
     max_fence_consumers: int = Field(1_000, ge=1, description="Largest number of durable consumers of a fence.")

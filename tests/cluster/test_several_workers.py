@@ -229,6 +229,9 @@ def test_tokens_hold_for_calls_through_a_gateway(place: Place, client: HullClien
             pipeline.locate(ZERO, keys=["a"], keys_of=ONE).result()
         with pytest.raises(UnauthenticatedError):
             stranger.get_hull(ZERO)
+        with pytest.raises(PermissionDeniedError):
+            some.series(ONE)
+        assert some.series(ZERO).areas[-1] == 16
         with some.watch(ZERO) as watch:
             next(watch)
             place.tokens.write_text(entry("all", ""))

@@ -72,6 +72,10 @@ def test_questions_have_the_answers_of_the_sdk(gateway: Gateway, address: str, s
     assert inside_and_outside == [[[None, None], [None, None]], *tangents]
     lines = {"origins": [[-1, 1]], "targets": [[9, 1]]}
     assert gateway.post(f"{at}/intersect-lines", lines).json["crossings"] == crossings
+    series = gateway.get(f"{at}/series?last=3600").json
+    assert (series["areas"][-1], series["rates"][0], series["widths"][-1]) == (16, None, 4)
+    assert series["times"][-1] > series["since"][:19]
+    assert gateway.get(f"{at}/series?last=0").status == 400
     shown = gateway.get(f"{at}/measures").json
     assert (shown["diameter"], shown["min_circle"]["radius"]) == (measures.diameter, measures.min_circle[1])
     assert gateway.get(f"{at}/sample?size=2").json["points"] == gateway.get(f"{at}/sample?size=2").json["points"]

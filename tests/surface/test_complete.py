@@ -42,6 +42,7 @@ OVER_HTTP = {
     "Quarantine": "PresentRules",
     "Sampled": "Sampled",
     "Separation": "Separation",
+    "Series": "Series",
     "SubjectsInside": "SubjectsInside",
     "Supported": "Supported",
     "Tangents": "Tangents",

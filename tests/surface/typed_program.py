@@ -44,6 +44,7 @@ def writes(client: sdk.HullClient) -> None:
 def reads(client: sdk.HullClient) -> None:
     assert_type(client.get_hull("a", layer=2), sdk.Hull)
     assert_type(client.get_measures("a"), sdk.Measured)
+    assert_type(client.series("a", 600), sdk.Series)
     assert_type(client.locate("a", [(0, 0)], min_revision=3), sdk.Located)
     assert_type(client.distance("a", keys=["k"], keys_of="b"), sdk.Distances)
     assert_type(client.count("a", [(0, 0)]), sdk.Counted)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from dynhull_client import HullClient
+    from dynhull_client import HullClient, Series
 
 from .completion import hulls
 from .connected import AsJson, HullName, connected
+from .durations import more_than_0
 from .json_lines import json_line
 from .tab_lines import flat, tab_line
 
@@ -21,16 +22,36 @@ OF_A_PLANE = {"centroid", "width", "min_box", "min_perimeter_box", "min_circle"}
 
 
 @connected
-def measure(client: "HullClient", name: HullName, as_json: AsJson = False) -> None:
+def measure(
+    client: "HullClient",
+    name: HullName,
+    last: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SPAN",
+            help="How the hull was over the last time, such as 30m, as far as the server keeps it, by default an "
+            "hour: a line about every ten seconds in which it changed, the oldest first, and the last one of now.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
     """Measure a hull: one line per measure, its name, its numbers and its unit between tabs; a table on a terminal.
 
         dynhull measure fleet/north --json | jq .diameter
+
+        dynhull measure fleet/north --last 1h > north.tsv
 
     Lengths, areas and places are in the units of the coordinates; on the globe in metres (m), square metres (m2) and
     degrees (deg). Bounds are least x, least y, greatest x, greatest y; on the globe west, south, east, north, west
     greater than east across the antimeridian. Boxes, the smallest ones in any direction, are four corners; circles are
     a centre and a radius. The label point is inside. On the globe there are no centroid, width, boxes and circle.
+
+    With --last, a heading and lines of time, revision, points, vertices, area, perimeter, diameter, width and rate:
+    revisions a second. What there is not is nan.
     """
+    if last is not None:
+        _print_series(client.series(name, more_than_0(last, "--last")), as_json=as_json)
+        return
     found = client.get_measures(name)
     members = asdict(found)
     if found.geographic:
@@ -44,6 +65,24 @@ def measure(client: "HullClient", name: HullName, as_json: AsJson = False) -> No
         return
     for member, value in members.items():
         typer.echo(tab_line(member, value, *filter(None, [units.get(member)])))
+
+
+def _print_series(series: "Series", *, as_json: bool) -> None:
+    columns = {
+        "time": [f"{time}Z" for time in series.times],
+        "revision": series.revisions,
+        "points": series.points,
+        "vertices": series.vertices,
+        "area": series.areas,
+        "perimeter": series.perimeters,
+        "diameter": series.diameters,
+        "width": series.widths,
+        "rate": series.rates,
+    }
+    if not as_json:
+        typer.echo(tab_line(*columns))
+    for row in zip(*columns.values(), strict=True):
+        typer.echo(json_line(**dict(zip(columns, row, strict=True))) if as_json else tab_line(*row))
 
 
 def _show(name: str, members: dict[str, Any], units: dict[str, str]) -> None:

@@ -19,6 +19,12 @@ LayerCount = Annotated[int, Query(ge=1, le=1000, description="The number of laye
 SampleSize = Annotated[int, Query(ge=1, le=100_000, description="The most points.")]
 WithKeys = Annotated[bool, Query(description="Whether to name the points, in a keyed hull.")]
 AboutPointsOrKeys = Annotated[schemas.AboutPointsOrKeys, schemas.body(examples.ABOUT)]
+Last = Annotated[
+    float | None,
+    Query(
+        gt=0, le=86_400, description="Seconds: rows since then, and the one before them. All that are kept by default."
+    ),
+]
 OtherRevision = Annotated[int, Query(ge=0, le=schemas.LARGEST, description="A revision of the other hull to wait for.")]
 
 
@@ -128,6 +134,12 @@ async def get_measures(
 ) -> schemas.AllMeasures:
     """All measures: also diameter, width, smallest boxes and smallest circle."""
     return schemas.AllMeasures.model_validate(await client.get_measures(name, layer=layer, min_revision=min_revision))
+
+
+@router.get("/series")
+async def series(client: Caller, name: HullPath, last: Last = None) -> schemas.Series:
+    """How counts and measures were over the last hour: a row about every ten seconds in which the hull changed."""
+    return schemas.Series.model_validate(await client.series(name, last))
 
 
 @router.get("/verification")

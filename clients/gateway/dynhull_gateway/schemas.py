@@ -487,6 +487,34 @@ class Influence(Response):
     keys: list[str] | list[int] | None
 
 
+class Series(Response):
+    """How a hull was over the last time: row by row, the oldest first; the last row is of now.
+
+    A row says how the hull was at its time, and since its changed time. Areas and lengths are in the units of the
+    coordinates; on the globe in square metres and metres. Hulls of more than 256 vertices have no diameters and widths,
+    those on the globe no widths.
+    """
+
+    uid: str
+    geographic: bool
+    since: AwareDatetime = Field(description="The time from which on rows are kept, or those that were asked for.")
+    interval: float = Field(
+        description="Seconds between two rows of a hull that changes all the time; 0 where the server keeps none."
+    )
+    times: Times
+    changed_times: Times = Field(
+        description="When the newest batch was committed, or points last left by time; null where that is not known."
+    )
+    revisions: Integers
+    points: Integers
+    vertices: Integers
+    areas: Numbers
+    perimeters: Numbers
+    diameters: Numbers
+    widths: Numbers
+    rates: Numbers = Field(description="Revisions a second before each row; null for the first one.")
+
+
 @answering(sdk.Separation)
 class Separation(Response):
     """The distance or overlap of two hulls, and the line between them."""

@@ -62,6 +62,7 @@ from ._messages import (
 )
 from ._pipeline import Pipeline
 from ._quarantine_messages import HeldPosition, Quarantine
+from ._series import Series
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import FenceWatch, ManyWatch, Watch
 from ._writer import Writer
@@ -118,6 +119,7 @@ __all__ = [
     "Quarantine",
     "Sampled",
     "Separation",
+    "Series",
     "Sketch",
     "Snapshot",
     "Stored",

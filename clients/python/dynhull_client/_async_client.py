@@ -9,6 +9,7 @@ from . import _fences as fences
 from . import _layers as peeling
 from . import _many as many
 from . import _quarantine as quarantine
+from . import _series as kept
 from . import _uses as uses
 from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
@@ -98,6 +99,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     layers = _answering(peeling.layers)
     influence = _answering(peeling.influence)
     get_measures = _answering(uses.get_measures)
+    series = _answering(kept.series)
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)
     frontier = _answering(uses.frontier)

@@ -9,6 +9,7 @@ from . import _fences as fences
 from . import _layers as peeling
 from . import _many as many
 from . import _quarantine as quarantine
+from . import _series as kept
 from . import _uses as uses
 from ._calls import Call, Pages
 from ._connection import BlockingConnection
@@ -112,6 +113,7 @@ class HullClient(Client[BlockingConnection]):
     layers = _answering(peeling.layers)
     influence = _answering(peeling.influence)
     get_measures = _answering(uses.get_measures)
+    series = _answering(kept.series)
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)
     frontier = _answering(uses.frontier)

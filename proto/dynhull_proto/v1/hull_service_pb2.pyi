@@ -729,6 +729,46 @@ class GetMeasuresResponse(_message.Message):
     geographic: bool
     def __init__(self, revision: _Optional[int] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., diameter: _Optional[float] = ..., width: _Optional[float] = ..., min_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_perimeter_box: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., min_circle_x: _Optional[float] = ..., min_circle_y: _Optional[float] = ..., min_circle_radius: _Optional[float] = ..., label_x: _Optional[float] = ..., label_y: _Optional[float] = ..., geographic: bool = ...) -> None: ...
 
+class GetSeriesRequest(_message.Message):
+    __slots__ = ("name", "last", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    LAST_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    last: _duration_pb2.Duration
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., last: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class GetSeriesResponse(_message.Message):
+    __slots__ = ("uid", "frame", "since_time", "interval", "times", "changed_times", "revisions", "point_counts", "vertex_counts", "areas", "perimeters", "diameters", "widths")
+    UID_FIELD_NUMBER: _ClassVar[int]
+    FRAME_FIELD_NUMBER: _ClassVar[int]
+    SINCE_TIME_FIELD_NUMBER: _ClassVar[int]
+    INTERVAL_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    CHANGED_TIMES_FIELD_NUMBER: _ClassVar[int]
+    REVISIONS_FIELD_NUMBER: _ClassVar[int]
+    POINT_COUNTS_FIELD_NUMBER: _ClassVar[int]
+    VERTEX_COUNTS_FIELD_NUMBER: _ClassVar[int]
+    AREAS_FIELD_NUMBER: _ClassVar[int]
+    PERIMETERS_FIELD_NUMBER: _ClassVar[int]
+    DIAMETERS_FIELD_NUMBER: _ClassVar[int]
+    WIDTHS_FIELD_NUMBER: _ClassVar[int]
+    uid: str
+    frame: _hull_pb2.Frame
+    since_time: _timestamp_pb2.Timestamp
+    interval: _duration_pb2.Duration
+    times: _points_pb2.Times
+    changed_times: _points_pb2.Times
+    revisions: _containers.RepeatedScalarFieldContainer[int]
+    point_counts: _containers.RepeatedScalarFieldContainer[int]
+    vertex_counts: _containers.RepeatedScalarFieldContainer[int]
+    areas: _containers.RepeatedScalarFieldContainer[float]
+    perimeters: _containers.RepeatedScalarFieldContainer[float]
+    diameters: _containers.RepeatedScalarFieldContainer[float]
+    widths: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, uid: _Optional[str] = ..., frame: _Optional[_Union[_hull_pb2.Frame, str]] = ..., since_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., changed_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., revisions: _Optional[_Iterable[int]] = ..., point_counts: _Optional[_Iterable[int]] = ..., vertex_counts: _Optional[_Iterable[int]] = ..., areas: _Optional[_Iterable[float]] = ..., perimeters: _Optional[_Iterable[float]] = ..., diameters: _Optional[_Iterable[float]] = ..., widths: _Optional[_Iterable[float]] = ...) -> None: ...
+
 class SeparateRequest(_message.Message):
     __slots__ = ("name", "min_revision", "other_name", "other_min_revision", "encoding")
     NAME_FIELD_NUMBER: _ClassVar[int]

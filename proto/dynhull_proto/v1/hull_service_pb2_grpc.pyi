@@ -156,6 +156,11 @@ class HullServiceStub:
     """
     GetMeasures: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]
     """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
+    GetSeries: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetSeriesRequest, _hull_service_pb2.GetSeriesResponse]
+    """Returns what the server has kept of a hull's counts and measures: one row about every ten seconds in which the hull has
+    changed, of the last hour by default (`dynhull serve --series-kept`), and a row of now. It is kept in memory by the
+    process that has the hull, and begins anew where that starts, or another one takes the hull over.
+    """
     Separate: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]
     """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
     parts them. FAILED_PRECONDITION if one of them has no points, or one is geographic and the other is not.
@@ -333,6 +338,11 @@ class HullServiceAsyncStub(HullServiceStub):
     """
     GetMeasures: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetMeasuresRequest, _hull_service_pb2.GetMeasuresResponse]  # type: ignore[assignment]
     """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
+    GetSeries: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetSeriesRequest, _hull_service_pb2.GetSeriesResponse]  # type: ignore[assignment]
+    """Returns what the server has kept of a hull's counts and measures: one row about every ten seconds in which the hull has
+    changed, of the last hour by default (`dynhull serve --series-kept`), and a row of now. It is kept in memory by the
+    process that has the hull, and begins anew where that starts, or another one takes the hull over.
+    """
     Separate: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SeparateRequest, _hull_service_pb2.SeparateResponse]  # type: ignore[assignment]
     """Separates two hulls: their distance and the line between them, or the depth of their overlap and the direction that
     parts them. FAILED_PRECONDITION if one of them has no points, or one is geographic and the other is not.
@@ -663,6 +673,17 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetMeasuresResponse, _abc.Awaitable[_hull_service_pb2.GetMeasuresResponse]]:
         """Returns all measures of a hull. Width, boxes and circle belong to the plane: a geographic hull has NaN, and no corners."""
+
+    @_abc_1.abstractmethod
+    def GetSeries(
+        self,
+        request: _hull_service_pb2.GetSeriesRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.GetSeriesResponse, _abc.Awaitable[_hull_service_pb2.GetSeriesResponse]]:
+        """Returns what the server has kept of a hull's counts and measures: one row about every ten seconds in which the hull has
+        changed, of the last hour by default (`dynhull serve --series-kept`), and a row of now. It is kept in memory by the
+        process that has the hull, and begins anew where that starts, or another one takes the hull over.
+        """
 
     @_abc_1.abstractmethod
     def Separate(

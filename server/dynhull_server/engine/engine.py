@@ -15,6 +15,7 @@ from .housekeeping import Housekeeping
 from .hulls import Hulls
 from .loading import Loader
 from .positions import incarnation_of
+from .series import LOOK_SECONDS
 from .shard_store import ShardStore
 from .supervisor import Supervisor
 from .threads import Machine
@@ -127,6 +128,11 @@ class Engine:
         every(house.SWEEP_SECONDS, "sweep", house.sweep)
         if sync_seconds is not None:
             every(sync_seconds, "sync", house.sync)
+
+    def keep_series(self, seconds: float, most: int) -> None:
+        """Begin to keep measures of hulls for so many seconds, in at most so many bytes."""
+        self.hulls.series.begin(seconds, most)
+        self.driver.supervisor.every(LOOK_SECONDS, "series", self.hulls.series.round)
 
     async def close(self) -> None:
         """Complete the trips in progress, refuse the waiting requests, and close the storage."""

@@ -20,6 +20,7 @@ from .live_hull import LiveHull
 from .positions import Standing, standing
 from .recalls import Recalls
 from .rosters import Rosters
+from .series import KeptSeries
 from .waiter import Waiter
 
 
@@ -34,10 +35,12 @@ class Hulls:
 
     Attributes:
         rosters: those of the watches of many hulls.
+        series: the measures that are kept.
     """
 
     def __init__(self, driver: Driver, storage: Storage, fences: Fences, divisions: Divisions | None) -> None:
         self.rosters = Rosters(lambda: driver.core.hulls.values())
+        self.series = KeptSeries(self.of, driver)
         self._driver = driver
         self._fences = fences
         self._divisions = divisions
@@ -142,6 +145,7 @@ class Hulls:
             hull.committed = self._driver.published
             self._move(hull)
         self.rosters.moved(hulls)
+        self.series.moved(hulls)
 
     def divide(self, hull: Hull, requests: Sequence[WriteBatch | Expire]) -> None:
         """Have the shards of a hull carry out requests."""

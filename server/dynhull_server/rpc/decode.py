@@ -342,6 +342,16 @@ def decode_rate(events_per_second: float, field: str = "max_events_per_second") 
     return 1 / events_per_second
 
 
+def decode_last(request: hull_service_pb2.GetSeriesRequest) -> float | None:
+    """The seconds of a series that a caller asks for, None for all."""
+    if not request.HasField("last"):
+        return None
+    seconds = request.last.seconds + request.last.nanos / 1e9
+    if not 0 < seconds <= LONGEST_INTERVAL:
+        raise InvalidFieldError("last", f"{seconds} s", f"must be positive and at most {LONGEST_INTERVAL} s")
+    return seconds
+
+
 def decode_interval(
     request: hull_service_pb2.WatchRequest | fence_service_pb2.WatchFenceRequest,
 ) -> float | None:

@@ -18,6 +18,7 @@ from ..engine.difference import Difference
 from ..engine.layers import Layers
 from ..engine.live_hull import LiveHull
 from ..engine.measures import HullMeasures
+from ..engine.series import SERIES_SECONDS, Series
 from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Sketch, Snapshot
@@ -247,6 +248,30 @@ def encode_measures(found: HullMeasures) -> hull_pb2.Measures:
         diameter=found.diameter,
         width=found.width,
     )
+
+
+def encode_series(
+    hull: LiveHull, series: Series, encoding: points_pb2.PointEncoding, *, keeps: bool
+) -> hull_service_pb2.GetSeriesResponse:
+    """The measures of the last time."""
+    rows = series.rows
+    message = hull_service_pb2.GetSeriesResponse(
+        uid=hull.uid,
+        frame=FRAMES["geographic" if hull.geographic else "plane"],
+        times=encode_times(rows["time"], encoding),
+        changed_times=encode_times(rows["changed"], encoding),
+        revisions=rows["revision"].tolist(),
+        point_counts=rows["points"].tolist(),
+        vertex_counts=rows["vertices"].tolist(),
+        areas=rows["area"].tolist(),
+        perimeters=rows["perimeter"].tolist(),
+        diameters=rows["diameter"].tolist(),
+        widths=rows["width"].tolist(),
+    )
+    message.since_time.FromMicroseconds(series.since)
+    if keeps:
+        message.interval.FromSeconds(SERIES_SECONDS)
+    return message
 
 
 def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:

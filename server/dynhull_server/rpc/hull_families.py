@@ -18,6 +18,7 @@ from prometheus_client.metrics_core import Metric
 from ..engine.driver import Driver
 from ..engine.hulls import Hulls
 from ..engine.measures import HullMeasures
+from ..engine.series import KeptSeries
 from ..engine.server_time import MICROSECONDS
 from ..engine.steps import Slices
 from ..state.errors import HullNotFoundError
@@ -118,6 +119,7 @@ class HullFamilies:
             GaugeMetricFamily("dynhull_held_keys", "Keys in quarantine.", value=survey.held),
             GaugeMetricFamily("dynhull_clock_lag_seconds", behind, value=lag),
         ]
+        sums += _series(self._hulls.series)
         if self._prefixes:
             left_out = "Hulls under --metrics-prefix without measures here: there are more than --metrics-hulls."
             sums.append(GaugeMetricFamily("dynhull_metrics_hulls_left_out", left_out, value=survey.left_out))
@@ -173,6 +175,22 @@ class HullFamilies:
                 extra={"left_out": left_out, "metrics_hulls": self._most},
             )
         self._left_out = left_out
+
+
+def _series(series: KeptSeries) -> list[Metric]:
+    """What the kept measures of hulls take."""
+    if not series.seconds:
+        return []
+    lost = CounterMetricFamily(
+        "dynhull_series_lost_samples", "Kept measures that were dropped early, or not kept, by --series-bytes."
+    )
+    lost.add_metric([], series.lost)
+    return [
+        GaugeMetricFamily("dynhull_series_hulls", "Hulls whose measures are kept.", value=len(series)),
+        GaugeMetricFamily("dynhull_series_bytes", "Memory that kept measures take, about.", value=series.bytes),
+        GaugeMetricFamily("dynhull_series_reach_seconds", "Time for which measures are kept.", value=series.reach),
+        lost,
+    ]
 
 
 def _sizes(measured: Sequence[_Named], largest: Sequence[tuple[str, int, int]]) -> Iterator[Metric]:

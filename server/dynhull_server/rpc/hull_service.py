@@ -389,6 +389,12 @@ class HullService:
         run = self._run(len(vertices))
         return await answers.measures(counts, vertices, found, encoding, run, geographic=hull.geographic)
 
+    async def GetSeries(self, request: pb.GetSeriesRequest, call: Call) -> pb.GetSeriesResponse:
+        hull = self._read(call, request.name)
+        encoding = decode.decode_encoding(request.encoding)
+        series = await self._hulls.series.read(hull, decode.decode_last(request))
+        return encode.encode_series(hull, series, encoding, keeps=bool(self._hulls.series.seconds))
+
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
         hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
         encoding = decode.decode_encoding(request.encoding)
