@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import with_all_cases
+from cases import ALL_CASES, with_all_cases
 from cluster import descendants, processes
 from command_line import dynhull
 from pacing import pause
@@ -47,6 +47,10 @@ KINDS: dict[str, dict[str, Any]] = {
     "keyed window": {"keyed": "str", "max_age": 30, "clock": "data"},
 }
 SHARDS = 3
+SOME_KINDS = [
+    kind if kind in ("points", "keyed window") else pytest.param(kind, marks=with_all_cases) for kind in KINDS
+]
+LIVES = 6 if ALL_CASES else 3
 START = 1_700_000_000
 
 
@@ -114,7 +118,7 @@ def test_a_hull_over_shards_is_one_hull(client: HullClient, name: str, kind: str
     assert client.create_hull(many, shards=SHARDS, **settings).shards == SHARDS
     batches = Batches(settings, seed=len(kind))
     refused = 0
-    for _ in range(40):
+    for _ in range(40 if ALL_CASES else 20):
         batch = batches.next()
         expected, found = (batches.apply(client, each, batch) for each in (one, many))
         if isinstance(expected, tuple):
@@ -366,7 +370,7 @@ def test_the_shards_of_a_deleted_hull_are_deleted_and_a_new_one_is_empty(tmp_pat
         assert client.verify("fleet").equal
 
 
-@pytest.mark.parametrize("options", [(), WORKERS], ids=["process", "workers"])
+@pytest.mark.parametrize("options", [pytest.param((), marks=with_all_cases), WORKERS], ids=["process", "workers"])
 def test_shards_of_a_deleted_hull_do_not_prevent_a_start(tmp_path: Path, options: tuple[str, ...]) -> None:
     """Killed with shards of both, the deleted hull and the new one of its name."""
     with server_process(*options, "--data", str(tmp_path), killed=True) as server, HullClient(server.address) as client:
@@ -477,7 +481,7 @@ def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
     ):
         client.create_hull("fleet", shards=2)
         client.apply("fleet", insert=points)
-        for kill in range(6):
+        for kill in range(LIVES):
             done = threading.Event()
 
             def change(done: threading.Event = done, shards: int = 3 + kill % 3) -> None:
@@ -507,7 +511,7 @@ def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
 @pytest.mark.parametrize("options", [(), pytest.param(WORKERS, marks=with_all_cases)], ids=["process", "workers"])
 def test_a_server_that_is_killed_has_the_old_shards_or_the_new_ones(tmp_path: Path, options: tuple[str, ...]) -> None:
     points = np.random.default_rng(5).normal(size=(20_000, 2))
-    for life in range(6):
+    for life in range(LIVES):
         with (
             server_process(*options, "--data", str(tmp_path), killed=True, torn=life > 0) as server,
             HullClient(server.address, retries=0) as client,
@@ -598,7 +602,7 @@ def test_copies_beside_writes_are_of_one_revision(
     """On a machine so busy that some time passes between the moments of the parts."""
     read = copies.format_of
     monkeypatch.setattr(copies, "format_of", lambda *given: (pause(0.02), read(*given))[1])
-    data, made = tmp_path / "data", [tmp_path / f"copy{i}" for i in range(5)]
+    data, made = tmp_path / "data", [tmp_path / f"copy{i}" for i in range(LIVES)]
     spans = []
     with (
         server_process(*options, "--data", str(data), "--snapshot-points", "10") as server,
@@ -662,7 +666,7 @@ def test_a_shard_of_another_moment_is_not_restored(tmp_path: Path) -> None:
     assert not (tmp_path / "copy").exists()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SOME_KINDS)
 def test_an_export_has_the_rows_of_one_hull(tmp_path: Path, kind: str) -> None:
     data, settings = tmp_path / "data", KINDS[kind]
     with server_process(*WORKERS, "--data", str(data)) as server, HullClient(server.address) as client:

@@ -10,7 +10,7 @@ import pytest
 @pytest.mark.long
 def test_every_event_arrives_whatever_goes_away() -> None:
     torture = Path(__file__).with_name("relay_torture.py")
-    command = [sys.executable, torture, "--downs", "2", "--down", "1", "--kills", "4"]
+    command = [sys.executable, torture, "--downs", "1", "--down", "1", "--kills", "2"]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr
-    assert "'times without the endpoint': 2" in run.stdout.splitlines()[-1]
+    assert "'times without the endpoint': 1" in run.stdout.splitlines()[-1]

@@ -4,6 +4,6 @@ import flips
 
 
 def test_no_bit_loses_a_batch_in_silence(tmp_path):
-    counts, faults = flips.run(tmp_path, count=40, seed=1, processes=1, every=400)
+    counts, faults = flips.run(tmp_path, count=20, seed=1, processes=1, every=400)
     assert faults == []
     assert min(counts[each] for each in (flips.HARMLESS, flips.REPAIRED, flips.REFUSED)) > 0
