@@ -51,9 +51,9 @@ class Faulty(SQLiteStorage):
 
 
 if __name__ == "__main__":
-    from dynhull_server import app
+    from dynhull_cluster.storages import folder
 
-    app.SQLiteStorage = Faulty
+    folder.SQLiteStorage = Faulty
     supervisor.PATIENCE = 1.0
     driver.STUCK = 0.5
     storage.CHECKPOINT_BYTES, storage.LONGEST_LOG_BYTES = 2**17, 2**18
