@@ -43,9 +43,9 @@ from dynhull_server.state.events import (
     Reply,
     Retried,
     Retry,
-    Stir,
     Stopping,
     Tick,
+    WakeFences,
 )
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.fence import Fence
@@ -219,7 +219,7 @@ class CoreServer:
                 self._computing.append(effect.ticket)
             case Examine():
                 self._settle(effect)
-            case Stir():
+            case WakeFences():
                 made = {} if effect.events is None else effect.events.by_fence()
                 for fence in effect.fences:
                     events = made.get(fence.number, ())

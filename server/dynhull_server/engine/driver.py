@@ -25,9 +25,9 @@ from ..state.events import (
     Reply,
     Retried,
     Retry,
-    Stir,
     Stopping,
     Tick,
+    WakeFences,
 )
 from ..state.fences.events.block import EventBlock
 from ..state.fences.model.fence import Fence
@@ -67,7 +67,7 @@ class HullObserver(Protocol):
 class FenceObserver(Protocol):
     """What the driver calls for effects that concern fences."""
 
-    def stir(self, fences: Sequence[Fence], events: EventBlock | None) -> None:
+    def notify(self, fences: Sequence[Fence], events: EventBlock | None) -> None:
         """Fences have new events, or have changed otherwise."""
 
 
@@ -286,8 +286,8 @@ class Driver:
                 self._compute(effect.ticket)
             case Examine():
                 self._examine(effect)
-            case Stir():
-                self._fences.stir(effect.fences, effect.events)
+            case WakeFences():
+                self._fences.notify(effect.fences, effect.events)
             case Retry():
                 self.supervisor.failed("examination", effect.reason)
                 self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))

@@ -56,22 +56,22 @@ class FenceKeeping:
         self._limits = driver.limits.fences
         self._plans: dict[int, _Plan] = {}
         self._due: list[tuple[int, int]] = []  # a heap of times and numbers; outdated where the plan has another time
-        fences.stirred.update(dict.fromkeys(driver.core.fences.values()))
+        fences.changed.update(dict.fromkeys(driver.core.fences.values()))
 
     async def round(self) -> None:
         """Look at the fences that have changed since the last round, and at those whose oldest events are too old."""
         fences = self._fences
-        stirred, fences.stirred = fences.stirred, {}
-        stirred |= dict.fromkeys(self._crossed())
+        changed, fences.changed = fences.changed, {}
+        changed |= dict.fromkeys(self._crossed())
         now = self._driver.time()
         while self._due and self._due[0][0] <= now:
             due, number = heappop(self._due)
             plan = self._plans.get(number)
             if plan is not None and plan.due == due:
                 del self._plans[number]
-                stirred[plan.fence] = None
+                changed[plan.fence] = None
         failure: Exception | None = None
-        for count, fence in enumerate(stirred, start=1):
+        for count, fence in enumerate(changed, start=1):
             if count % FENCES_A_STEP == 0:
                 await self._clock.sleep(0)
             if fence.ended or self._rests(fence):
@@ -81,7 +81,7 @@ class FenceKeeping:
             except FenceNotFoundError:
                 continue
             except Exception as error:  # go on with the other fences
-                fences.stirred[fence] = None
+                fences.changed[fence] = None
                 failure = failure or error
         if failure is not None:
             raise failure
@@ -90,12 +90,12 @@ class FenceKeeping:
         """The fences that subjects have crossed, but those with which there is nothing to do: nearly all, as a rule."""
         tallies, limits = self._driver.core.tallies, self._limits
         columns = tallies.columns
-        stirred = tallies.stirred()
+        changed = tallies.changed()
         if not limits.max_fence_event_age:
             many = columns[Column.LAST] - columns[Column.FIRST] >= limits.max_fence_events
             many |= columns[Column.UNSAVED] >= np.maximum(columns[Column.INSIDE], LEAST_EVENTS)
-            stirred &= many | (columns[Column.LIMITED] != 0)
-        return (tallies.owners[place] for place in np.flatnonzero(stirred).tolist())
+            changed &= many | (columns[Column.LIMITED] != 0)
+        return (tallies.owners[place] for place in np.flatnonzero(changed).tolist())
 
     def _rests(self, fence: Fence) -> bool:
         """Whether there is nothing to do for a fence."""
@@ -121,7 +121,7 @@ class FenceKeeping:
         config = fence.row.config
         first = await self._first(fence)
         if fence.row.config is not config:  # replaced meanwhile: the next round looks by the limits of now
-            self._fences.stirred[fence] = None
+            self._fences.changed[fence] = None
             return
         stored = fence.last - fence.unsaved
         if fence.unsaved >= max(LEAST_EVENTS, fence.inside) or (first > stored + 1 and fence.unsaved):

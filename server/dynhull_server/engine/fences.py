@@ -141,7 +141,7 @@ class Fences:
 
     Attributes:
         events: the number of committed events by type, since the start.
-        stirred: the fences that have changed otherwise than by crossings of subjects, until their keeping has seen
+        changed: the fences that have changed otherwise than by crossings of subjects, until their keeping has seen
             them.
         watched: those whose next event somebody waits for, by number.
     """
@@ -152,7 +152,7 @@ class Fences:
         self._live: dict[Fence, LiveFence] = {}
         self._checks = asyncio.Semaphore(MOST_CHECKS)
         self.events: Counter[int] = Counter()
-        self.stirred: dict[Fence, None] = {}
+        self.changed: dict[Fence, None] = {}
         self.watched: dict[int, LiveFence] = {}
 
     def __len__(self) -> int:
@@ -194,7 +194,7 @@ class Fences:
             raise FenceNotFoundError(name)
         await self._driver.ask(DeleteFence(Waiter(), name, self._driver.time(), rows=fence.inside))
 
-    def stir(self, fences: Sequence[Fence], events: EventBlock | None) -> None:
+    def notify(self, fences: Sequence[Fence], events: EventBlock | None) -> None:
         """Count new events, and wake those who watch their fences.
 
         Args:
@@ -207,7 +207,7 @@ class Fences:
             if self.watched:
                 for number in self.watched.keys() & set(events.fences.tolist()):
                     self.watched[number].moved()
-        self.stirred.update(dict.fromkeys(fences))
+        self.changed.update(dict.fromkeys(fences))
         for fence in fences:
             live = self._live.get(fence)
             if live is not None:

@@ -166,7 +166,7 @@ class Reply:
 
 
 @dataclass(slots=True)
-class Stir:
+class WakeFences:
     """Wake the watchers of fences that have new events or settings.
 
     Attributes:
@@ -186,4 +186,4 @@ class Divide:
     requests: "list[WriteBatch | Expire]"
 
 
-Effect = Compute | Commit | Divide | Examine | Retry | Reply | Stir
+Effect = Compute | Commit | Divide | Examine | Retry | Reply | WakeFences

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..events import Effect, Examine, Stir, Tick
+from ..events import Effect, Examine, Tick, WakeFences
 from ..leg import Leg
 from ..queues import Queue, Queues, names_of
 from ..registry import Registry
@@ -97,7 +97,7 @@ class FenceCore:
 
     def keep(self, trip: Trip, part: FencePart, effects: list[Effect]) -> None:
         """Publish what a trip has committed of fences, and join or part the queues."""
-        events, stirred = part.events, []
+        events, to_wake = part.events, []
         if part.crossed is not None:
             self._registry.tallies.take(part.crossed)
         moved = any(leg.area is not leg.fence.area for leg in part.legs.values())
@@ -115,12 +115,12 @@ class FenceCore:
                 for subjects in fence.subjects.values():
                     subjects.dropped(fence)
             if leg.events or changed:
-                stirred.append(fence)
+                to_wake.append(fence)
         if events is not None:
             self._registry.recent.add(events, len(self._registry.fences))
         self._registry.remove_fences([leg.fence for leg in part.legs.values() if leg.deleted])
-        if stirred or events is not None:
-            effects.append(Stir(stirred, events))
+        if to_wake or events is not None:
+            effects.append(WakeFences(to_wake, events))
         if part.structural:
             self._queues.rejoin(trip, part, moved=moved)
 

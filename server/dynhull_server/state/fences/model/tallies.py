@@ -73,7 +73,7 @@ class Column(IntEnum):
 
     RULES: whether it has rules that look at each of its events.
     LIMITED: whether it has limits of its own on the events that are kept.
-    STIRRED: whether it has had events since its keeping looked at it.
+    CHANGED: whether it has had events since its keeping looked at it.
     """
 
     FIRST = 0
@@ -83,7 +83,7 @@ class Column(IntEnum):
     UNSAVED = 4
     RULES = 5
     LIMITED = 6
-    STIRRED = 7
+    CHANGED = 7
 
 
 class Tallies(Table):
@@ -106,13 +106,13 @@ class Tallies(Table):
         place = super().remove(number)
         self.rule(place, rules=False)
         self.owners.pop(place, None)
-        self.columns[Column.STIRRED, place] = False  # nobody is there to be looked at
+        self.columns[Column.CHANGED, place] = False  # nobody is there to be looked at
         return place
 
-    def stirred(self) -> npt.NDArray[np.bool_]:
+    def changed(self) -> npt.NDArray[np.bool_]:
         """(places,) which fences have had events of crossings since this was last asked. O(places)."""
-        found: npt.NDArray[np.bool_] = self.columns[Column.STIRRED] != 0
-        self.columns[Column.STIRRED] = False
+        found: npt.NDArray[np.bool_] = self.columns[Column.CHANGED] != 0
+        self.columns[Column.CHANGED] = False
         return found
 
     def take(self, told: "Told") -> None:
@@ -127,7 +127,7 @@ class Tallies(Table):
                     columns[Column.TIME],
                     columns[Column.UNSAVED],
                     columns[Column.INSIDE],
-                    columns[Column.STIRRED],
+                    columns[Column.CHANGED],
                 ),
             )
             return
@@ -135,7 +135,7 @@ class Tallies(Table):
         columns[Column.TIME][places] = told.times
         columns[Column.UNSAVED][places] += told.made
         columns[Column.INSIDE][places] += told.changes
-        columns[Column.STIRRED][places] = True
+        columns[Column.CHANGED][places] = True
 
     def rule(self, place: int, *, rules: bool) -> None:
         """Take note whether a fence has rules that look at each of its events."""
