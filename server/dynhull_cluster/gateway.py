@@ -17,6 +17,7 @@ from dynhull_server.entrance import PublicEntrance, grpc_server
 from dynhull_server.rpc.access import LOOK_SECONDS
 from dynhull_server.rpc.calls import Calls, Work
 from dynhull_server.rpc.health import Health
+from dynhull_server.rpc.many import ManyQuotas
 from dynhull_server.rpc.methods import (
     DESCRIPTOR,
     FENCES,
@@ -87,7 +88,7 @@ class Gateway:
         self._relay = Relay(self._links_to(workers, ways), settings.max_watch_lag)
         self._composed = Composed(self._relay, settings.max_fence_corners)
         self._watches = SharedWatches(self._relay, metrics)
-        self._many = SharedMany(self._relay, metrics)
+        self._many = SharedMany(self._relay, metrics, ManyQuotas(settings))
         self._fences = SharedFences(self._relay, metrics)
         self._server = grpc_server(settings, shared_port=True)
         self._serving = False

@@ -13,11 +13,11 @@ from google.rpc import code_pb2
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.engine.positions import NOWHERE, Position, Standing, decode_standings
-from dynhull_server.engine.roster import Roster, RosterEntry
+from dynhull_server.engine.roster import Roster, RosterEntry, RosterLimits
 from dynhull_server.engine.watch_many import watch_many
 from dynhull_server.rpc import decode
 from dynhull_server.rpc.calls import Call
-from dynhull_server.rpc.many import MANY_INTERVAL, encode_many, name_only, require_many
+from dynhull_server.rpc.many import MANY_INTERVAL, ManyQuotas, encode_many, name_only, require_many
 from dynhull_server.rpc.methods import DESCRIPTOR
 from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
@@ -42,20 +42,22 @@ class SharedMany:
     Args:
         relay: the workers.
         metrics: counts the watchers.
+        quotas: how much a caller may watch.
     """
 
-    def __init__(self, relay: Relay, metrics: Metrics) -> None:
+    def __init__(self, relay: Relay, metrics: Metrics, quotas: ManyQuotas) -> None:
         self._relay = relay
         self._metrics = metrics
+        self._quotas = quotas
         self._feeds: Feeds[ManyFeed] = Feeds()
 
     async def watch(self, call: Call) -> None:
         """The method `WatchMany`."""
-        with call.stream(), self._metrics.watcher() as watcher:
+        with call.stream(), self._quotas.watches.take(call.owner), self._metrics.watcher() as watcher:
             with call.cutoff():
                 message = await call.receive()
             request = pb.WatchManyRequest.FromString(message)
-            require_many(decode.decode_many(request), call.access)
+            require_many(decode.decode_many(request), call.access, self._quotas)
             if len(self._relay.links) == 1:
                 sending = partial(self._metrics.sending, watcher, "many")
                 await self._relay.read_from(self._relay.links[0], WATCH_MANY, call, message, sending)
@@ -84,7 +86,7 @@ class SharedMany:
         kind.ClearField("position")
         kind.max_events_per_second = UPSTREAM_RATE
         key = tuple(links), kind.SerializeToString(deterministic=True)
-        with self._feeds.use(key, partial(ManyFeed, links, kind)) as feed:
+        with self._feeds.use(key, partial(ManyFeed, links, kind, self._quotas.roster)) as feed:
             tokens: int | None = None
             with call.cutoff():
                 await feed.complete()
@@ -107,6 +109,7 @@ class ManyFeed:
     Args:
         links: the workers.
         request: what is asked of each, without a position.
+        limits: how much may be followed at once.
 
     Attributes:
         roster: the hulls.
@@ -114,8 +117,8 @@ class ManyFeed:
         tokens: the number of times that tokens have changed: those who follow have to ask whether they still may.
     """
 
-    def __init__(self, links: Sequence[WorkerLink], request: pb.WatchManyRequest) -> None:
-        self.roster = Roster(self)
+    def __init__(self, links: Sequence[WorkerLink], request: pb.WatchManyRequest, limits: RosterLimits) -> None:
+        self.roster = Roster(self, limits)
         self.failure: Exception | None = None
         self.tokens = 0
         self._request = request
@@ -201,6 +204,7 @@ class ManyFeed:
                 part.anew.append(hull)
             else:
                 self._note(part, hull)
+                self.roster.require_within_limits()
             if row % TOGETHER == TOGETHER - 1:
                 await asyncio.sleep(0)
         if response.position:

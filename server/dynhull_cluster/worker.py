@@ -39,6 +39,7 @@ def own_settings(settings: Settings) -> Settings:
             "metrics_port": None,
             "max_health_calls": HEALTH_CALLS,
             "max_health_calls_per_caller": HEALTH_CALLS,
+            "max_many_watches_per_caller": settings.max_streams,  # gateways count them: of many callers one comes here
         }
     )
 

@@ -28,6 +28,7 @@ from .rpc.fence_service import FenceService
 from .rpc.health import Health
 from .rpc.hull_families import HullFamilies
 from .rpc.hull_service import HullService
+from .rpc.many import ManyQuotas
 from .rpc.methods import (
     DESCRIPTOR,
     FENCES,
@@ -189,6 +190,7 @@ class Server:
             self._engine.driver,
             self._engine.hulls,
             self._metrics,
+            ManyQuotas(self._settings),
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )

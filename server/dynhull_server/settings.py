@@ -114,6 +114,16 @@ class Settings(BaseModel):
     max_producers_per_caller: int = Field(1_000, ge=1, description="The same per token, or without tokens per address.")
     max_streams: int = Field(10_000, ge=1, description="Largest number of simultaneous streaming calls.")
     max_streams_per_caller: int = Field(2_500, ge=1, description="The same per token, or without tokens per address.")
+    max_many_watches_per_caller: int = Field(
+        256,
+        ge=1,
+        description="Largest number of simultaneous watches of many hulls (WatchMany), per token, or without tokens "
+        "per address.",
+    )
+    max_watched_hulls: int = Field(100_000, ge=1, description="Largest number of hulls of such a watch.")
+    max_watched_bytes: int = Field(
+        256 * 2**20, ge=1, description="Largest size of the states of all hulls of such a watch."
+    )
     max_unread_bytes_per_caller: int = Field(
         256 * 2**20,
         ge=1,

@@ -7,7 +7,10 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
-from gateway_process import Events, Gateway
+from gateway_process import Events, Gateway, gateway_process
+from metrics import scrape
+from patience import wait_until
+from ports import free_port
 
 from dynhull_client import HullClient, ManyChange
 from dynhull_gateway.events.many import ManyFeed, ManyView
@@ -165,3 +168,24 @@ def test_restores_before_a_reader_are_none_of_its_own() -> None:
 def test_refused(gateway: Gateway, query: str, field: str) -> None:
     answer = gateway.get(f"/events?{query}")
     assert (answer.status, answer.json["field"]) == (400, field)
+
+
+def test_streams_of_a_caller_are_limited(address: str, client: HullClient, name: str) -> None:
+    client.create_hull(name)
+    metrics = f"127.0.0.1:{(port := free_port())}"
+    options = ("--max-many-streams-per-caller", "1", "--metrics-port", str(port))
+    with gateway_process(address, *options) as gateway:
+        reader = Reader(gateway, f"/events?name={name}")
+        reader.until("complete")
+        other = Events(gateway, f"/hulls/{name}/events")  # of one hull: not one of these
+        refused = gateway.get(f"/events?name={name}-other")
+        assert (refused.status, refused.json["reason"], refused.json["value"]) == (429, "STREAM_LIMIT", "1")
+        assert "max_many_streams_per_caller" in refused.json["detail"]
+        counted = 'dynhull_gateway_refused_streams_total{limit="max_many_streams_per_caller"}'
+        assert scrape(metrics)[counted] == 1
+        other.close()
+        reader.close()
+        wait_until(lambda: not scrape(metrics)["dynhull_gateway_streams"])
+        reader = Reader(gateway, f"/events?name={name}")
+        reader.until("complete")
+        reader.close()

@@ -22,10 +22,12 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.access import ANONYMOUS
 from dynhull_server.rpc.calls import Calls
 from dynhull_server.rpc.hull_service import HullService
+from dynhull_server.rpc.many import ManyQuotas
 from dynhull_server.rpc.methods import hull_handlers
 from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.places import Places, Unread
 from dynhull_server.rpc.status import RelayedError, WorkerAwayError
+from dynhull_server.settings import Settings
 from dynhull_server.state.batch import Applied, Batch, Write
 from dynhull_server.state.errors import HullNotFoundError, NotStoredError, OutcomeUnknownError, SequenceGapError
 
@@ -63,7 +65,12 @@ class LinkedServer(ShellServer):
         await super()._start()
         metrics = Metrics()
         service = HullService(
-            self._engine.driver, self._engine.hulls, metrics, create_on_write=True, max_watch_lag=math.inf
+            self._engine.driver,
+            self._engine.hulls,
+            metrics,
+            ManyQuotas(Settings()),
+            create_on_write=True,
+            max_watch_lag=math.inf,
         )
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
         calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))

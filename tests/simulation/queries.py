@@ -17,8 +17,10 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.rpc.access import ANONYMOUS
 from dynhull_server.rpc.calls import Calls
 from dynhull_server.rpc.hull_service import HullService
+from dynhull_server.rpc.many import ManyQuotas
 from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.places import Places, Unread
+from dynhull_server.settings import Settings
 from dynhull_server.state.errors import HullNotFoundError, StoppingError
 
 from .clients import Client, Outline
@@ -42,7 +44,10 @@ class Queries:
     def __init__(self, engine: Engine, model: Model) -> None:
         self._model = model
         metrics = Metrics()
-        self._service = HullService(engine.driver, engine.hulls, metrics, create_on_write=False, max_watch_lag=math.inf)
+        quotas = ManyQuotas(Settings())
+        self._service = HullService(
+            engine.driver, engine.hulls, metrics, quotas, create_on_write=False, max_watch_lag=math.inf
+        )
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
         self._calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))
         self._calls.ready()

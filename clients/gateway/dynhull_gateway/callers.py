@@ -30,6 +30,11 @@ def token_of(request: Request) -> str | None:
     return token
 
 
+def address_of(request: Request) -> str:
+    """The address of a caller: that which a proxy has said, where it is believed."""
+    return "" if request.client is None else request.client.host
+
+
 def client_of(request: Request) -> AsyncHullClient:
     """The client that calls with the token of the request, or with the gateway's own if it has none."""
     client: AsyncHullClient = request.app.state.client

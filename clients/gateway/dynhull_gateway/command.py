@@ -58,6 +58,10 @@ def gateway(
         str, typer.Option(help="Pause after which a stream of events sends a comment, for the sake of proxies.")
     ] = "15s",
     max_streams: Annotated[int, typer.Option(min=0, help="Most streams of events at a time; 503 for more.")] = 10_000,
+    max_many_streams_per_caller: Annotated[
+        int,
+        typer.Option(min=0, help="Most of them of many hulls, per token, or without per address; 429 for more."),
+    ] = 256,
     grace: Annotated[str, typer.Option(help="How long requests may still take after SIGTERM.")] = "10s",
     metrics_port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port of the metrics page; 0 for a free one.")
@@ -97,6 +101,7 @@ def gateway(
         reader_seconds=more_than_0(reader_timeout, "--reader-timeout"),
         keepalive_seconds=more_than_0(keepalive, "--keepalive"),
         max_streams=max_streams,
+        max_many_streams_per_caller=max_many_streams_per_caller,
         grace_seconds=more_than_0(grace, "--grace"),
         root_path=root_path.rstrip("/"),
         forwarded_from=forwarded_from,

@@ -1,5 +1,8 @@
 """The metrics of a gateway, as a page for Prometheus."""
 
+from collections import Counter as Tally
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from time import perf_counter
 
@@ -29,6 +32,13 @@ class Figures:
         self.open_streams = 0
         streams = Gauge("dynhull_gateway_streams", "Streams of events that are open.", registry=registry)
         streams.set_function(lambda: self.open_streams)
+        self.refused_streams = Counter(
+            "dynhull_gateway_refused_streams",
+            "Streams that a limit has refused, by its name.",
+            ["limit"],
+            registry=registry,
+        )
+        self.many_streams: Tally[str] = Tally()
         self.waiting_bytes = 0
         waiting = Gauge(
             "dynhull_gateway_waiting_bytes",
@@ -52,6 +62,17 @@ class Figures:
             "Connections that were closed because nothing was read of what waited for the caller.",
             registry=registry,
         )
+
+    @contextmanager
+    def many_stream(self, caller: str) -> Iterator[None]:
+        """Count a stream of many hulls of a caller during the block."""
+        self.many_streams[caller] += 1
+        try:
+            yield
+        finally:
+            self.many_streams[caller] -= 1
+            if not self.many_streams[caller]:
+                del self.many_streams[caller]
 
     def serve(self, host: str, port: int) -> int:
         """Serve the page from another thread, and return its port."""

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
+from ..state.errors import LimitExceededError
 from ..state.records import CommitStamp
 from .positions import Standing
 from .steps import Slices
@@ -23,6 +24,32 @@ MESSAGE_BYTES, MESSAGE_SECONDS = 2**18, 0.05
 SOME_GONE = 1_000
 # Messages that are kept for others who are equally far.
 SHARED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class RosterLimits:
+    """Limits on what is followed at once; error messages use the names of the settings.
+
+    Attributes:
+        hulls: the number of hulls.
+        size: the bytes of their states.
+    """
+
+    hulls: int
+    size: int
+
+    def require_hulls(self, number: int) -> None:
+        """Raise LimitExceededError if these are too many hulls."""
+        if number > self.hulls:
+            raise LimitExceededError(
+                "max_watched_hulls", self.hulls, "watch fewer hulls, as by a longer prefix"
+            )
+
+    def require_size(self, size: int) -> None:
+        """Raise LimitExceededError if these are too many bytes."""
+        if size > self.size:
+            what = "watch fewer hulls, fewer of their vertices, or summaries"
+            raise LimitExceededError("max_watched_bytes", self.size, what)
 
 
 @dataclass(slots=True, eq=False)
@@ -80,16 +107,19 @@ class Roster:
 
     Args:
         source: where they come from.
+        limits: how much may be followed at once.
 
     Attributes:
         version: that of what has changed last.
         generation: the number of times that everything began anew.
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, limits: RosterLimits) -> None:
         self.version = 0
         self.generation = 0
         self._source = source
+        self._limits = limits
+        self._size = 0
         self._entries: OrderedDict[str, RosterEntry] = OrderedDict()
         self._gone = 0
         self._most_gone = SOME_GONE
@@ -120,14 +150,16 @@ class Roster:
         """Note that a hull has changed, or is there. O(1)."""
         entry = self._at_end(name)
         self._gone -= entry.gone
-        entry.partition, entry.commit, entry.new, entry.gone, entry.state = partition, commit, new, False, state
+        entry.partition, entry.commit, entry.new, entry.gone = partition, commit, new, False
+        self._keep(entry, state)
 
     def end(self, name: str) -> None:
         """Note that a hull is gone. O(1)."""
         if self.get(name) is None:
             return
         entry = self._at_end(name)
-        entry.gone, entry.state = True, None
+        entry.gone = True
+        self._keep(entry, None)
         self._gone += 1
         if self._gone > self._most_gone:
             self._forget_gone()
@@ -141,6 +173,15 @@ class Roster:
         """Note that states may have gone back: all who follow begin anew."""
         self.generation += 1
         self._moved.set()
+
+    def require_within_limits(self) -> None:
+        """Raise LimitExceededError if there are too many hulls, or their states are too large. O(1)."""
+        self._limits.require_hulls(len(self._entries) - self._gone)
+        self._limits.require_size(self._size)
+
+    def _keep(self, entry: RosterEntry, state: bytes | None) -> None:
+        self._size += len(state or b"") - len(entry.state or b"")
+        entry.state = state
 
     def _at_end(self, name: str) -> RosterEntry:
         self.version += 1
@@ -238,7 +279,7 @@ class Roster:
             yield b"".join(waiting)
 
     async def _message(self, entries: Sequence[RosterEntry], first: int) -> RosterMessage:
-        """The next message, which begins with an entry."""
+        """The next message, which begins with an entry. Raises LimitExceededError."""
         loop = asyncio.get_running_loop()
         begun = loop.time()
         slices = Slices()
@@ -259,6 +300,7 @@ class Roster:
                 states.append(state)
                 size += len(state)
             number += 1
+        self.require_within_limits()
         return RosterMessage(b"".join(states), entries[first:number], late)
 
     async def _encoded(self, entry: RosterEntry, until: float) -> bytes | None:
@@ -273,7 +315,7 @@ class Roster:
             self._late[entry] = asyncio.create_task(self._come_later(entry))
             return None
         if entry.version == version:  # otherwise it comes again, with what has changed meanwhile
-            entry.state = state
+            self._keep(entry, state)
         return state
 
     async def _come_later(self, entry: RosterEntry) -> None:
@@ -285,7 +327,7 @@ class Roster:
                 state = await self._source.encode(entry)
                 newest = entry.version == version
                 if not entry.gone:
-                    self._at_end(entry.name).state = state
+                    self._keep(self._at_end(entry.name), state)
         except Exception:  # those who follow get it when they ask for the state again
             if not entry.gone:
                 self._at_end(entry.name)

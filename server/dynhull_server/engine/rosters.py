@@ -37,7 +37,10 @@ class Rosters:
 
     @contextmanager
     def use(self, kind: Hashable, choice: Choice, make: Callable[[], Roster]) -> Iterator[Roster]:
-        """The roster of some hulls, for all who want the same kind of states of them. O(hulls) for the first."""
+        """The roster of some hulls, for all who want the same kind of states of them. O(hulls) for the first.
+
+        Raises LimitExceededError if they are too many.
+        """
         key = kind, choice
         if key not in self._rosters:
             self._rosters[key] = choice, self._begin(choice, make())
@@ -68,15 +71,16 @@ class Rosters:
                 yield from self._by_prefix.get(name[:length], ())
 
     def _begin(self, choice: Choice, roster: Roster) -> Roster:
+        for hull in self._hulls():
+            if choice.has(hull.name):
+                _note(roster, hull)
+                roster.require_within_limits()
         if choice.prefix is None:
             for name in choice.names:
                 self._by_name.setdefault(name, []).append(roster)
         else:
             self._by_prefix.setdefault(choice.prefix, []).append(roster)
         self._measure()
-        for hull in self._hulls():
-            if choice.has(hull.name):
-                _note(roster, hull)
         return roster
 
     def _forget(self, choice: Choice, roster: Roster) -> None:

@@ -47,6 +47,9 @@ async def watch_many(roster: Roster, position: Position | None, interval: float)
         roster: the hulls.
         position: how far the watcher is; None for one that has nothing.
         interval: the least number of seconds between two states of a hull.
+
+    Raises:
+        LimitExceededError: there are too many hulls, or their states are too large.
     """
     loop = asyncio.get_running_loop()
     with roster.following() as key:
@@ -105,6 +108,7 @@ class _Follower:
 
     async def picture(self, position: Position | None) -> AsyncGenerator[ManyPart, None]:
         """All hulls, but for those that are late."""
+        self._roster.require_within_limits()
         entries = self._roster.entries()
         goes_on = position is not None and position.precedes(self._standings)
         yield ManyPart(picture=Picture.BEGINS if goes_on or position is None else Picture.BEGINS_ANEW)

@@ -316,6 +316,8 @@ class Calls:
             except ANSWERED as error:
                 status = rpc_status.to_status(error_status(error, None if call is None else call.batches))
                 code = status.code.name
+                if isinstance(error, LimitExceededError):
+                    self._metrics.limited(error.limit)
                 self.note(status.details, method, code, context)
                 await context.abort(status.code, status.details, status.trailing_metadata)
             except asyncio.CancelledError:

@@ -29,7 +29,7 @@ from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
 from .decode_settings import decode_center, decode_quarantine, decode_settings, decode_shards
-from .many import MANY_INTERVAL, HullStates, encode_many, require_many
+from .many import MANY_INTERVAL, HullStates, ManyQuotas, encode_many, require_many
 from .metrics import Metrics
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
@@ -58,17 +58,26 @@ class HullService:
         driver: drives the core that has the hulls.
         hulls: the hulls.
         metrics: counts the work.
+        quotas: how much a caller may watch of many hulls.
         create_on_write: whether a write to a missing hull creates it.
         max_watch_lag: the seconds that a watcher may take to receive an event.
     """
 
     def __init__(
-        self, driver: Driver, hulls: Hulls, metrics: Metrics, *, create_on_write: bool, max_watch_lag: float
+        self,
+        driver: Driver,
+        hulls: Hulls,
+        metrics: Metrics,
+        quotas: ManyQuotas,
+        *,
+        create_on_write: bool,
+        max_watch_lag: float,
     ) -> None:
         self._hulls = hulls
         self._driver = driver
         self._aside = driver.aside
         self._metrics = metrics
+        self._quotas = quotas
         self._create_on_write = create_on_write
         self._max_watch_lag = max_watch_lag
         self._pages = VertexPages(driver.machine.clock)
@@ -506,7 +515,7 @@ class HullService:
 
     async def WatchMany(self, request: pb.WatchManyRequest, call: Call) -> None:
         choice = decode.decode_many(request)
-        require_many(choice, call.access)
+        require_many(choice, call.access, self._quotas)
         encoding = decode.decode_encoding(request.encoding)
         outline, most = decode.decode_many_contents(request)
         position = decode.decode_many_position(request)
@@ -514,7 +523,8 @@ class HullService:
         states = HullStates(self._hulls, encoding, outline=outline, most=most)
         kind = encoding, outline, most
         with (
-            self._hulls.rosters.use(kind, choice, lambda: Roster(states)) as roster,
+            self._quotas.watches.take(call.owner),
+            self._hulls.rosters.use(kind, choice, lambda: Roster(states, self._quotas.roster)) as roster,
             self._metrics.watcher() as watcher,
         ):
             async with aclosing(watch_many(roster, position, interval)) as parts:

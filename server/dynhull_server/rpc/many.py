@@ -7,13 +7,15 @@ from dynhull_proto.v1 import points_pb2
 from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.positions import Standing
-from ..engine.roster import RosterEntry
+from ..engine.roster import RosterEntry, RosterLimits
 from ..engine.rosters import Choice
 from ..engine.watch_many import ManyPart, Picture
+from ..settings import Settings
 from ..state.errors import HullNotFoundError
 from ..state.hull_state import Counts
 from .access import Rights
 from .encode import FRAMES, encode_measures, encode_points
+from .places import Places
 
 # Seconds between two states of a hull, where the watcher does not say.
 MANY_INTERVAL = 0.1
@@ -22,6 +24,23 @@ PICTURES = {
     Picture.BEGINS_ANEW: pb.PICTURE_BEGINS_ANEW,
     Picture.COMPLETE: pb.PICTURE_COMPLETE,
 }
+
+
+class ManyQuotas:
+    """How much one caller may watch of many hulls.
+
+    Args:
+        settings: the limits.
+
+    Attributes:
+        watches: limits the watches.
+        roster: the limits on each.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        # Each has a place of a streaming call before, so that in total there cannot be more than of these.
+        self.watches = Places("max_many_watches", settings.max_streams, settings.max_many_watches_per_caller)
+        self.roster = RosterLimits(settings.max_watched_hulls, settings.max_watched_bytes)
 
 
 class HullStates:
@@ -75,8 +94,14 @@ class HullStates:
         return await hull.sketch(counts, vertices, self._most)
 
 
-def require_many(choice: Choice, access: Rights) -> None:
-    """Raise PermissionDeniedError unless all of the hulls may be read, those to come too."""
+def require_many(choice: Choice, access: Rights, quotas: ManyQuotas) -> None:
+    """Refuse hulls that may not all be read, those to come too, or too many names.
+
+    Raises:
+        PermissionDeniedError: one of them may not be read.
+        LimitExceededError: there are too many names.
+    """
+    quotas.roster.require_hulls(len(choice.names))
     for name in sorted(choice.names) if choice.prefix is None else [choice.prefix]:
         access.require_read(name)
 

@@ -66,7 +66,17 @@ class Metrics:
             "Time when the scrub last completed a round of all hulls.",
             registry=self.registry,
         )
+        self._limits = Counter(
+            "dynhull_limit_refusals",
+            "Calls that a limit has refused or ended, by its name, which is that of a setting.",
+            ["limit"],
+            registry=self.registry,
+        )
         self._watchers: dict[object, float | None] = {}
+
+    def limited(self, limit: str) -> None:
+        """Count a call that a limit has refused or ended."""
+        self._limits.labels(limit).inc()
 
     def count_unread(self, unread: Unread) -> None:
         """Export what callers have not read."""

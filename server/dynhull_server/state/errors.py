@@ -119,8 +119,8 @@ class LimitExceededError(RefusedError):
         maximum: its value.
     """
 
-    def __init__(self, limit: str, maximum: float) -> None:
-        super().__init__(f"the limit {limit} is {maximum}")
+    def __init__(self, limit: str, maximum: float, of_what: str = "") -> None:
+        super().__init__(f"the limit {limit} is {maximum}{of_what and f': {of_what}'}")
         self.limit = limit
         self.maximum = maximum
 

@@ -15,7 +15,7 @@ from dynhull_proto.v1 import points_pb2
 from dynhull_server.engine import watch_many as module
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.positions import Position, decode_position
-from dynhull_server.engine.roster import Roster
+from dynhull_server.engine.roster import Roster, RosterLimits
 from dynhull_server.engine.rosters import Choice
 from dynhull_server.engine.watch_many import ManyPart, Picture, watch_many
 from dynhull_server.rpc.many import HullStates
@@ -23,6 +23,7 @@ from dynhull_server.rpc.many import HullStates
 ENCODING = points_pb2.POINT_ENCODING_PACKED
 FOR_EVER = 10**6  # rows of a read that runs beside the event loop
 NAMES = "fleet/busy", "fleet/other"
+NO_LIMITS = RosterLimits(10**9, 10**9)
 POINT = np.array([[1.0, 2.0]])
 
 
@@ -30,7 +31,7 @@ POINT = np.array([[1.0, 2.0]])
 def watched(engine: Engine) -> Iterator[Roster]:
     """The roster of those who watch the hulls."""
     states = HullStates(engine.hulls, engine.driver.aside, ENCODING, outline=False, most=0)
-    with engine.hulls.rosters.use("summaries", Choice("fleet/"), lambda: Roster(states)) as roster:
+    with engine.hulls.rosters.use("summaries", Choice("fleet/"), lambda: Roster(states, NO_LIMITS)) as roster:
         yield roster
 
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
 
-from ..callers import Caller, token_of
+from ..callers import Caller, address_of, token_of
 from ..problems import ProblemError
 from ..schemas import LARGEST, NAME, FencePath, HullPath, Prefix
 from . import documents
@@ -157,7 +157,10 @@ async def watch_many(
         detail = "max_vertices: only with outlines=true: without it no vertices are sent"
         raise ProblemError(400, detail, "INVALID_FIELD", field="max_vertices", value=str(max_vertices))
     _admit(request)
-    view = ManyView(token_of(request), prefix, tuple(sorted(set(name))), outlines, max_vertices, rate)
+    token, figures = token_of(request), request.app.state.figures
+    caller = address_of(request) if token is None else token
+    _admit_many(request, caller)
+    view = ManyView(token, prefix, tuple(sorted(set(name))), outlines, max_vertices, rate)
     with suppress(UnavailableError, DeadlineError):  # an answer of 503 would end an EventSource for good
         async with client.watch_many(**view.arguments(), timeout=PATIENCE_SECONDS) as allowed:
             await anext(allowed)  # whether these hulls may be read
@@ -165,7 +168,7 @@ async def watch_many(
     position = None if last_event_id is None else position_of(last_event_id)
     keepalive = state.settings.keepalive_seconds
     texts = state.shared.read(view, partial(ManyFeed, client, view), lambda feed: feed.read(position, keepalive))
-    return EventStream(texts, state.health, state.figures)
+    return EventStream(texts, state.health, figures, figures.many_stream(caller))
 
 
 @router.get("/fences/{name}/events", response_class=Described, responses=events(documents.OF_FENCE))
@@ -226,4 +229,14 @@ def _admit(request: Request) -> None:
     if state.health.draining.is_set():
         raise ProblemError(503, "the gateway stops", "DRAINING")
     if state.figures.open_streams >= state.settings.max_streams:
+        state.figures.refused_streams.labels("max_streams").inc()
         raise ProblemError(503, "too many streams of events", "STREAM_LIMIT", value=str(state.settings.max_streams))
+
+
+def _admit_many(request: Request, caller: str) -> None:
+    state = request.app.state
+    most = state.settings.max_many_streams_per_caller
+    if state.figures.many_streams[caller] >= most:
+        state.figures.refused_streams.labels("max_many_streams_per_caller").inc()
+        detail = f"the limit max_many_streams_per_caller is {most}: end streams of many hulls that this caller has"
+        raise ProblemError(429, detail, "STREAM_LIMIT", value=str(most))

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from contextlib import AbstractContextManager, nullcontext
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
@@ -22,20 +23,32 @@ class EventStream(Response):
         texts: events as text; closed with the stream.
         health: says when the gateway ends. Browsers then connect again, to the next gateway, and resume.
         figures: counts streams and events.
+        counted: a block within which the stream is open.
     """
 
     media_type = "text/event-stream"
 
-    def __init__(self, texts: AsyncIterator[bytes], health: State, figures: Figures) -> None:
+    def __init__(
+        self,
+        texts: AsyncIterator[bytes],
+        health: State,
+        figures: Figures,
+        counted: AbstractContextManager[None] | None = None,
+    ) -> None:
         super().__init__(headers=HEADERS)
         del self.headers["content-length"]
         self._texts = texts
         self._health = health
         self._figures = figures
+        self._counted = nullcontext() if counted is None else counted
         self._turn = asyncio.Lock()
 
     async def __call__(self, _: Scope, receive: Receive, send: Send) -> None:
         """Send until the first of: no more events, the reader has left, the gateway ends."""
+        with self._counted:
+            await self._until_an_end(receive, send)
+
+    async def _until_an_end(self, receive: Receive, send: Send) -> None:
         sending = asyncio.create_task(self._send(send))
         ends = [sending, asyncio.create_task(_left(receive)), asyncio.create_task(self._health.draining.wait())]
         self._figures.open_streams += 1
