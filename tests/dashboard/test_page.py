@@ -464,6 +464,49 @@ def test_the_picture_has_the_edges_of_a_hull_on_the_globe(
             assert inside.any()
 
 
+def test_all_hulls_of_a_prefix_are_picked(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    outlines = "prefix => picture.many.hulls.map(({name, corners}) => [name, corners.length]).sort()"
+    for part in "ab":
+        client.create_hull(f"{name}/{part}")
+        client.apply(f"{name}/{part}", insert=SQUARE)
+    with opened(browser, url, "") as page:
+        wait_for_hulls(page, f"{name}/*")
+        pick(page, f"{name}/")
+        page.wait_for_function(
+            f"expected => JSON.stringify(({outlines})()) == JSON.stringify(expected)",
+            arg=[[f"{name}/a", 4], [f"{name}/b", 4]],
+        )
+        assert f"prefix={name}" in page.url.replace("%2F", "/")
+        table = page.get_by_role("table").filter(has_text=f"{name}/*")
+        expect(table).to_contain_text("2 hulls, the last changed first")
+        client.create_hull(f"{name}/c")
+        client.apply(f"{name}/b", insert=[[9, 9], [1, 1]])
+        client.delete_hull(f"{name}/a")
+        client.apply(f"{name}/c", insert=[[7, 7], [9, 7], [8, 8]])
+        page.wait_for_function(
+            f"expected => JSON.stringify(({outlines})()) == JSON.stringify(expected)",
+            arg=[[f"{name}/b", 4], [f"{name}/c", 3]],
+        )
+        expect(table.get_by_role("rowheader").first).to_have_text(f"{name}/c")
+        page.mouse.move(*place_of(page, 9, 9))
+        expect(page.get_by_role("tooltip")).to_contain_text(f"a vertex of {name}/b")
+        page.reload()
+        expect(table).to_contain_text("2 hulls")
+        let_go(page, f"{name}/*")
+        page.wait_for_function("() => picture.many.hulls.length == 0")
+        expect(table).to_have_count(0)
+
+
+def test_a_prefix_without_hulls_says_so(browser: Browser, url: str, client: HullClient, name: str) -> None:
+    client.create_hull(f"{name}/a")
+    client.create_hull(f"{name}/b")
+    with opened(browser, url, name) as page:
+        expect(note(page)).to_contain_text(f"Others begin with that name: pick {name}/* above to see them all")
+        let_go(page, name)
+        pick(page, f"{name}-none/")
+        expect(note(page)).to_contain_text(f"No hull has a name that begins with {name}-none/ yet")
+
+
 def test_hulls_are_picked_and_let_go(browser: Browser, url: str, client: HullClient, hull: str) -> None:
     client.create_hull("shown")
     with opened(browser, url, "shown") as page:
@@ -644,7 +687,7 @@ def test_a_refused_token_is_named_as_the_cause(browser: Browser, tmp_path: Path)
 def test_a_name_that_no_hull_can_have(browser: Browser, url: str, name: str) -> None:
     with opened(browser, url, name) as page:
         expect(note(page)).to_contain_text(
-            f"The server has no hull {name}. Check the name, or pick another hull above."
+            f"The server has no hull {name}. Check the name, or pick another hull above. One that is made with this"
         )
 
 

@@ -14,6 +14,7 @@ from dynhull_client import (
 from .feed import HullFeed
 from .fence_feed import FenceFeed
 from .fence_list import FenceList
+from .many_feed import ManyFeed
 from .server_metrics import ServerMetrics
 from .server_state import ServerState
 
@@ -95,22 +96,36 @@ def about_fences(address: str, fences: FenceList, shown: bool) -> str:
     )
 
 
+def _in_place_of(name: str, server: ServerState) -> str:
+    """What to do where a hull is not there."""
+    prefix = name.rstrip("/") + "/"
+    if any(each.startswith(prefix) for each in server.hulls):
+        return f"Others begin with that name: pick {prefix}* above to see them all."
+    return "Check the name, or pick another hull above. One that is made with this name appears here by itself."
+
+
 def about_picture(
-    address: str, server: ServerState, feeds: Iterable[HullFeed], fences: Iterable[FenceFeed] = ()
+    address: str,
+    server: ServerState,
+    feeds: Iterable[HullFeed],
+    fences: Iterable[FenceFeed] = (),
+    many: Iterable[ManyFeed] = (),
 ) -> str:
     """For the picture: why it is empty, and what to do; empty where it is not, or where the banner says it."""
-    feeds, fences = list(feeds), list(fences)
-    if server.error is not None or not server.listed or any(feed.bounds for feed in feeds):
+    feeds, fences, many = list(feeds), list(fences), list(many)
+    if server.error is not None or not server.listed or any(feed.bounds for feed in feeds) or any(map(len, many)):
         return ""
     if any(fence.area.bounds for fence in fences):
         return ""
+    if nothing := [each.prefix for each in many if each.complete]:
+        return f"No hull has a name that begins with {nothing[0]} yet. Those that are made appear here by themselves."
     if not feeds and (unknown := [fence.name for fence in fences if isinstance(fence.trouble, UNKNOWN_FENCE)]):
         return f"The server has no fence {unknown[0]}. Check the name, or pick another fence above."
     if empty := [feed.name for feed in feeds if feed.trouble is None and feed.followed]:
         return f"{empty[0]} has no points yet. Add some: dynhull load {empty[0]} FILE.csv --address {address}"
     if missing := [feed.name for feed in feeds if isinstance(feed.trouble, HullNotFoundError | InvalidRequestError)]:
-        return f"The server has no hull {missing[0]}. Check the name, or pick another hull above."
-    if feeds:
+        return f"The server has no hull {missing[0]}. {_in_place_of(missing[0], server)}"
+    if feeds or many:
         return ""
     if server.hulls:
         return "Pick a hull above."

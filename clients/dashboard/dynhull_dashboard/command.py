@@ -42,8 +42,8 @@ def dashboard(
 ) -> None:
     """Show live hulls and fences in the browser.
 
-    The first line printed is "dynhull dashboard on http://HOST:PORT". Add ?hull=NAME or ?fence=NAME to open the page
-    with that hull or fence.
+    The first line printed is "dynhull dashboard on http://HOST:PORT". Add ?hull=NAME, ?fence=NAME or ?prefix=fleet/ to
+    open the page with that hull or fence, or with all hulls whose names begin with fleet/.
     Anyone who can reach the page can see what the token may read.
 
     dynhull dashboard --metrics http://127.0.0.1:9464/metrics  # with dynhull serve --metrics-port 9464

@@ -9,6 +9,7 @@ from .degrees import axes, position_text
 from .event_rows import shortened
 from .feed import HullFeed
 from .fence_feed import FenceFeed
+from .many_feed import ManyFeed
 from .search import Sighting, State
 
 SHAPES = {1: "a single point", 2: "a segment"}
@@ -32,9 +33,9 @@ EVENTS = {
 }
 
 
-def describe(hulls: Iterable[HullFeed], fences: Iterable[FenceFeed] = ()) -> str:
-    """One sentence for each hull, up to three for each fence."""
-    return " ".join([*(_sentence(feed) for feed in hulls), *(_fence(feed) for feed in fences)])
+def describe(hulls: Iterable[HullFeed], fences: Iterable[FenceFeed] = (), many: Iterable[ManyFeed] = ()) -> str:
+    """One sentence for each hull and each prefix, up to three for each fence."""
+    return " ".join([*map(_sentence, hulls), *map(_many, many), *map(_fence, fences)])
 
 
 def _sentence(feed: HullFeed) -> str:
@@ -48,6 +49,10 @@ def _sentence(feed: HullFeed) -> str:
         f"{feed.name}: {shape}{pole} around {feed.points:,} points, {x} from {left:.6g} to {right:.6g}, "
         f"{y} from {bottom:.6g} to {top:.6g}, at revision {feed.revision:,}."
     )
+
+
+def _many(feed: ManyFeed) -> str:
+    return f"{feed.prefix}*: the outlines of {len(feed):,} hulls."
 
 
 def _fence(feed: FenceFeed) -> str:

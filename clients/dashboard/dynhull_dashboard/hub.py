@@ -9,6 +9,7 @@ from .feed import HullFeed
 from .feeds import Feeds
 from .fence_feed import FenceFeed
 from .fence_list import FenceList
+from .many_feed import ManyFeed
 from .outliers import OutlierFeed
 from .server_metrics import ServerMetrics
 from .server_state import ServerState
@@ -29,6 +30,7 @@ class Hub:
         fence_list: the server's fences.
         hulls: the feeds of the hulls on view.
         fences: the feeds of the fences on view.
+        many: the feeds of all hulls of a prefix.
         outliers: the feeds of the outliers of hulls, for those viewers that look at them.
     """
 
@@ -42,11 +44,13 @@ class Hub:
         self.metrics = None if metrics_url is None else ServerMetrics(metrics_url)
         self.hulls = Feeds(partial(HullFeed, client))
         self.fences = Feeds(partial(FenceFeed, client))
+        self.many = Feeds(partial(ManyFeed, client))
         self.outliers = Feeds(partial(OutlierFeed, client, self.hulls, units.area))
 
     async def close(self) -> None:
         """Stop all background tasks."""
         await self.outliers.close()  # they use hulls
-        await asyncio.gather(self.server.close(), self.fence_list.close(), self.hulls.close(), self.fences.close())
+        feeds = self.hulls, self.fences, self.many
+        await asyncio.gather(self.server.close(), self.fence_list.close(), *(each.close() for each in feeds))
         if self.metrics is not None:
             await self.metrics.close()

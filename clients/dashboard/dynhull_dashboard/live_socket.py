@@ -17,8 +17,8 @@ log = logging.getLogger(__name__)
 class LiveSocket(WebSocketHandler):
     """Sends what is new on the page, and does what the page asks for.
 
-    The query names hulls, fences and a key, and may ask for outliers. Without `hull` or `fence` the dashboard chooses;
-    an empty one stands for none.
+    The query names hulls, fences, prefixes of hulls and a key, and may ask for outliers. Without `hull` or `fence` the
+    dashboard chooses; an empty one stands for none.
     """
 
     def initialize(self, hub: Hub, version: str) -> None:
@@ -36,9 +36,8 @@ class LiveSocket(WebSocketHandler):
         """The page has connected."""
         key = self.get_query_argument("key", "", strip=False)
         outliers = bool(self.get_query_argument("outliers", ""))
-        viewer = Viewer(
-            self._hub, self._names("hull"), self._names("fence"), key, outliers=outliers, version=self._version
-        )
+        picked = self._names("hull"), self._names("fence"), self._names("prefix") or []
+        viewer = Viewer(self._hub, *picked, key, outliers=outliers, version=self._version)
         self._viewer = viewer
         self._sending = asyncio.create_task(self._send(viewer))
 

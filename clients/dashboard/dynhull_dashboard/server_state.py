@@ -1,6 +1,7 @@
 """Whether the server answers, and its list of hulls."""
 
 import asyncio
+from collections import Counter
 
 from dynhull_client import AsyncHullClient, DynhullError, HullInfo
 
@@ -31,6 +32,11 @@ class ServerState:
     def largest(self) -> list[str]:
         """The hull with the most points, in a list; an empty list where there are no hulls."""
         return [hull.name for hull in sorted(self.hulls.values(), key=lambda hull: -hull.points)[:1]]
+
+    def prefixes(self) -> list[str]:
+        """What the names of several hulls begin with, up to one of their slashes."""
+        counts = Counter(each[: end + 1] for each in self.hulls for end, letter in enumerate(each) if letter == "/")
+        return sorted(prefix for prefix, count in counts.items() if count > 1)
 
     async def close(self) -> None:
         """Stop polling."""

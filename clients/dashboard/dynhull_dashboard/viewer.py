@@ -12,6 +12,8 @@ from .feed import HullFeed
 from .fence_picks import FencePicks
 from .hub import Hub
 from .looks import LOOKS, Look
+from .many_cards import many_table
+from .many_picks import ManyPicks
 
 if TYPE_CHECKING:
     from .outliers import OutlierFeed
@@ -36,6 +38,7 @@ class Viewer:
         hub: the source of the hulls.
         hulls: the hulls to begin with; None for those of the fences, or the largest one.
         fences: the fences to begin with; None for the first ones of these hulls.
+        prefixes: the prefixes to begin with, all of whose hulls are shown.
         sought: the key to look for to begin with; empty for none.
         outliers: whether to begin with the outliers of the hulls.
         version: names the version of the page's scripts, which a page of another version loads.
@@ -46,6 +49,7 @@ class Viewer:
         hub: Hub,
         hulls: list[str] | None,
         fences: list[str] | None,
+        prefixes: Iterable[str] = (),
         sought: str = "",
         *,
         outliers: bool = False,
@@ -61,12 +65,15 @@ class Viewer:
         self._properties: dict[str, Any] = {}
         self._drawn: dict[tuple[str, str], str] = {}
         self._rows: dict[str, tuple[object, int]] = {}  # of each history, how many rows have been sent
-        self._untouched = hulls is None and not fences
+        self._untouched = hulls is None and not fences and not prefixes
+        self._many = ManyPicks(hub)
+        self._many.show(prefixes, ())
         self._fences = FencePicks(hub, fences)
         self._show(hub.server.largest() if self._untouched else hulls or ())
         self._takes: Mapping[str, tuple[Callable[[object], bool], Callable[[Any], None]]] = {
             "hulls": (_are_names, self._pick_hulls),
             "fences": (_are_names, self._pick_fences),
+            "prefixes": (_are_names, self._pick_prefixes),
             "sought": (_is_text, self._seek),
             "outliers": (_is_choice, self._choose_outliers),
             "verify": (_is_text, self._verify),
@@ -75,10 +82,11 @@ class Viewer:
     def close(self) -> None:
         """Let go of all feeds."""
         self._show(())
+        self._many.show((), ())
         self._fences.close()
 
     def take(self, message: str) -> None:
-        """Do what the page asks for: a JSON object with one or more of hulls, fences, sought, outliers, verify.
+        """Do what the page asks for: a JSON object with one or more of the names of `_takes`.
 
         Raises:
             ValueError: if it is none; then nothing is changed.
@@ -109,6 +117,7 @@ class Viewer:
             if self._drawn.get(name) is not message:
                 self._drawn[name] = message
                 found.append(message)
+        found += self._many.messages()
         return found
 
     def _page(self, properties: Mapping[str, Any]) -> Iterator[str]:
@@ -151,6 +160,11 @@ class Viewer:
         self._fences.show(names)
         self._forget(self._shown.keys() | set(self._fences.names))
 
+    def _pick_prefixes(self, prefixes: list[str]) -> None:
+        self._untouched = False
+        self._many.show(prefixes, (shown.look for shown in self._shown.values()))
+        self._show(self._shown.keys())
+
     def _seek(self, key: str) -> None:
         self._sought = key
 
@@ -171,13 +185,13 @@ class Viewer:
             shown.feed.verify_now()
 
     def _show(self, picked: Iterable[str]) -> None:
-        names = list(dict.fromkeys(picked))[: len(LOOKS)]
+        names = list(dict.fromkeys(picked))[: len(LOOKS) - len(self._many.looks)]
         for name in self._shown.keys() - set(names):
             del self._shown[name]
             self._hub.hulls.release(name)
         for name in names:
             if name not in self._shown:
-                taken = [shown.look for shown in self._shown.values()]
+                taken = [*(shown.look for shown in self._shown.values()), *self._many.looks.values()]
                 look = next(look for look in LOOKS if look not in taken)
                 self._shown[name] = Shown(self._hub.hulls.open(name), look)
         self._show_outliers()
@@ -212,24 +226,27 @@ class Viewer:
         return {
             "hulls": [_look(name, shown.look) for name, shown in self._shown.items()],
             "fences": [_look(name, look) for name, look in self._fences.looks.items()],
+            "prefixes": [_look(prefix, look) for prefix, look in self._many.looks.items()],
         }
 
     def _text(self) -> dict[str, Any]:
         """The words and the figures."""
         server, fences = self._hub.server, self._hub.fence_list
         feeds = [shown.feed for shown in self._shown.values()]
+        many = [feed for feed, _ in self._many.feeds]
         connected = server.error is None
         rows = ((shown.feed, shown.look) for shown in self._shown.values())
         return {
-            "offered": sorted(server.hulls),
+            "offered": [*(f"{prefix}*" for prefix in server.prefixes()), *sorted(server.hulls)],
             "offered_fences": sorted(fences.fences),
             "banner": about_server(self._hub.address, server.error)
             if server.error
             else about_metrics(self._hub.metrics),
-            "note": about_picture(self._hub.address, server, feeds, self._fences.feeds),
+            "note": about_picture(self._hub.address, server, feeds, self._fences.feeds, many),
             "outliers": [self._outliers[name].words for name in self._shown if name in self._outliers],
             "fence_hint": about_fences(self._hub.address, fences, shown=bool(self._fences.names)),
-            "description": describe(feeds, self._fences.feeds),
+            "description": describe(feeds, self._fences.feeds, many),
+            "many_table": many_table(self._many.feeds, connected=connected, area_unit=self._hub.units.area),
             "table": table(rows, connected=connected, area_unit=self._hub.units.area),
             "fence_table": self._fences.table(self._shown, connected=connected),
         }

@@ -25,6 +25,7 @@ SCRIPTS = (
     "tiles.js",
     "boxes.js",
     "hulls.js",
+    "many.js",
     "fences.js",
     "labels.js",
     "trails.js",

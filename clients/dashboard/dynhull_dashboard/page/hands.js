@@ -80,7 +80,7 @@ class Hands {
     this.tip.style.top = `${Math.max(0, down + 14 + offsetHeight > height ? down - 14 - offsetHeight : down + 14)}px`
   }
   nearest(across, down) {
-    const {view, hulls, fences} = this.picture
+    const {view, hulls, fences, many} = this.picture
     let best, least = NEAR
     const look = (place, thing, advantage) => {
       const [right, low] = view.place(...place), away = Math.hypot(right - across, low - down) - advantage
@@ -90,6 +90,8 @@ class Hands {
       for (const [{keys, x, y, revision}, words, advantage] of [[points, `a point of ${name}`, 0], [vertices, `a vertex of ${name}`, 4]])
         for (let row = 0; row < x.length; row++)
           look([x[row], y[row]], {title: keys ? `${keys[row]}: ${words}` : words, revision}, advantage)
+    for (const {name, corners, vertices: {revision}} of many.hulls)
+      for (const place of corners) look(place, {title: `a vertex of ${name}`, revision}, 0)
     for (const fence of fences.values())
       for (const {key, place} of fence.marks(hulls)) look(place, {title: `${key}: inside ${fence.name}`}, 5)
     return best

@@ -4,9 +4,9 @@ const write = (selector, text) => { if (find(selector).textContent != text) find
 const MOST_OFFERED = 20, RETRY_MILLISECONDS = 1000
 const SILENCE = "The dashboard does not answer. Check that dynhull dashboard still runs. The page shows what it last "
   + "received, and reconnects by itself."
-const SAID = ["description", "table", "fence_table", "outliers"], PAGE = ""
+const SAID = ["description", "table", "many_table", "fence_table", "outliers"], PAGE = "", ALL_OF = "*"
 const settings = find(".page").dataset
-const state = {hulls: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], outliers: [],
+const state = {hulls: [], prefixes: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], outliers: [],
   places: []}
 const is_dark = matchMedia("(prefers-color-scheme: dark)"), on_dark = JSON.parse(settings.onDark)
 const lit = colour => is_dark.matches ? on_dark[colour] ?? colour : colour
@@ -56,7 +56,10 @@ function take(message, text) {
   }
   if (message.kind == "lines") return time_lines.take(message)
   if (message.kind == "vertices" || message.kind == "points") picture.trails.take(message, Date.now())
-  recorder.take(message, text)
+  if (message.kind == "many") {
+    const known = picture.many.prefixes.get(message.prefix)?.hulls.keys() ?? []
+    for (const outline of told_apart(message, known)) record(outline)
+  } else recorder.take(message, text)
 }
 // What the page says of the moment that it shows.
 function record(message) {
@@ -65,7 +68,7 @@ function record(message) {
 function show_said({name, said}) {
   if (name == "description") write("#description", said)
   else if (name == "outliers") show_lines(".outliers", said)
-  else find({table: ".of_hulls", fence_table: ".of_fences"}[name]).innerHTML = said  // the server has escaped the names
+  else find({table: ".of_hulls", many_table: ".of_many", fence_table: ".of_fences"}[name]).innerHTML = said  // the server has escaped the names
 }
 function show_found() {
   const found = recorder.live ? state.found : state.sought ? picture.found_words() : []
@@ -82,12 +85,13 @@ function show_drawing(message) {
 function update({kind: _, ...changes}) {
   if (changes.version && changes.version != settings.version) return location.reload()
   Object.assign(state, changes)
-  if (changes.hulls || changes.fences) {
+  if (changes.hulls || changes.fences || changes.prefixes) {
     const hulls = state.hulls.map(({name}) => name), fences = state.fences.map(({name}) => name)
     show_looks()
-    recorder.keep([PAGE, ...hulls, ...fences])
+    recorder.keep([PAGE, ...hulls, ...fences, ...state.prefixes.map(({name}) => name)])
     events.keep(fences)
     find(".page").classList.toggle("fenced", fences.length > 0)
+    find(".page").classList.toggle("overview", state.prefixes.length > 0 && !hulls.length)
     for (const picker of pickers) picker.show()
   }
   for (const picker of pickers) if (changes[picker.offered]) picker.offer()
@@ -104,8 +108,8 @@ function update({kind: _, ...changes}) {
 }
 // The colours are those of the page, which may become dark.
 function show_looks() {
-  const [hulls, fences] = [state.hulls, state.fences].map(looks => looks.map(look => ({...look, colour: lit(look.colour)})))
-  picture.keep(hulls, fences)
+  const [hulls, fences, prefixes] = [state.hulls, state.fences, state.prefixes].map(looks => looks.map(look => ({...look, colour: lit(look.colour)})))
+  picture.keep(hulls, fences, prefixes)
   time_lines.keep(hulls)
   time_lines.server_colour = lit(settings.neutral)
 }
@@ -122,22 +126,27 @@ function chip({name, key}, remove) {
   return item
 }
 // What is meant by some letters: the name itself, else the first name of which a part begins with them, else the first that
-// has them; without any, a name that does not exist yet.
-function best_match(letters, names) {
+// has them; without any, a name that does not exist yet. All hulls of a prefix are meant by one that ends with a slash.
+function best_match(letters, offered) {
+  const prefixed = /[/*]$/.test(letters), names = offered.filter(name => prefixed || !name.endsWith(ALL_OF))
   const begins = name => name.startsWith(letters) || /[._/-]/.test(name) && name.split(/[._/-]/).some(part => part.startsWith(letters))
-  return [name => name == letters, begins, name => name.includes(letters)].map(fits => letters && names.find(fits)).find(name => name) ?? letters
+  return [name => name == letters, begins, name => name.includes(letters)].map(fits => letters && names.find(fits)).find(name => name) ?? (letters.endsWith("/") ? letters + ALL_OF : letters)
 }
-// The chips and the field of a picker. `picked` is what it shows and changes, of the state of the page.
+// The chips and the field of a picker. `picked` is what it shows and changes, of the state of the page, by the noun that it
+// has in the address. Of several the last has prefixes, which are shown with an asterisk.
 class Picker {
   constructor({form, noun, most, offered, picked}) {
-    Object.assign(this, {form: find(form), noun, most, offered, picked})
+    Object.assign(this, {form: find(form), noun, most, offered, picked: Object.entries(picked)})
     this.field = find(`${form} [list]`)
     this.field.addEventListener("change", () => state[offered].includes(this.field.value) && this.add())
     this.form.addEventListener("submit", event => { event.preventDefault(); this.add() })
     this.show()
   }
   get names() {
-    return state[this.picked].map(({name}) => name)
+    return this.looks.map(({name}) => name)
+  }
+  get looks() {
+    return this.picked.flatMap(([, names], row) => row ? state[names].map(look => ({...look, name: look.name + ALL_OF})) : state[names])
   }
   add() {
     const name = best_match(this.field.value, state[this.offered])
@@ -145,13 +154,14 @@ class Picker {
     this.field.value = ""
   }
   pick(names) {
-    ask({[this.picked]: names})
-    keep_in_address(this.noun, names.length ? names : [""])
+    const [one, many] = [names.filter(name => !name.endsWith(ALL_OF)), names.filter(name => name.endsWith(ALL_OF)).map(name => name.slice(0, -1))]
+    ask(Object.fromEntries(this.picked.map(([, asked], row) => [asked, row ? many : one])))
+    this.picked.forEach(([noun], row) => keep_in_address(noun, row ? many : one.length ? one : [""]))
   }
   show() {
     const full = this.names.length >= this.most
     const remove = removed => this.pick(this.names.filter(name => name != removed))
-    this.form.querySelector("ul").replaceChildren(...state[this.picked].map(each => chip(each, remove)))
+    this.form.querySelector("ul").replaceChildren(...this.looks.map(each => chip(each, remove)))
     this.field.disabled = full
     this.field.placeholder = full ? `Remove a ${this.noun} to pick another` : `Pick ${this.noun}s`
   }
@@ -160,8 +170,8 @@ class Picker {
   }
 }
 const pickers = [
-  new Picker({form: ".hulls", noun: "hull", most: settings.mostHulls, offered: "offered", picked: "hulls"}),
-  new Picker({form: ".fences", noun: "fence", most: settings.mostFences, offered: "offered_fences", picked: "fences"}),
+  new Picker({form: ".hulls", noun: "hull", most: settings.mostHulls, offered: "offered", picked: {hull: "hulls", prefix: "prefixes"}}),
+  new Picker({form: ".fences", noun: "fence", most: settings.mostFences, offered: "offered_fences", picked: {fence: "fences"}}),
 ]
 const finder = find(".finder input")
 function seek(key) {

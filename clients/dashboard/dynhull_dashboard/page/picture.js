@@ -1,6 +1,6 @@
 // The picture: two canvases, one for the ground (coasts or axes), one for what moves, and the order in which things are
 // drawn. A new layer is a function of the canvas and the picture, in its place in LAYERS.
-const LAYERS = [draw_fences, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
+const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
   draw_rings]
 const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
 const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
@@ -20,6 +20,7 @@ class Picture {
     this.on_globe = new GlobeView()
     this.view = this.plane
     this.hulls = new Map()
+    this.many = new Many()
     this.fences = new Map()
     this.labels = new Labels()
     this.trails = new Trails()
@@ -58,7 +59,8 @@ class Picture {
     this.draw()  // at once: an empty canvas would be seen
   }
   // What is on the page: names and looks.
-  keep(hulls, fences) {
+  keep(hulls, fences, prefixes) {
+    this.many.keep(prefixes)
     for (const [known, looks, Kind] of [[this.hulls, hulls, Hull], [this.fences, fences, Fence]]) {
       const names = looks.map(({name}) => name)
       for (const name of known.keys()) if (!names.includes(name)) known.delete(name)
@@ -72,8 +74,9 @@ class Picture {
     this.on_globe.refit()
     this.draw_soon()
   }
-  // A drawing of a hull or of a fence.
+  // A drawing of a hull or of a fence, or the outline of one of many hulls.
   take(message) {
+    if (message.within != undefined) this.many.take(message)
     const drawn = message.hull != undefined && !message.fence ? this.hulls.get(message.hull) : this.fences.get(message.fence)
     drawn?.take(message)
     this.draw_soon()
@@ -121,7 +124,7 @@ class Picture {
     this.draw_all()
   }
   choose_view() {
-    const hulls = [...this.hulls.values()].filter(hull => hull.vertices.x.length)
+    const hulls = [...this.hulls.values(), ...this.many.hulls].filter(hull => hull.vertices.x.length)
     const areas = [...this.fences.values()].filter(fence => fence.area.polygons.length)
     const globe = [...hulls.map(hull => hull.globe), ...areas.map(fence => fence.area.globe)]
     const view = globe.length && globe.every(each => each) ? this.on_globe : this.plane
@@ -139,7 +142,7 @@ class Picture {
       this.ground_drawn = false
     }
     if (!this.following) return
-    const points = hulls.flatMap(hull => view.globe ? hull.corners : hull.polygons(view).flat(2))
+    const points = hulls.flatMap(hull => hull.extremes ?? (view.globe ? hull.corners : hull.polygons(view).flat(2)))
     for (const fence of this.fences.values())
       points.push(...(fence.area.globe || !view.globe ? fence.area.polygons.flat(2) : []), ...fence.margins(view, this.hulls).flat(2))
     const before = this.where()
@@ -254,7 +257,7 @@ class Picture {
       canvas.fillText(compact(tick), left - 5, down + 4)
     }
     canvas.stroke()
-    const degrees = [...this.hulls.values()].some(hull => hull.globe)
+    const degrees = [...this.hulls.values(), ...this.many.hulls].some(hull => hull.globe)
     const name = (axis, unit) => degrees ? "" : unit ? `${axis} (${unit})` : axis
     canvas.textAlign = "center"
     canvas.fillText(name("x", this.units.x), left + wide / 2, height - 6)

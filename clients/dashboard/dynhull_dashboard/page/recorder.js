@@ -24,8 +24,9 @@ class Recorder {
     return Math.max(this.began, Date.now() - RECORDED_MILLISECONDS)
   }
   take(message, text) {
-    const name = `${message.kind} of ${message.fence ?? message.hull}`, now = Date.now()
-    const track = this.tracks.get(name) ?? {name, moments: [], texts: [], subject: message.fence ?? message.hull}
+    const subject = message.within ?? message.fence ?? message.hull, now = Date.now()
+    const name = `${message.kind} of ${subject}${message.within == undefined ? "" : ` ${message.hull}`}`
+    const track = this.tracks.get(name) ?? {name, moments: [], texts: [], subject}
     this.tracks.set(name, track)
     track.moments.push(now)
     track.texts.push(text)

@@ -13,9 +13,9 @@ function save_picture(picture, moment) {
   context.drawImage(picture.canvases[1], 0, 0)
   canvas.toBlob(content => download(content, `dynhull ${moment}.png`))
 }
-function save_shapes({hulls, fences}, moment) {
+function save_shapes({hulls, many, fences}, moment) {
   const features = [
-    ...[...hulls.values()].map(({name, vertices, corners, globe}) =>
+    ...[...hulls.values(), ...many.hulls].map(({name, vertices, corners, globe}) =>
       feature({hull: name, revision: vertices.revision}, globe ? vertices.rings.map(ring => [ring]) : corners?.length ? [[corners]] : [])),
     // Rings that are wound for the globe of the picture are the other way round.
     ...[...fences.values()].map(({name, area: {polygons, globe}}) =>
@@ -34,8 +34,8 @@ function feature(properties, polygons) {
 function closed(ring) {
   return [...ring, ring[0]]
 }
-function save_vertices({hulls, view}, moment) {
-  const rows = [...hulls.values()].flatMap(({name, vertices: {revision, keys, x, y}}) =>
+function save_vertices({hulls, many, view}, moment) {
+  const rows = [...hulls.values(), ...many.hulls].flatMap(({name, vertices: {revision, keys, x, y}}) =>
     x.map((each, row) => [name, revision, keys?.[row] ?? "", each, y[row]]))
   const lines = [["hull", "revision", "key", ...view.globe ? ["longitude", "latitude"] : ["x", "y"]], ...rows]
   save_text(lines.map(cells => cells.map(quoted).join() + "\r\n").join(""), "text/csv", `dynhull ${moment}.csv`)

@@ -1,0 +1,67 @@
+// All hulls of some prefixes: outlines alone, each prefix in one colour.
+const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, LEAST_PIXELS = 3
+// What is drawn of one of many hulls, with the extreme corners alone for the extent of the picture.
+class Outline extends Hull {
+  take(message) {
+    super.take({...message, kind: "vertices"})
+    const [left, low, right, high] = box_around(this.corners)
+    this.box = [left, low, right, high]
+    this.straight = Math.max(right - left, high - low) < STRAIGHT_DEGREES
+  }
+  get extremes() {
+    const [left, low, right, high] = this.box
+    return [[left, low], [right, low], [right, high], [left, high]]
+  }
+  // Adds it to a path: as a small box where its corners cannot be told apart.
+  trace(canvas, view) {
+    const places = this.extremes.map(place => view.place(...place)), [across, down] = places[0]
+    const size = Math.max(Math.abs(places[2][0] - across), Math.abs(places[2][1] - down))
+    if (size < LEAST_PIXELS) canvas.rect(across - LEAST_PIXELS / 2, down - LEAST_PIXELS / 2, LEAST_PIXELS, LEAST_PIXELS)
+    else if (view.globe && this.straight) {
+      this.corners.forEach(([x, y], row) => row ? canvas.lineTo(...view.place(x, y)) : canvas.moveTo(...view.place(x, y)))
+      canvas.closePath()
+    } else for (const rings of this.polygons(view)) view.polygon(canvas, rings)
+  }
+}
+class Many {
+  constructor() {
+    this.prefixes = new Map()  // the look of each, and its hulls by name
+  }
+  keep(looks) {
+    for (const prefix of this.prefixes.keys()) if (!looks.some(({name}) => name == prefix)) this.prefixes.delete(prefix)
+    for (const look of looks) {
+      const known = this.prefixes.get(look.name) ?? {hulls: new Map()}
+      known.look = look
+      for (const hull of known.hulls.values()) hull.look = look
+      this.prefixes.set(look.name, known)
+    }
+  }
+  take({within, gone, ...message}) {
+    const known = this.prefixes.get(within)
+    if (!known) return
+    if (gone || !message.x.length) return void known.hulls.delete(message.hull)
+    if (!known.hulls.has(message.hull)) known.hulls.set(message.hull, new Outline(message.hull, known.look))
+    known.hulls.get(message.hull).take(message)
+  }
+  get hulls() {
+    return [...this.prefixes.values()].flatMap(({hulls}) => [...hulls.values()])
+  }
+}
+function draw_many(canvas, {view, many}) {
+  for (const {look, hulls} of many.prefixes.values()) {
+    canvas.beginPath()
+    for (const hull of hulls.values()) hull.trace(canvas, view)
+    canvas.fillStyle = canvas.strokeStyle = look.colour
+    canvas.globalAlpha = MANY_ALPHA
+    canvas.fill()
+    canvas.globalAlpha = 1
+    canvas.lineWidth = 1
+    canvas.stroke()
+  }
+}
+// What a message about many hulls says of each, as messages that are kept one by one; `known` are those there were.
+function* told_apart({prefix, whole, hulls}, known) {
+  const names = new Set(hulls.map(({hull}) => hull))
+  for (const hull of whole ? known : []) if (!names.has(hull)) yield {kind: "outline", within: prefix, hull, revision: 0, x: [], y: [], rings: null, gone: true}
+  for (const each of hulls) yield {kind: "outline", within: prefix, ...each}
+}
