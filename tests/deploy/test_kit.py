@@ -33,7 +33,7 @@ def expressions() -> list[str]:
     """Of the Grafana dashboard, with its variables filled in."""
     panels = json.loads((KIT / "grafana/dynhull.json").read_text())["panels"]
     found = [target["expr"] for panel in panels for target in panel.get("targets", [])]
-    return [each.replace("$__rate_interval", "5m").replace("$instance", ".*") for each in found]
+    return [each.replace("$__rate_interval", "5m").replace("$instance", ".*").replace("$hull", ".*") for each in found]
 
 
 def test_prometheus_takes_the_configuration() -> None:
@@ -52,7 +52,7 @@ def test_prometheus_understands_the_grafana_dashboard(tmp_path: Path) -> None:
 
 
 def test_what_is_asked_for_is_there(tmp_path: Path) -> None:
-    with measured() as (server, address), HullClient(server.address) as client:
+    with measured("--metrics-prefix", "") as (server, address), HullClient(server.address) as client:
         client.create_hull("a")
         client.apply("a", insert=[[0, 0]])
         with client.watch("a") as watch:
