@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 from patience import until
 
-from dynhull_client import AsyncHullClient, Circle, Fence, FenceEvent, Polygon
+from dynhull_client import AsyncHullClient, Circle, Fence, FenceEvent, HullClient, Polygon, Series
 from dynhull_dashboard.advice import about_fences
 from dynhull_dashboard.event_rows import MOST_EVENTS, EventRows
+from dynhull_dashboard.feed import HullFeed
 from dynhull_dashboard.fence_drawing import area_of
 from dynhull_dashboard.fence_list import FenceList
 from dynhull_dashboard.history import ROWS, History
 from dynhull_dashboard.outline import MOST_DRAWN, drawn
+from dynhull_dashboard.past import past_rows
 from dynhull_dashboard.repeating import pause_after
 from dynhull_dashboard.server_metrics import Scrape
 from dynhull_dashboard.units import Units
@@ -54,9 +56,46 @@ def test_a_history_keeps_the_latest_rows() -> None:
     history = History("time", "points")
     for row in range(ROWS + 10):
         history.append(row, -row)
-    assert history.since(0)["time"] == list(range(10, ROWS + 10))
+    assert history.since(0)["time"] == [0, *range(10, ROWS + 10)]  # of what is older, a row every ten seconds
     assert history.since(ROWS + 8) == {"time": [ROWS + 8, ROWS + 9], "points": [-ROWS - 8, -ROWS - 9]}
     assert history.since(ROWS + 10)["time"] == []
+
+
+def test_time_lines_begin_with_what_the_server_has_kept() -> None:
+    """A line is level where the hull was unchanged."""
+    minutes = np.array([0, 1, 21], "datetime64[m]").astype("datetime64[us]")
+    floats = np.array([1e6, 2e6, 3e6])
+    since = datetime(1970, 1, 1, 0, 0, 50, tzinfo=UTC)
+    sizes = np.array([3, 4, 5], np.uint64), np.array([3, 4, 4], np.uint32)
+    kept = Series("u", True, since, 60.0, minutes, minutes, np.array([1, 4, 10], np.uint64), *sizes, *4 * [floats])
+    first, *rows = past_rows(kept)
+    assert first[:4] == (50_000, 3, 3, 1)
+    assert rows == [(60_000, 4, 4, 2, 0.05), (1_200_000, 4, 4, 2, 0), (1_260_000, 5, 4, 3, 0.1)]
+    history = History("time", "points", "vertices", "area", "rate")
+    history.begin(past_rows(kept))
+    assert history.since(0)["time"] == []
+    history.append(1_261_000, 5, 4, 3, 0)
+    assert history.since(0)["time"] == [50_000, 60_000, 1_200_000, 1_260_000, 1_261_000]
+    assert history.since(1)["time"] == []
+
+
+def test_a_feed_has_a_past(address: str, name: str) -> None:
+    with HullClient(address) as client:
+        client.create_hull(name)
+        client.apply(name, insert=[[0, 0], [4, 0], [0, 4]])
+
+    async def shown() -> None:
+        async with AsyncHullClient(address) as client:
+            feed = HullFeed(client, name)
+            try:
+                await until(lambda: feed.history.length)
+                lines = feed.history.since(0)
+                assert len(lines["time"]) > feed.history.length
+                assert (lines["points"][0], lines["area"][0]) == (3, 8)
+            finally:
+                await feed.close()
+
+    asyncio.run(shown())
 
 
 def test_what_the_server_counts_as_rates() -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import math
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ from .degrees import SQUARE_KILOMETRE, Center, outline, poles, shown
 from .drawing import Drawing
 from .history import History
 from .outline import Box, apart, box_around, drawn
+from .past import LONGEST_SECONDS, past_rows
 from .repeating import repeat
 from .search import KeySearch
 
@@ -36,6 +38,8 @@ SAMPLE_SIZE = 2_000
 FEW_POINTS_SECONDS, MANY_POINTS_SECONDS = 0.1, 2.0
 SEARCH_SECONDS = 0.2
 VERIFY_SECONDS = 30.0
+# Seconds to wait for what the server has kept, before the time lines begin without it.
+PAST_SECONDS = 2.0
 
 NO_POINTS = HullCopy().vertices
 
@@ -63,7 +67,7 @@ class HullFeed:
         poles: the poles in it, such as "south".
         verified: the last verification; None before the first.
         rate: batches per second, over the last second.
-        history: one row per second.
+        history: one row per second, after those of the last hour that the server has kept.
         keyed: whether the points have keys; True until that is known.
         search: finds keys in the hull.
     """
@@ -177,7 +181,10 @@ class HullFeed:
         return self.area if self.center is None else self.area / SQUARE_KILOMETRE
 
     async def _count(self) -> None:
-        """Add a row to the history every second."""
+        """Begin the history with what the server has kept, then add a row every second."""
+        with suppress(DynhullError):  # the server is away or of an earlier version, or the hull is not there
+            series = await self._client.series(self.name, LONGEST_SECONDS, timeout=PAST_SECONDS)
+            self.history.begin(past_rows(series))
         before, then = self.revision, time.monotonic()
         while True:
             await asyncio.sleep(TICK_SECONDS)
