@@ -41,9 +41,7 @@ class RosterLimits:
     def require_hulls(self, number: int) -> None:
         """Raise LimitExceededError if these are too many hulls."""
         if number > self.hulls:
-            raise LimitExceededError(
-                "max_watched_hulls", self.hulls, "watch fewer hulls, as by a longer prefix"
-            )
+            raise LimitExceededError("max_watched_hulls", self.hulls, "watch fewer hulls, as by a longer prefix")
 
     def require_size(self, size: int) -> None:
         """Raise LimitExceededError if these are too many bytes."""
