@@ -30,7 +30,7 @@ POINT = np.array([[1.0, 2.0]])
 @contextmanager
 def watched(engine: Engine) -> Iterator[Roster]:
     """The roster of those who watch the hulls."""
-    states = HullStates(engine.hulls, engine.driver.aside, ENCODING, outline=False, most=0)
+    states = HullStates(engine.hulls, ENCODING, outline=False, most=0)
     with engine.hulls.rosters.use("summaries", Choice("fleet/"), lambda: Roster(states, NO_LIMITS)) as roster:
         yield roster
 
