@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from cases import with_all_cases
 from cluster import processes
+from command_line import dynhull
 from one_gateway import entries
 from patience import wait_until
+from postgresql import PostgreSQL, query
 from server_process import Server, server_process
 
 from dynhull_client import HullClient, HullCopies, ManyWatch, PermissionDeniedError, UnauthenticatedError
@@ -73,6 +75,57 @@ def test_kills(server: Server, rounds: int) -> None:
                 client.create_hull(again)
             while held(copies) != present(client):
                 follow(watch, revisions, "position")
+
+
+@with_all_cases
+@pytest.mark.timeout(900)
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_moves_between_machines(postgres: PostgreSQL) -> None:
+    """Partitions move to and fro while their hulls change, are deleted and made again, and workers are killed."""
+    random = np.random.default_rng(6)
+    names = [f"{part}/{number}" for part in ("north", "fleet", "depot", "port") for number in range(3)]
+    copies, revisions = HullCopies(), dict[str, tuple[str, int]]()
+    url = postgres.new_database()
+    options = ("--cluster", "--partitions", "2", "--journal", url, "--scrub-cpu", "0", "--log-level", "error")
+    with (
+        server_process(*options, complaints=None) as server,
+        server_process(*options, complaints=None) as other,
+        HullClient(server.address, retries=1000) as client,
+    ):
+        for name in names:
+            client.create_hull(name)
+        wait_until(lambda: len(query(url, "SELECT worker FROM workers")) == 2)
+        with client.watch_many(copies=copies) as watch:
+            follow(watch, revisions, "complete")
+            for turn in range(60):
+                partition = turn % 2
+                for name in random.permutation(names)[:6]:
+                    client.apply(name, insert=random.normal(size=(3, 2)), producer=f"test-{turn}", sequence=1)
+                if turn % 6 == 5:
+                    killed = processes((server, other)[turn % 4 // 2].process.pid)["worker-0"]
+                    os.kill(killed, signal.SIGKILL)
+                target = moved(url, partition)
+                wait_until(lambda partition=partition, target=target: owner(url, partition) == target)
+                again = names[turn % len(names)]
+                client.delete_hull(again)
+                client.create_hull(again)
+                follow(watch, revisions, "position")
+            while held(copies) != present(client):
+                follow(watch, revisions, "position")
+
+
+def owner(url: str, partition: int) -> str | None:
+    """The worker that serves a partition."""
+    served = "SELECT worker FROM owners WHERE until > '-infinity' AND address <> '' AND partition = "
+    return next((worker for (worker,) in query(url, served + str(partition))), None)
+
+
+def moved(url: str, partition: int) -> str:
+    """Have a partition served by another worker; its name."""
+    wait_until(lambda: owner(url, partition) is not None and len(query(url, "SELECT worker FROM workers")) > 1)
+    target = next(worker for (worker,) in query(url, "SELECT worker FROM workers") if worker != owner(url, partition))
+    assert dynhull("cluster", "move", partition, target, "--journal", url).exit_code == 0
+    return target
 
 
 def test_rights_of_prefixes_and_tokens_that_go(tmp_path: Path) -> None:
