@@ -6,7 +6,7 @@ slow client therefore gets newer states, and memory does not grow.
 
 import asyncio
 from collections.abc import AsyncGenerator
-from contextlib import aclosing, suppress
+from contextlib import aclosing
 from dataclasses import dataclass
 from enum import Enum, auto
 
@@ -51,39 +51,37 @@ async def watch_many(roster: Roster, position: Position | None, interval: float)
     Raises:
         LimitExceededError: there are too many hulls, or their states are too large.
     """
-    loop = asyncio.get_running_loop()
     with roster.following() as key:
         while True:
-            follower = _Follower(roster)
-            async with aclosing(follower.picture(position)) as parts:
+            async with aclosing(_until_anew(roster, key, position, interval)) as parts:
                 async for part in parts:
                     yield part
-            unpictured, complete = follower.late.copy(), False
-            marked_at, slot = loop.time(), -1
-            while not follower.begins_anew:
-                if not complete and unpictured.isdisjoint(follower.late):
-                    complete, marked_at = True, loop.time()
-                    yield ManyPart(picture=Picture.COMPLETE, position=follower.position())
-                roster.heard(key, follower.version)
-                due = False
-                with suppress(TimeoutError):
-                    async with asyncio.timeout_at(marked_at + MARK_SECONDS):
-                        await roster.beyond(follower.version, follower.generation)
-                        # Once in each slot of time: those who are equally far share what they get.
-                        await asyncio.sleep((slot + 1) * interval - loop.time())
-                        due = True
-                if follower.begins_anew:
-                    break
-                if due:
-                    slot = int(loop.time() // interval)
-                    async with aclosing(follower.changes()) as parts:
-                        async for part in parts:
-                            yield part
-                if loop.time() >= marked_at + MARK_SECONDS:
-                    marked_at = loop.time()
-                    if complete:
-                        yield ManyPart(position=follower.position())
             position = NOWHERE
+
+
+async def _until_anew(
+    roster: Roster, key: object, position: Position | None, interval: float
+) -> AsyncGenerator[ManyPart, None]:
+    """A picture and what changes after it, until all is to be pictured anew."""
+    loop = asyncio.get_running_loop()
+    follower = _Follower(roster)
+    async with aclosing(follower.picture(position)) as parts:
+        async for part in parts:
+            yield part
+    unpictured, complete, marked_at = follower.late.copy(), False, loop.time()
+    while not follower.begins_anew:
+        if not complete and unpictured.isdisjoint(follower.late):
+            complete, marked_at = True, loop.time()
+            yield ManyPart(picture=Picture.COMPLETE, position=follower.position())
+        roster.heard(key, follower.version)
+        async with aclosing(follower.news(interval, marked_at + MARK_SECONDS)) as parts:
+            async for part in parts:
+                yield part
+        if loop.time() < marked_at + MARK_SECONDS or follower.begins_anew:
+            continue
+        marked_at = loop.time()
+        if complete:
+            yield ManyPart(position=follower.position())
 
 
 class _Follower:
@@ -99,6 +97,7 @@ class _Follower:
         self.generation, self.version = roster.generation, roster.version
         self.late: set[RosterEntry] = set()
         self._roster = roster
+        self._slot = -1
         self._standings = roster.standings()
 
     @property
@@ -119,8 +118,19 @@ class _Follower:
             async for message in messages:
                 yield ManyPart(message)
 
-    async def changes(self) -> AsyncGenerator[ManyPart, None]:
-        """What has changed since."""
+    async def news(self, interval: float, until: float) -> AsyncGenerator[ManyPart, None]:
+        """What has changed since; nothing if nothing does so until then, or if all is to be pictured anew."""
+        loop = asyncio.get_running_loop()
+        try:
+            async with asyncio.timeout_at(until):
+                await self._roster.beyond(self.version, self.generation)
+                # Once in each slot of time: those who are equally far share what they get.
+                await asyncio.sleep((self._slot + 1) * interval - loop.time())
+        except TimeoutError:
+            return
+        if self.begins_anew:
+            return
+        self._slot = int(loop.time() // interval)
         standings, version = self._roster.standings(), self._roster.version
         async for part in self._sent(self._roster.changes(self.version)):
             yield part
