@@ -106,21 +106,9 @@ def _beginning(
 
 def _snapshot(fence: KeptFence, inside: Inside, hulls: dict[str, HullRows]) -> FenceEvent:
     area = fence.row.config.area_hull
-    return FenceEvent(
-        inside.sequence + 1,
-        EventType.SNAPSHOT,
-        Cause.CREATED,
-        "",
-        None,
-        0,
-        0 if area is None else hulls[area].last,
-        None,
-        None,
-        None,
-        NO_TIME,
-        inside.time,
-        inside=tuple(each._replace(since=None) for each in inside.members),
-    )
+    everybody = EventType.SNAPSHOT, Cause.CREATED, "", None, 0, 0 if area is None else hulls[area].last
+    members = tuple(each._replace(since=None) for each in inside.members)
+    return FenceEvent(inside.sequence + 1, *everybody, None, None, None, NO_TIME, inside.time, inside=members)
 
 
 def _inside(fence: KeptFence, hulls: dict[str, HullRows]) -> Inside:

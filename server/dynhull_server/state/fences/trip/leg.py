@@ -34,7 +34,6 @@ from ..model.records import (
     Key,
     Members,
     Origin,
-    Position,
     PutConsumer,
     PutDelays,
     Subject,
@@ -113,7 +112,7 @@ class FenceLeg:
             now: the time.
             origins: where subjects of this fence come from.
         """
-        time = self.time(now)
+        time, hull, revisions = self.time(now), subjects.hull.name, self._revisions(subjects.hull)
         keys = crossings.keys[rows] if isinstance(rows, slice) else take_keys(crossings.keys, rows)
         columns = zip(
             crossings.changes[rows].tolist(),
@@ -129,19 +128,22 @@ class FenceLeg:
             gone = x != x  # NaN
             here, before = None if gone else (x, y), None if before_x != before_x else (before_x, before_y)
             far, origin = None if gone else distance, origins.get(key)
-            why = caused(causes, swap)
-            self._add(TYPES[change], why, time, subjects.hull, key, here, before, far, event_time, origin=origin)
+            subject = TYPES[change], caused(causes, swap), hull, key, *revisions
+            self.events.append(FenceEvent(self.last + 1, *subject, here, before, far, event_time, time, origin=origin))
 
     def entered(self, subjects: Subjects, now: int) -> None:
         """Make an event of each subject that is inside of a new fence."""
-        time, keys = self.time(now), subjects.index.inside(self.fence.number)
+        time, hull, revisions = self.time(now), subjects.hull.name, self._revisions(subjects.hull)
+        keys = subjects.index.inside(self.fence.number)
         points = keyed(subjects.hull.state).positions(keys).tolist()
         for key, (x, y), event_time in zip(key_list(keys), points, _event_times(subjects, keys), strict=True):
-            self._add(EventType.ENTER, Cause.CREATED, time, subjects.hull, key, (x, y), None, 0.0, event_time)
+            subject = EventType.ENTER, Cause.CREATED, hull, key, *revisions
+            self.events.append(FenceEvent(self.last + 1, *subject, (x, y), None, 0.0, event_time, time))
 
     def report(self, subjects: Subjects, found: Mapping[Key, tuple[EventType, int, int]], now: int) -> None:
         """Make an event of each of some keys that are there, given its type, why, and its first time."""
-        time, keys = self.time(now), subjects.keys(found)
+        time, hull, revisions = self.time(now), subjects.hull.name, self._revisions(subjects.hull)
+        keys = subjects.keys(found)
         points = keyed(subjects.hull.state).positions(keys)
         delays = {} if self.fence.delays is None else self.fence.delays.of(subjects.hull.name)
         outside = np.array([found[key][0] is EventType.EXIT or key in delays for key in key_list(keys)], np.bool_)
@@ -149,34 +151,25 @@ class FenceLeg:
         columns = zip(key_list(keys), points.tolist(), distances, _event_times(subjects, keys), strict=True)
         for key, (x, y), distance, event_time in columns:
             kind, causes, first_time = found[key]
-            self._add(kind, causes, time, subjects.hull, key, (x, y), None, distance, event_time, first_time)
+            subject = kind, causes, hull, key, *revisions
+            self.events.append(
+                FenceEvent(self.last + 1, *subject, (x, y), None, distance, event_time, time, first_time)
+            )
 
     def paired(self, pair: Pair, causes: int, now: int) -> None:
         """Make the event that two hulls begin or cease to be near."""
-        self.events.append(
-            FenceEvent(
-                self.last + 1,
-                EventType.BEGIN if pair.near else EventType.CEASE,
-                causes,
-                pair.other.name,
-                None,
-                pair.other.state.counts.revision,
-                pair.area.state.counts.revision,
-                None,
-                None,
-                pair.distance,
-                NO_TIME,
-                self.time(now),
-            )
-        )
+        kind = EventType.BEGIN if pair.near else EventType.CEASE
+        hulls = kind, causes, pair.other.name, None, pair.other.state.counts.revision, pair.area.state.counts.revision
+        self.events.append(FenceEvent(self.last + 1, *hulls, None, None, pair.distance, NO_TIME, self.time(now)))
 
     def left(self, subjects: Subjects, keys: Keys, cause: Mapping[Key, int] | int, now: int) -> None:
         """Make an exit of each of some keys of a hull that are gone, given why; with the positions they still have."""
-        time = self.time(now)
+        time, hull, revisions = self.time(now), subjects.hull.name, self._revisions(subjects.hull)
         points = keyed(subjects.hull.state).positions(keys).tolist()
         for key, (x, y) in zip(key_list(keys), points, strict=True):
             why, before = cause if isinstance(cause, int) else cause[key], None if x != x else (x, y)
-            self._add(EventType.EXIT, why, time, subjects.hull, key, None, before)
+            subject = EventType.EXIT, why, hull, key, *revisions
+            self.events.append(FenceEvent(self.last + 1, *subject, None, before, None, NO_TIME, time))
 
     def put_delay(self, subject: Subject, delay: Delay | None) -> None:
         """Put the delay of a subject in the place of the one before."""
@@ -189,43 +182,15 @@ class FenceLeg:
 
     def summed_up(self, kind: EventType, cause: int, now: int) -> None:
         """Make one event of all subjects that are inside."""
-        self._add(kind, cause, self.time(now), inside=tuple(members(self.fence)))
-
-    def _add(
-        self,
-        kind: EventType,
-        causes: int,
-        time: int,
-        hull: Hull | None = None,
-        key: Key | None = None,
-        position: Position | None = None,
-        previous: Position | None = None,
-        distance: float | None = None,
-        event_time: int = NO_TIME,
-        first_time: int = NO_TIME,
-        inside: tuple[Members, ...] = (),
-        origin: Origin | None = None,
-    ) -> None:
-        """Make the next event; `hull` is that of the subject."""
-        name, revision = ("", 0) if hull is None else (hull.name, hull.state.counts.revision)
-        event = FenceEvent(
-            self.last + 1,
-            kind,
-            causes,
-            name,
-            key,
-            revision,
-            self.area_revision,
-            position,
-            previous,
-            distance,
-            event_time,
-            time,
-            first_time,
-            inside,
-            origin,
+        everybody = kind, cause, "", None, 0, self.area_revision
+        inside = tuple(members(self.fence))
+        self.events.append(
+            FenceEvent(self.last + 1, *everybody, None, None, None, NO_TIME, self.time(now), inside=inside)
         )
-        self.events.append(event)
+
+    def _revisions(self, hull: Hull) -> tuple[int, int]:
+        """The revisions of a subject's hull and of the area."""
+        return hull.state.counts.revision, self.area_revision
 
     def settings(self) -> Iterator[FenceChange]:
         """The changes to commit before its events."""
