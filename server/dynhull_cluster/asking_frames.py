@@ -1,4 +1,4 @@
-"""The end of who asks: of a gateway, or of the root of a hull over shards."""
+"""The asking end of a connection: that of a gateway, or of the root of a hull over shards."""
 
 import asyncio
 

@@ -72,7 +72,7 @@ class Composed:
         found = list(names(kind.FromString(message)))
         try:
             return common_link(self._relay, found)
-        except HullsApartError:  # only who may use the names is told about them
+        except HullsApartError:  # only for callers that may use the names
             for field, name in found:
                 require(call.access, field, name)
             raise

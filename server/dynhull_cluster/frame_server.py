@@ -1,4 +1,4 @@
-"""The end of a worker: it serves the calls that arrive as frames, by the handlers that gRPC has.
+"""The answering end of a connection: a worker serves the calls that arrive as frames, by the handlers that gRPC has.
 
 Of calls that arrive together, neighbours that ask the same about other points are a run, which is answered at once: a
 busy worker finds more of them, and so has less to do for each.

@@ -1,8 +1,8 @@
 """Which worker has which names.
 
 A name belongs to one of 1,024 slots, by a hash of its first part, up to the first "/"; a worker, or a partition of a
-database, has every n-th slot. So names with a common first part are on one worker, which fences, and batches over several
-hulls, need.
+database, has every n-th slot. So names with a common first part are on one worker, which fences, and batches over
+several hulls, need.
 """
 
 import zlib

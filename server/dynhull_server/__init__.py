@@ -1,4 +1,4 @@
-"""The dynhull server: named hulls behind the gRPC service dynhull.v1.HullService."""
+"""The dynhull server: named hulls and fences behind the gRPC services of dynhull.v1."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""A gRPC server with the hull service, health, reflection, metrics and the background scrub."""
+"""A gRPC server with the services of hulls and fences, health, reflection, metrics and the background scrub."""
 
 import asyncio
 import logging

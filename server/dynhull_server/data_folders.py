@@ -65,7 +65,7 @@ def _check_part(data: Path) -> bool:
         typer.echo(problem, err=True)
     if wrong and not report.fatal:
         typer.echo(
-            f"{data}: fences are wrong, as told above: restore a backup, or delete and create these fences again"
+            f"{data}: fences are wrong, as reported above: restore a backup, or delete and create these fences again"
         )
     elif report.fatal:
         typer.echo(f"{data}: damaged; it cannot be served: restore a backup")

@@ -72,7 +72,7 @@ def run(settings: Settings, make: Callable[[], Awaitable[Alone]]) -> None:
 
 
 def share_processors(settings: Settings) -> None:
-    """Let a batch use so many threads; by default the processors, divided by the workers, less one for other work."""
+    """Set the threads of a batch: by default the processors, divided by the workers, less one for other work."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     set_threads(settings.threads or min(64, max(1, processors // (settings.workers or 1) - 1)))
 

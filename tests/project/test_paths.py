@@ -36,6 +36,16 @@ def test_what_a_page_names_is_there(page: Path) -> None:
     assert [word for word in found if word not in ends] == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_methods_that_a_page_names_are_those_of_their_classes(page: Path) -> None:
+    modules = [
+        file.read_text() for folder in ("server", "clients", "dynhull") for file in (ROOT / folder).rglob("*.py")
+    ]
+    for kind, method in re.findall(r"`(?:[a-z]+\.)?([A-Z]\w+)\.([a-z]\w+)`", page.read_text()):
+        homes = [text for text in modules if f"\nclass {kind}" in text]
+        assert any(f"def {method}(" in text for text in homes), f"{kind}.{method}"
+
+
 def test_every_package_is_in_the_table() -> None:
     packages = PROJECT["tool"]["scikit-build"]["wheel"]["packages"]
     table = CONTRIBUTING.read_text()

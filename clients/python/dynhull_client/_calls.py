@@ -1,6 +1,6 @@
 """Each call once: the request, how to read the answer, and the documentation.
 
-The methods of `HullClient` and `AsyncHullClient` are made of these functions and those in `uses`.
+The methods of `HullClient` and `AsyncHullClient` are made of these functions and those in `_uses`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Calls about what a few bad points cannot spoil, made as those in `calls`, and their answers."""
+"""Calls about what a few bad points cannot spoil, made as those in `_calls`, and their answers."""
 
 from __future__ import annotations
 

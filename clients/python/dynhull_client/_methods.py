@@ -1,4 +1,4 @@
-"""What the methods of both clients have in common: they are made of the functions in `calls` and `uses`."""
+"""What the methods of both clients have in common: they are made of functions as those in `_calls` and `_uses`."""
 
 import inspect
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Calls about the quarantine of a keyed hull, made as those in `calls`."""
+"""Calls about the quarantine of a keyed hull, made as those in `_calls`."""
 
 from __future__ import annotations
 

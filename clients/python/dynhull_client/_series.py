@@ -1,4 +1,4 @@
-"""The call for the measures that a server has kept of a hull, made as those in `calls`, and its answer."""
+"""The call for the measures that a server has kept of a hull, made as those in `_calls`, and its answer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calls that put a hull to use, made as those in `calls`, and their answers."""
+"""Calls that put a hull to use, made as those in `_calls`, and their answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What callers ask of a root that is served: each request is answered in its thread, and told on the event loop."""
+"""What callers ask of a root that is served: each is carried out in its thread, and answered on the event loop."""
 
 import asyncio
 from typing import Any, Protocol

@@ -1,4 +1,4 @@
-"""The commands `dynhull cluster ...`: they write into the tables what is wished, and the workers do it."""
+"""The commands `dynhull cluster ...`: they write wishes into the tables, and the workers carry them out."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager

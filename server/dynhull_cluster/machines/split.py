@@ -110,7 +110,7 @@ def _is_divided(connection: Connection, database: Database, partitions: int) -> 
 
 
 def _require_room(connection: Connection, partitions: int) -> None:
-    """Raise StorageError if PostgreSQL has too few connections for so many partitions: there is no way back."""
+    """Raise StorageError if PostgreSQL has too few connections for these partitions: there is no way back."""
     ((most,),) = connection.execute("SELECT current_setting('max_connections')::integer").fetchall()
     needed = CONNECTIONS * partitions
     if needed > most:

@@ -241,7 +241,7 @@ def require_partitions(connection: Connection, database: Database, partitions: i
 
 
 def divided_otherwise(database: Database, partitions: int) -> StorageError:
-    """The error of a server that cannot serve so many partitions."""
+    """The error of a server that cannot serve this number of partitions."""
     remedy = f"start the server with --workers {partitions}, or with --cluster"
     return StorageError(f"{database} is divided among {partitions} workers: {remedy}")
 

@@ -1,8 +1,8 @@
 """Dividing the rows of a database with one partition among several, inside of one transaction.
 
 A row keeps its number, its payload and its checksum, and gets another partition. So hulls, fences, their events, and
-the numbers of producers are what they were, also for who goes on with them. A row with events of many fences is copied
-to the partitions of all fences that need it; what it has of others counts as that of deleted fences.
+the numbers of producers are what they were, also for callers that go on with them. A row with events of many fences is
+copied to the partitions of all fences that need it; what it has of others counts as that of deleted fences.
 """
 
 from collections import Counter, defaultdict

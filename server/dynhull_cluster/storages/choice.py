@@ -1,4 +1,4 @@
-"""Chooses the kind of storage that the settings ask for."""
+"""Chooses the kind of storage by the settings."""
 
 from pkgutil import resolve_name
 

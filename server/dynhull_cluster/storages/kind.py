@@ -1,4 +1,4 @@
-"""What serves hulls in one kind of storage: the interface."""
+"""The interface of what serves hulls in one kind of storage."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager

@@ -1,1 +1,1 @@
-"""The state: named hulls with their revisions and watchers. Knows nothing of gRPC."""
+"""The engine: drives the core with threads and the event loop, and serves callers that wait and watch. Without gRPC."""

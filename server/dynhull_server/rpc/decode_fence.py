@@ -52,7 +52,7 @@ def decode_consumer(consumer: str) -> str:
 def decode_fence(
     request: fence_service_pb2.CreateFenceRequest | fence_service_pb2.ReplaceFenceRequest, most_corners: int
 ) -> FenceConfig:
-    """The settings of a fence, whose area has at most so many corners."""
+    """The settings of a fence, whose area has at most that many corners."""
     if not request.HasField("config"):
         raise InvalidFieldError("config", "", "the settings of the fence are required")
     config = request.config

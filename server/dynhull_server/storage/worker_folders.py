@@ -58,7 +58,7 @@ def require_one_process(data: Path) -> None:
 
 
 def divide(data: Path, workers: int) -> None:
-    """Make a folder for so many workers, or check that it is one.
+    """Make a folder for that many workers, or check that it is one.
 
     Raises:
         StorageError: it is the folder of one process, or of another number of workers.

@@ -15,7 +15,7 @@ from ..lines import whole_or_nothing, write_all
 from .feed import Message
 
 log = structlog.get_logger("dynhull_ingest")
-# So many are logged one by one; later ones are counted, and written to the file if there is one.
+# This many are logged one by one; later ones are counted, and written to the file if there is one.
 LOGGED = 10
 
 

@@ -21,7 +21,7 @@ Position = tuple[float, float]
 
 
 class Mirror:
-    """A hull in the plane that is told of each change of a geographic hull before it takes place, and follows it.
+    """A hull in the plane that is notified of each change of a geographic hull before it takes place, and follows it.
 
     Args:
         hull: the geographic hull, which has a centre that stays.

@@ -1,6 +1,6 @@
 """A copy of a database is another incarnation of its hulls and fences: their uids are other ones.
 
-Readers and writers that know what was after the copy was made can therefore tell that it is not there. The part of a
+Readers and writers that know what was after the copy was made can therefore notice that it is not there. The part of a
 uid before INCARNATION stays, and what follows it is new with each copy: the same for all databases of a server, since a
 hull over shards has its uid in several.
 """
@@ -68,7 +68,7 @@ def anew(reader: Reader, ledger: Ledger, incarnation: str) -> Iterator[Iterable[
 def beginning_anew(reader: Reader, ledger: Ledger) -> Iterator[list[Change | AnyStep]]:
     """The changes, to be adopted one after the other, after which the fences have one event, who is inside.
 
-    The events that there were since the backup cannot be told, and those in it have perhaps been sent, with other uids.
+    The events since the backup are unknown, and those in it have perhaps been sent, with other uids.
     So a sequence is left out: to each consumer that was there, all events that it has not acknowledged are lost.
     """
     hulls = {hull.row.name: hull for hull in ledger.hulls.values()}

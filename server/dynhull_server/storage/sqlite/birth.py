@@ -1,4 +1,4 @@
-"""The time at which a file was made, which Python does not tell on Linux."""
+"""The time at which a file was made, which Python does not report on Linux."""
 
 import ctypes
 import os

@@ -1,6 +1,6 @@
 """Which file a database was when it was served last: the time at which that was made, noted beside it.
 
-So a copy of a folder, which may lack what was committed since, is told from the folder itself, also if that was moved.
+So a copy of a folder, which may lack what was committed since, differs from the folder itself, even if that was moved.
 """
 
 from .folder import Folder

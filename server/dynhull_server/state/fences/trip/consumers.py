@@ -7,7 +7,7 @@ from .leg import FenceLeg
 
 
 def put_consumer(request: Acknowledge, leg: FenceLeg, most: int) -> Consumer:
-    """Create a consumer if it is new, and acknowledge events; a fence has at most so many consumers."""
+    """Create a consumer if it is new, and acknowledge events; a fence has at most that many consumers."""
     fence = leg.fence
     if request.uid and request.uid != fence.row.uid:
         raise FenceReplacedError(fence.name, fence.row.uid)
