@@ -41,7 +41,7 @@ def test_the_methods_that_a_page_names_are_those_of_their_classes(page: Path) ->
     modules = [
         file.read_text() for folder in ("server", "clients", "dynhull") for file in (ROOT / folder).rglob("*.py")
     ]
-    for kind, method in re.findall(r"`(?:[a-z]+\.)?([A-Z]\w+)\.([a-z]\w+)`", page.read_text()):
+    for kind, method in re.findall(r"`(?:[a-z]+\.)?([A-Z][a-z]\w*)\.([a-z]\w+)`", page.read_text()):
         homes = [text for text in modules if f"\nclass {kind}" in text]
         assert any(f"def {method}(" in text for text in homes), f"{kind}.{method}"
 
