@@ -1,7 +1,7 @@
 """The changes of a hull as a live table, as lines of text or as lines of JSON."""
 
 from collections import deque
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
@@ -14,7 +14,7 @@ from rich.text import Text
 from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Sketch, Snapshot, Watch
 
 from .closed_pipe import when_pipe_closes
-from .json_lines import json_line
+from .json_lines import json_line, members
 from .tab_lines import printable, tab_line
 
 SHOWN_EVENTS = 12
@@ -157,7 +157,7 @@ def _json(event: Event, corners: Corners | None) -> str:
         points=event.points,
         snapshot=isinstance(event, Snapshot),
         **vertices,
-        **({} if measures is None else asdict(measures)),
+        **({} if measures is None else members(measures)),
         **({} if corners is None else {"joined": corners.joined, "left": corners.left}),
     )
 

@@ -9,7 +9,7 @@ from dynhull_surface.settings import HullSettings
 from . import completion
 from .connected import AsJson, connected
 from .durations import shown
-from .json_lines import json_line
+from .json_lines import json_line, members
 from .listing import below, confirm_deletion, existing, listed, print_list
 from .lon_lat import lon_lat
 from .plural import plural
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from dynhull_client import HullClient, HullInfo
 
+WINDOW = "max_age", "max_points", "clock", "max_skew", "ahead"
 
 NewNames = Annotated[list[str], typer.Argument(metavar="HULL", help="Names of the hulls.")]
 Names = Annotated[
@@ -171,30 +172,10 @@ def _line(info: "HullInfo") -> str:
 
 
 def _members(info: "HullInfo") -> dict[str, Any]:
-    window = info.window
-    return {
-        "name": info.name,
-        "points": info.points,
-        "distinct": info.distinct,
-        "revision": info.revision,
-        "created": info.created.isoformat(),
-        "uid": info.uid,
-        "keyed": info.keyed,
-        "ordering": info.ordering,
-        "point_limit": info.point_limit,
-        "max_age": None if window is None or window.max_age is None else window.max_age.total_seconds(),
-        "max_points": None if window is None else window.max_points,
-        "window_clock": None if window is None else window.clock,
-        "max_skew": None if window is None or window.max_skew is None else window.max_skew.total_seconds(),
-        "ahead": None if window is None else window.ahead,
-        "clock": None if info.clock is None else info.clock.isoformat(),
-        "geographic": info.geographic,
-        "center": info.center,
-        "held": info.held,
-        "shards": info.shards,
-        "restored": info.restored,
-        **rule_members(info.quarantine),
-    }
+    window = dict.fromkeys(WINDOW) if info.window is None else members(info.window)
+    window["window_clock"] = window.pop("clock")
+    hull = {name: value for name, value in members(info).items() if name not in ("window", "quarantine")}
+    return {**hull, **window, "restored": info.restored, **rule_members(info.quarantine)}
 
 
 def _window(info: "HullInfo") -> str:

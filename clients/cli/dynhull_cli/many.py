@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Iterator
-from dataclasses import asdict
 from datetime import UTC, datetime
 from itertools import islice
 
@@ -15,7 +14,7 @@ from rich.text import Text
 from dynhull_client import ManyChange, ManyWatch
 
 from .closed_pipe import when_pipe_closes
-from .json_lines import json_line
+from .json_lines import json_line, members
 from .tab_lines import tab_line
 
 HEADINGS = ("revision", "points", "vertices", "area", "perimeter", "diameter", "changed")
@@ -125,21 +124,6 @@ def _json(change: ManyChange) -> str:
     if change.kind != "state":
         named = {"hull": change.hull} if change.hull else {}
         return json_line(kind=change.kind, **named, position=position)
-    measures = change.measures
-    return json_line(
-        kind=change.kind,
-        hull=change.hull,
-        uid=change.uid,
-        revision=change.revision,
-        points=change.points,
-        distinct=change.distinct,
-        held=change.held,
-        vertex_count=change.vertex_count,
-        geographic=change.geographic,
-        center=change.center,
-        changed=None if change.changed is None else change.changed.isoformat(),
-        clock=None if change.clock is None else change.clock.isoformat(),
-        measures=None if measures is None else asdict(measures),
-        **({} if change.vertices is None else {"vertices": change.vertices, "error": change.error}),
-        position=position,
-    )
+    without = () if change.vertices is not None else ("vertices", "error")
+    state = {name: value for name, value in members(change).items() if name not in without}
+    return json_line(**state | {"position": position})

@@ -1,6 +1,5 @@
 """`dynhull insert`, `dynhull put` and `dynhull remove`: a few points. `dynhull load` reads files."""
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -11,7 +10,7 @@ from dynhull_surface.reasons import Exit
 from .conditions import ONLY, TTL, Only
 from .connected import AsJson, HullName, connected, fail
 from .durations import duration
-from .json_lines import json_line
+from .json_lines import json_line, members
 from .plural import plural
 
 if TYPE_CHECKING:
@@ -144,8 +143,7 @@ def _left_out(applied: "Applied") -> str:
 
 def _report(name: str, applied: "Applied", what: str, as_json: bool) -> None:
     if as_json:
-        members = asdict(applied) | {"clock": applied.clock and applied.clock.isoformat()}
-        typer.echo(json_line(name=name, **members))
+        typer.echo(json_line(name=name, **members(applied)))
     else:
         changed = "changed" if applied.hull_changed else "unchanged"
         typer.echo(f"{name}: {what}, {applied.points:,} in the hull, its shape {changed}")

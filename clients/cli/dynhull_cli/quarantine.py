@@ -6,7 +6,7 @@ import typer
 
 from .connected import AsJson, HullName, connected
 from .groups import group
-from .json_lines import json_line
+from .json_lines import json_line, members
 from .listing import listed, print_list
 from .plural import plural
 from .tab_lines import printable, tab_line
@@ -114,13 +114,7 @@ def given_rules(max_speed: float | None, max_growth: float | None, confirmations
 
 def rule_members(rules: "Quarantine | None") -> dict[str, Any]:
     """The rules as members of a JSON object; null for those that are off."""
-    if rules is None:
-        return {"max_speed": None, "max_growth": None, "confirmations": None}
-    return {
-        "max_speed": rules.max_speed,
-        "max_growth": rules.max_growth,
-        "confirmations": rules.confirmations,
-    }
+    return {"max_speed": None, "max_growth": None, "confirmations": None} if rules is None else members(rules)
 
 
 def shown_rules(rules: "Quarantine | None") -> str:
@@ -152,16 +146,7 @@ def _report(name: str, applied: "Applied", what: str, as_json: bool) -> None:
 
 
 def _members(held: "HeldPosition") -> dict[str, Any]:
-    return {
-        "key": held.key,
-        "position": held.position,
-        "time": None if held.time is None else held.time.isoformat(),
-        "breaks": held.breaks,
-        "speed": held.speed,
-        "growth": held.growth,
-        "revision": held.revision,
-        "confirmations": held.confirmations,
-    }
+    return members(held) | {"breaks": held.breaks}
 
 
 def _columns(held: "HeldPosition") -> list[str]:

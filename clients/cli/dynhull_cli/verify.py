@@ -1,7 +1,6 @@
 """`dynhull verify`: live hulls compared with a recomputation."""
 
 import sys
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,7 +12,7 @@ from dynhull_surface.reasons import Exit
 
 from .completion import hulls
 from .connected import AsJson, connected
-from .json_lines import json_line
+from .json_lines import json_line, members
 from .listing import listed
 from .plural import plural
 
@@ -41,7 +40,7 @@ def verify(
         found = client.verify(name, timeout=timeout)
         different += not found.whole
         typer.echo(
-            json_line(name=name, whole=found.whole, **asdict(found)) if as_json else f"{name}: {_summary(found)}"
+            json_line(name=name, whole=found.whole, **members(found)) if as_json else f"{name}: {_summary(found)}"
         )
     if different:
         sys.exit(Exit.FAILED)

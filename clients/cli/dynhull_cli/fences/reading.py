@@ -6,7 +6,7 @@ import typer
 
 from ..completion import fences
 from ..connected import AsJson, connected
-from ..json_lines import json_line
+from ..json_lines import json_line, members
 from ..listing import below, confirm_deletion, existing, listed, print_list
 from ..plural import plural
 from ..tab_lines import tab_line
@@ -70,11 +70,9 @@ def inside(client: "HullClient", name: FenceName, as_json: AsJson = False) -> No
 
     With --json, one object with the sequence of the event that leads to them, and the keys of each hull.
     """
-    from .shown import inside_members
-
     found = client.fence_inside(name)
     if as_json:
-        typer.echo(json_line(sequence=found.sequence, subjects=[inside_members(each) for each in found.subjects]))
+        typer.echo(json_line(**members(found)))
         return
     subjects = ((each.hull, key) for each in found.subjects for key in each.keys)
     for hull, key in listed(subjects, f"nobody is inside {name}"):

@@ -1,19 +1,16 @@
 """Fences and their events as JSON and as text."""
 
-from dataclasses import asdict
-from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from datetime import timedelta
+from typing import Any
 
 from dynhull_client import Circle, Fence, FenceEvent, HullClient, Prefix
 from dynhull_surface.described import Setting, described
 from dynhull_surface.settings import FenceSettings
 
 from ..durations import shown
+from ..json_lines import members
 from ..keyed_rows import known_hull
 from ..plural import plural
-
-if TYPE_CHECKING:
-    from dynhull_client import SubjectsInside
 
 LISTS = "snapshot", "closed"  # events that list who is inside
 MAY_BE_EMPTY = "fence", "uid", "sequence", "key", "distance", "inside"  # what zero or nobody is a value of
@@ -21,30 +18,15 @@ MAY_BE_EMPTY = "fence", "uid", "sequence", "key", "distance", "inside"  # what z
 
 def fence_members(fence: Fence) -> dict[str, Any]:
     """A fence as members of JSON; members without a value are null."""
-    members = {name: getattr(fence, name) for name in Fence.__dataclass_fields__}
-    members["area"] = _area_json(fence)
-    members["subjects"] = {"prefix": fence.subjects.text} if isinstance(fence.subjects, Prefix) else fence.subjects
-    members |= {name: value.total_seconds() for name, value in members.items() if isinstance(value, timedelta)}
-    members["created"] = fence.created.isoformat()
-    members["consumers"] = [
-        asdict(each) | {"oldest": _time(each.oldest)}  # a datetime
-        for each in fence.consumers
-    ]
-    return members
+    subjects = {"prefix": fence.subjects.text} if isinstance(fence.subjects, Prefix) else fence.subjects
+    return members(fence) | {"area": _area_json(fence), "subjects": subjects}
 
 
 def event_members(event: FenceEvent) -> dict[str, Any]:
     """An event as members of JSON: those that it has."""
-    members = {name: getattr(event, name) for name in FenceEvent.__dataclass_fields__ if name != "after"}
-    members |= {name: value.isoformat() for name, value in members.items() if isinstance(value, datetime)}
-    members["cause"] = sorted(event.cause)
-    members["inside"] = [inside_members(each) for each in event.inside] if event.type in LISTS else None
-    return {name: value for name, value in members.items() if value or (value is not None and name in MAY_BE_EMPTY)}
-
-
-def inside_members(subjects: "SubjectsInside") -> dict[str, Any]:
-    """Keys of one hull as members of JSON."""
-    return {"hull": subjects.hull, "keys": list(subjects.keys), "revision": subjects.revision}
+    found = members(event) | {"cause": sorted(event.cause), "after": None}
+    found["inside"] = event.inside if event.type in LISTS else None
+    return {name: value for name, value in found.items() if value or (value is not None and name in MAY_BE_EMPTY)}
 
 
 def unit_of(client: HullClient, fence: Fence) -> str:
@@ -114,7 +96,3 @@ def _area_json(fence: Fence) -> Any:
     if len(rings) == 1:
         return {"type": "Polygon", "coordinates": rings[0]}
     return {"type": "MultiPolygon", "coordinates": rings}
-
-
-def _time(time: datetime | None) -> str | None:
-    return None if time is None else time.isoformat()

@@ -3,17 +3,14 @@
 import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from typing import Any
 
 import grpc
 
+from dynhull_cli.fences.shown import event_members
 from dynhull_client import AsyncHullClient, DynhullError, FenceEvent, FenceReplacedError
 
 from .messages import COMMENT, message, place, problem
 from .shared import RETRY_SECONDS
-
-LISTS = "snapshot", "closed"  # events that list who is inside
-MAY_BE_EMPTY = "sequence", "key", "distance", "inside"  # what zero or nobody is a value of
 
 
 @dataclass(slots=True)
@@ -109,13 +106,4 @@ async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) 
 
 
 def _text(event: FenceEvent, ident: str) -> bytes:
-    return message(event.type, ident, shown(event))
-
-
-def shown(event: FenceEvent) -> dict[str, Any]:
-    """An event as JSON has it, without what is not there."""
-    named = {name: getattr(event, name) for name in FenceEvent.__dataclass_fields__ if name != "after"}
-    named["cause"] = sorted(event.cause)
-    inside = [{"hull": each.hull, "keys": each.keys, "revision": each.revision} for each in event.inside]
-    named["inside"] = inside if event.type in LISTS else None
-    return {name: value for name, value in named.items() if value or (value is not None and name in MAY_BE_EMPTY)}
+    return message(event.type, ident, event_members(event))
