@@ -77,16 +77,12 @@ class AsyncWriter:
 
         Returns the future of the batch's effect. Arguments and errors as for `Writer.put`.
         """
-        writing = self._writing
-        coalesce = writing.coalesce == "last"
-        parts = put_parts(
-            insert, delete, move, keys, points, times, only, ttl, expire_times, writing.missing, coalesce=coalesce
-        )
+        parts = put_parts(self._writing, insert, delete, move, keys, points, times, only, ttl, expire_times)
         return await self._add(parts, sequence)
 
     async def remove(self, keys: Any, *, sequence: int | None = None) -> asyncio.Future[Applied]:
         """Remove keys, as `Writer.remove` does."""
-        return await self._add(remove_parts(keys, self._writing.missing), sequence)
+        return await self._add(remove_parts(self._writing, keys), sequence)
 
     async def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""

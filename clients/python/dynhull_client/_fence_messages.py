@@ -1,8 +1,9 @@
 """Fences and their events, as values."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
+from typing import Any, Literal
 
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2
 from dynhull_surface.settings import FenceSettings
@@ -37,27 +38,14 @@ FenceCause = Literal[
     "time_passed",
 ]
 
-TYPES: dict[int, EventType] = {
-    fence_pb2.FENCE_EVENT_TYPE_ENTER: "enter",
-    fence_pb2.FENCE_EVENT_TYPE_EXIT: "exit",
-    fence_pb2.FENCE_EVENT_TYPE_CROSS: "cross",
-    fence_pb2.FENCE_EVENT_TYPE_DWELL: "dwell",
-    fence_pb2.FENCE_EVENT_TYPE_TRANSFER: "transfer",
-    fence_pb2.FENCE_EVENT_TYPE_BEGIN: "begin",
-    fence_pb2.FENCE_EVENT_TYPE_CEASE: "cease",
-    fence_pb2.FENCE_EVENT_TYPE_SNAPSHOT: "snapshot",
-    fence_pb2.FENCE_EVENT_TYPE_CLOSED: "closed",
-}
-CAUSES: dict[int, FenceCause] = {
-    fence_pb2.FENCE_CAUSE_SUBJECT_MOVED: "subject_moved",
-    fence_pb2.FENCE_CAUSE_AREA_MOVED: "area_moved",
-    fence_pb2.FENCE_CAUSE_SUBJECT_APPEARED: "subject_appeared",
-    fence_pb2.FENCE_CAUSE_SUBJECT_REMOVED: "subject_removed",
-    fence_pb2.FENCE_CAUSE_SUBJECT_EXPIRED: "subject_expired",
-    fence_pb2.FENCE_CAUSE_FENCE_CREATED: "fence_created",
-    fence_pb2.FENCE_CAUSE_FENCE_CHANGED: "fence_changed",
-    fence_pb2.FENCE_CAUSE_TIME_PASSED: "time_passed",
-}
+
+def _words(names: Iterable[tuple[str, int]], prefix: str) -> dict[int, Any]:
+    """The words for the numbers on the wire but 0: FENCE_EVENT_TYPE_ENTER is "enter"."""
+    return {number: name.removeprefix(prefix).lower() for name, number in names if number}
+
+
+TYPES: dict[int, EventType] = _words(fence_pb2.FenceEventType.items(), "FENCE_EVENT_TYPE_")
+CAUSES: dict[int, FenceCause] = _words(fence_pb2.FenceCause.items(), "FENCE_CAUSE_")
 
 
 @dataclass(frozen=True, slots=True)

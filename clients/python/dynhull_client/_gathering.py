@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from dynhull_proto.v1 import batch_pb2
 
-    from ._batch import Missing, Only
+    from ._batch import Only
+    from ._calls import Writing
 
 Key = str | int
 UNTIMED = 0
@@ -49,6 +50,7 @@ class Part:
 
 
 def put_parts(
+    writing: Writing,
     insert: npt.ArrayLike | None,
     delete: npt.ArrayLike | None,
     move: tuple[npt.ArrayLike, npt.ArrayLike] | None,
@@ -58,9 +60,6 @@ def put_parts(
     only: Only | None,
     ttl: float | timedelta | None,
     expire_times: Any,
-    missing: Missing | None,
-    *,
-    coalesce: bool,
 ) -> list[Part]:
     """Points to insert, delete and move as one part, or keys to put as `Batch` takes them.
 
@@ -77,10 +76,11 @@ def put_parts(
             only=only,
             ttl=ttl,
             expire_times=expire_times,
-            missing=missing,
+            missing=writing.missing,
         )
         return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
-    options: Any = {"missing": missing, "insert": insert, "delete": delete, "move": move, "only": only, "ttl": ttl}
+    options: Any = {"insert": insert, "delete": delete, "move": move, "only": only, "ttl": ttl}
+    options["missing"] = writing.missing
     checked, xy = checked_keys(keys), as_points(points, "points", on_globe=None)
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")
@@ -90,7 +90,7 @@ def put_parts(
     stamps = [UNTIMED] * len(names) if micros is None else micros.tolist()
     conditions: Conditions = only, ttl, ends is not None
     parts = []
-    for rows in _runs(names, stamps, coalesce and only != "absent"):
+    for rows in _runs(names, stamps, writing.coalesce == "last" and only != "absent"):
         batch = whole
         if rows.stop - rows.start < len(names):
             of_rows = {name: None if each is None else each[rows] for name, each in columns.items()}
@@ -100,13 +100,13 @@ def put_parts(
     return parts
 
 
-def remove_parts(keys: Any, missing: Missing | None) -> list[Part]:
+def remove_parts(writing: Writing, keys: Any) -> list[Part]:
     """Keys to remove; a new part begins where a key comes again."""
     checked = checked_keys(keys)
     names = plain_keys(checked)
     return [
         Part(
-            Batch(remove=checked[rows], missing=missing).message,
+            Batch(remove=checked[rows], missing=writing.missing).message,
             rows.stop - rows.start,
             dict.fromkeys(names[rows]),
             kind=_kind(names),

@@ -115,16 +115,12 @@ class Writer:
             DynhullError: the writer has ended: nothing after its error was applied.
             RuntimeError: the writer is closed, or belongs to the process that this one was forked from.
         """
-        writing = self._writing
-        coalesce = writing.coalesce == "last"
-        parts = put_parts(
-            insert, delete, move, keys, points, times, only, ttl, expire_times, writing.missing, coalesce=coalesce
-        )
+        parts = put_parts(self._writing, insert, delete, move, keys, points, times, only, ttl, expire_times)
         return self._add(parts, sequence)
 
     def remove(self, keys: Any, *, sequence: int | None = None) -> Future[Applied]:
         """Remove keys in the next batch, as `put` adds points. Removing a key that was put before is a new batch."""
-        return self._add(remove_parts(keys, self._writing.missing), sequence)
+        return self._add(remove_parts(self._writing, keys), sequence)
 
     def flush(self) -> None:
         """Wait until everything put so far is acknowledged; raises the first error of a batch since the last flush."""
