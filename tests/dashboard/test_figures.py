@@ -16,11 +16,11 @@ from dynhull_dashboard.advice import about_fences
 from dynhull_dashboard.event_rows import MOST_EVENTS, EventRows
 from dynhull_dashboard.feed import HullFeed
 from dynhull_dashboard.fence_drawing import area_of
-from dynhull_dashboard.fence_list import FenceList
 from dynhull_dashboard.history import ROWS, History
 from dynhull_dashboard.outline import MOST_DRAWN, drawn
 from dynhull_dashboard.past import past_rows
 from dynhull_dashboard.repeating import pause_after
+from dynhull_dashboard.server_lists import FenceList
 from dynhull_dashboard.server_metrics import Scrape
 from dynhull_dashboard.units import Units
 

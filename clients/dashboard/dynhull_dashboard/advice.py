@@ -13,10 +13,9 @@ from dynhull_client import (
 
 from .feed import HullFeed
 from .fence_feed import FenceFeed
-from .fence_list import FenceList
 from .many_feed import ManyFeed
+from .server_lists import FenceList, HullList
 from .server_metrics import ServerMetrics
-from .server_state import ServerState
 
 UNKNOWN_FENCE = FenceNotFoundError, InvalidRequestError  # the latter for what cannot be a name
 TOO_OLD = "This server has no fences: it is older than they are. Update it with pip install --upgrade dynhull"
@@ -87,7 +86,7 @@ def about_fences(address: str, fences: FenceList, shown: bool) -> str:
     """Below the tables: why there are no fences to pick, and what to do; empty where there are."""
     if fences.error is not None:
         return f"{TOO_OLD}." if is_unsupported(fences.error) and not shown else ""
-    if not fences.listed or fences.fences or shown:
+    if not fences.listed or fences.by_name or shown:
         return ""
     begin = f" whose names begin with {fences.prefix}" if fences.prefix else ""
     return (
@@ -96,24 +95,24 @@ def about_fences(address: str, fences: FenceList, shown: bool) -> str:
     )
 
 
-def _in_place_of(name: str, server: ServerState) -> str:
+def _in_place_of(name: str, hull_list: HullList) -> str:
     """What to do where a hull is not there."""
     prefix = name.rstrip("/") + "/"
-    if any(each.startswith(prefix) for each in server.hulls):
+    if any(each.startswith(prefix) for each in hull_list.by_name):
         return f"Others begin with that name: pick {prefix}* above to see them all."
     return "Check the name, or pick another hull above. One that is made with this name appears here by itself."
 
 
 def about_picture(
     address: str,
-    server: ServerState,
+    hull_list: HullList,
     feeds: Iterable[HullFeed],
     fences: Iterable[FenceFeed] = (),
     many: Iterable[ManyFeed] = (),
 ) -> str:
     """For the picture: why it is empty, and what to do; empty where it is not, or where the banner says it."""
     feeds, fences, many = list(feeds), list(fences), list(many)
-    if server.error is not None or not server.listed or any(feed.bounds for feed in feeds) or any(map(len, many)):
+    if hull_list.error is not None or not hull_list.listed or any(feed.bounds for feed in feeds) or any(map(len, many)):
         return ""
     if any(fence.area.bounds for fence in fences):
         return ""
@@ -124,11 +123,11 @@ def about_picture(
     if empty := [feed.name for feed in feeds if feed.trouble is None and feed.followed]:
         return f"{empty[0]} has no points yet. Add some: dynhull load {empty[0]} FILE.csv --address {address}"
     if missing := [feed.name for feed in feeds if isinstance(feed.trouble, HullNotFoundError | InvalidRequestError)]:
-        return f"The server has no hull {missing[0]}. {_in_place_of(missing[0], server)}"
+        return f"The server has no hull {missing[0]}. {_in_place_of(missing[0], hull_list)}"
     if feeds or many:
         return ""
-    if server.hulls:
+    if hull_list.by_name:
         return "Pick a hull above."
-    begin = f" whose names begin with {server.prefix}" if server.prefix else ""
-    name = f"{server.prefix}NAME"
+    begin = f" whose names begin with {hull_list.prefix}" if hull_list.prefix else ""
+    name = f"{hull_list.prefix}NAME"
     return f"The server has no hulls{begin} yet. Make one: dynhull load {name} FILE.csv --address {address}"

@@ -58,15 +58,15 @@ class FencePicks:
 
     def some(self, hulls: Collection[str]) -> list[str]:
         """The fences of these hulls, out of those that can be picked."""
-        known = self._hub.server.hulls
-        listed = self._hub.fence_list.fences.values()
+        known = self._hub.hull_list.by_name
+        listed = self._hub.fence_list.by_name.values()
         return [fence.name for fence in listed if not set(hulls).isdisjoint(hulls_of(fence, known))]
 
     def new_hulls(self) -> list[str]:
         """The hulls of the fences that have become known since the last call: they belong into the picture."""
         known = {feed.name: feed.fence for feed in self.feeds if feed.name in self._awaited and feed.fence is not None}
         self._awaited -= known.keys()
-        return [name for fence in known.values() for name in hulls_of(fence, self._hub.server.hulls)]
+        return [name for fence in known.values() for name in hulls_of(fence, self._hub.hull_list.by_name)]
 
     def table(self, hulls: Collection[str], *, connected: bool) -> str:
         """Their table as HTML. `hulls` are those in the picture."""

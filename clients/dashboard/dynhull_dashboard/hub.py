@@ -8,11 +8,10 @@ from dynhull_client import AsyncHullClient
 from .feed import HullFeed
 from .feeds import Feeds
 from .fence_feed import FenceFeed
-from .fence_list import FenceList
 from .many_feed import ManyFeed
 from .outliers import OutlierFeed
+from .server_lists import FenceList, HullList
 from .server_metrics import ServerMetrics
-from .server_state import ServerState
 from .units import NO_UNITS, Units
 
 
@@ -26,7 +25,7 @@ class Hub:
         units: the units of the coordinates.
 
     Attributes:
-        server: the server's hulls.
+        hull_list: the server's hulls.
         fence_list: the server's fences.
         hulls: the feeds of the hulls on view.
         fences: the feeds of the fences on view.
@@ -39,7 +38,7 @@ class Hub:
     ) -> None:
         self.address = client.address
         self.units = units
-        self.server = ServerState(client, prefix)
+        self.hull_list = HullList(client, prefix)
         self.fence_list = FenceList(client, prefix)
         self.metrics = None if metrics_url is None else ServerMetrics(metrics_url)
         self.hulls = Feeds(partial(HullFeed, client))
@@ -51,6 +50,6 @@ class Hub:
         """Stop all background tasks."""
         await self.outliers.close()  # they use hulls
         feeds = self.hulls, self.fences, self.many
-        await asyncio.gather(self.server.close(), self.fence_list.close(), *(each.close() for each in feeds))
+        await asyncio.gather(self.hull_list.close(), self.fence_list.close(), *(each.close() for each in feeds))
         if self.metrics is not None:
             await self.metrics.close()

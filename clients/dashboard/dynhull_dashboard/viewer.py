@@ -69,7 +69,7 @@ class Viewer:
         self._many = ManyPicks(hub)
         self._many.show(prefixes, ())
         self._fences = FencePicks(hub, fences)
-        self._show(hub.server.largest() if self._untouched else hulls or ())
+        self._show(hub.hull_list.largest() if self._untouched else hulls or ())
         self._takes: Mapping[str, tuple[Callable[[object], bool], Callable[[Any], None]]] = {
             "hulls": (_are_names, self._pick_hulls),
             "fences": (_are_names, self._pick_fences),
@@ -205,7 +205,7 @@ class Viewer:
     def _choose(self) -> None:
         """Show what belongs to the viewer's choice, and something where there is none."""
         if self._untouched and not self._shown:
-            self._show(self._hub.server.largest())
+            self._show(self._hub.hull_list.largest())
         if self._fences.untouched and not self._fences.names and (fences := self._fences.some(self._shown)):
             self._fences.show(fences)
         hulls = self._fences.new_hulls()
@@ -231,18 +231,18 @@ class Viewer:
 
     def _text(self) -> dict[str, Any]:
         """The words and the figures."""
-        server, fences = self._hub.server, self._hub.fence_list
+        hull_list, fences = self._hub.hull_list, self._hub.fence_list
         feeds = [shown.feed for shown in self._shown.values()]
         many = [feed for feed, _ in self._many.feeds]
-        connected = server.error is None
+        connected = hull_list.error is None
         rows = ((shown.feed, shown.look) for shown in self._shown.values())
         return {
-            "offered": [*(f"{prefix}*" for prefix in server.prefixes()), *sorted(server.hulls)],
-            "offered_fences": sorted(fences.fences),
-            "banner": about_server(self._hub.address, server.error)
-            if server.error
+            "offered": [*(f"{prefix}*" for prefix in hull_list.prefixes()), *sorted(hull_list.by_name)],
+            "offered_fences": sorted(fences.by_name),
+            "banner": about_server(self._hub.address, hull_list.error)
+            if hull_list.error
             else about_metrics(self._hub.metrics),
-            "note": about_picture(self._hub.address, server, feeds, self._fences.feeds, many),
+            "note": about_picture(self._hub.address, hull_list, feeds, self._fences.feeds, many),
             "outliers": [self._outliers[name].words for name in self._shown if name in self._outliers],
             "fence_hint": about_fences(self._hub.address, fences, shown=bool(self._fences.names)),
             "description": describe(feeds, self._fences.feeds, many),
