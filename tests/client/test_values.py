@@ -92,6 +92,7 @@ EXPORTED = [
     "RevisionForgottenError",
     "Sampled",
     "Separation",
+    "Series",
     "SequenceAheadError",
     "SequenceGapError",
     "Sketch",

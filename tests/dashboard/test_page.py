@@ -542,8 +542,10 @@ def test_the_link_keeps_where_the_picture_is(browser: Browser, url: str, client:
         with opened(browser, url, hull) as page:
             page.wait_for_function("name => picture.hulls.get(name)?.corners?.length >= 3", arg=hull)
             page.get_by_role("application").press("+")
-            page.get_by_role("application").press("ArrowLeft")
             page.wait_for_function("() => location.search.includes('view=')")
+            larger = page.evaluate("location.search")
+            page.get_by_role("application").press("ArrowLeft")
+            page.wait_for_function("larger => location.search != larger", arg=larger)
             extent = page.evaluate("picture.view.extent")
             page.reload()
             page.wait_for_function("name => picture.hulls.get(name)?.corners?.length >= 3 && !picture.wanted", arg=hull)

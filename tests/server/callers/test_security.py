@@ -73,6 +73,7 @@ EVERY_CALL = {
     "Distance": lambda stub, name: stub.Distance(pb.DistanceRequest(name=name)),
     "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
+    "GetSeries": lambda stub, name: stub.GetSeries(pb.GetSeriesRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
     "WatchMany": lambda stub, name: next(stub.WatchMany(pb.WatchManyRequest(names=[name]))),
     "GetLayers": lambda stub, name: stub.GetLayers(pb.GetLayersRequest(name=name, layer_count=1)),
