@@ -1,5 +1,6 @@
 """The part of a hull that a watcher follows: its vertices, or the extreme ones in some directions."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -158,12 +159,58 @@ class ResumedView(VerticesView):
             return await self.next()
 
 
-# Extreme vertices, all vertices, and the keys of the extreme ones.
-_Looked = tuple[Points, Points | None, VertexKeys | None]
+# Chosen vertices, all vertices, the keys of the chosen ones, and how far the hull reaches beyond them.
+_Chosen = tuple[Points, Points | None, VertexKeys | None, float]
 
 
-class SketchView:
-    """The extreme vertices in some directions; each event has all of them.
+class _ChosenView(ABC):
+    """Some of the vertices; each event has all of them.
+
+    Args:
+        hull: the hull.
+        vertices: whether to include all vertices.
+        keys: whether to include the keys of those that are chosen, in a keyed hull.
+        layer: the convex layer.
+    """
+
+    def __init__(self, hull: LiveHull, *, vertices: bool, keys: bool, layer: int = 1) -> None:
+        self._hull = hull
+        self._with_vertices = vertices
+        self._with_keys = keys
+        self._layer = layer
+        self._held: _Chosen = np.empty((0, 2)), None, None, 0.0
+
+    @abstractmethod
+    async def _choose(self, min_revision: int) -> tuple[Counts, _Chosen]:
+        """What there is at a revision."""
+
+    def _read(self, state: HullState, chosen: Points, error: float = 0.0) -> _Chosen:
+        vertices = state.vertices() if self._with_vertices else None
+        return chosen, vertices, state.keys_at(chosen) if self._with_keys else None, error
+
+    def _rows(self, chosen: int) -> int:
+        return chosen + (self._hull.vertex_count if self._with_vertices else 0)
+
+    async def first(self, min_revision: int) -> Event:
+        """A sketch."""
+        counts, self._held = await self._choose(min_revision)
+        return Sketch(counts, self._hull.uid, *self._held)
+
+    async def next(self) -> Event:
+        """A sketch, if it has changed."""
+        before = self._held
+        counts, self._held = await self._choose(0)
+        if all(map(_same, before, self._held)):
+            return Progress(counts)
+        return Sketch(counts, self._hull.uid, *self._held)
+
+    async def changed(self, revision: int) -> None:
+        """Wait until the vertices, or with keys or in an inner layer the hull, may have changed."""
+        await _changed(self._hull, revision, any_point=self._with_keys or self._layer > 1)
+
+
+class SketchView(_ChosenView):
+    """The extreme vertices in some directions.
 
     Args:
         hull: the hull.
@@ -173,38 +220,19 @@ class SketchView:
     """
 
     def __init__(self, hull: LiveHull, directions: Points, *, vertices: bool, keys: bool = False) -> None:
-        self._hull = hull
+        super().__init__(hull, vertices=vertices, keys=keys)
         self._directions = directions
-        self._with_vertices = vertices
-        self._with_keys = keys
-        self._rows = len(directions) + (hull.vertex_count if vertices else 0)
-        self._held: _Looked = np.empty((0, 2)), None, None
 
-    def _look(self, state: HullState) -> _Looked:
+    def _look(self, state: HullState) -> _Chosen:
         extremes = state.outline().support(self._directions) if len(state.hull) else np.empty((0, 2))
-        vertices = state.vertices() if self._with_vertices else None
-        return extremes, vertices, state.keys_at(extremes) if self._with_keys else None
+        return self._read(state, extremes)
 
-    async def first(self, min_revision: int) -> Event:
-        """A sketch."""
-        counts, self._held = await self._hull.read(self._look, self._rows, min_revision)
-        return Sketch(counts, self._hull.uid, *self._held)
-
-    async def next(self) -> Event:
-        """A sketch, if it has changed."""
-        before = self._held
-        counts, self._held = await self._hull.read(self._look, self._rows)
-        if all(map(_same, before, self._held)):
-            return Progress(counts)
-        return Sketch(counts, self._hull.uid, *self._held)
-
-    async def changed(self, revision: int) -> None:
-        """Wait until the vertices, or with keys the hull, may have changed."""
-        await _changed(self._hull, revision, any_point=self._with_keys)
+    async def _choose(self, min_revision: int) -> tuple[Counts, _Chosen]:
+        return await self._hull.read(self._look, self._rows(len(self._directions)), min_revision)
 
 
-class FewView:
-    """At most `most` of the vertices, and how far the hull reaches beyond them; each event has all of them.
+class FewView(_ChosenView):
+    """At most `most` of the vertices, and how far the hull reaches beyond them.
 
     Args:
         hull: the hull.
@@ -215,22 +243,15 @@ class FewView:
     """
 
     def __init__(self, hull: LiveHull, most: int, *, vertices: bool, keys: bool, layer: int) -> None:
-        self._hull = hull
+        super().__init__(hull, vertices=vertices, keys=keys, layer=layer)
         self._most = most
-        self._with_vertices = vertices
-        self._with_keys = keys
-        self._layer = layer
-        self._held: _Looked = np.empty((0, 2)), None, None
-        self._error = 0.0
 
-    def _look(self, state: HullState) -> tuple[_Looked, float]:
+    def _look(self, state: HullState) -> _Chosen:
         """A sketch of the hull itself."""
         assert not isinstance(state.hull, GeographicHull)  # its sketches are made aside
-        chosen, error = state.hull.sketch(self._most)
-        vertices = state.vertices() if self._with_vertices else None
-        return (chosen, vertices, state.keys_at(chosen) if self._with_keys else None), error
+        return self._read(state, *state.hull.sketch(self._most))
 
-    async def _look_aside(self, min_revision: int) -> tuple[Counts, tuple[_Looked, float]]:
+    async def _look_aside(self, min_revision: int) -> tuple[Counts, _Chosen]:
         """A sketch of the vertices of the layer or of places on the globe, made outside of the trips."""
         keys = None
         if self._with_keys:
@@ -239,31 +260,13 @@ class FewView:
             counts, vertices = await self._hull.vertices(min_revision, self._layer)
         chosen, error = await self._hull.sketch(counts, vertices, self._most)
         named = None if keys is None else keys[rows_of(chosen, vertices)]
-        return counts, ((chosen, vertices if self._with_vertices else None, named), error)
+        return counts, (chosen, vertices if self._with_vertices else None, named, error)
 
-    async def _sketch(self, min_revision: int = 0) -> Sketch:
+    async def _choose(self, min_revision: int) -> tuple[Counts, _Chosen]:
         if self._layer > 1 or self._most > FEW_VERTICES or self._hull.geographic:
-            counts, (self._held, self._error) = await self._look_aside(min_revision)
-        else:
-            rows = self._most * ROWS_A_VERTEX + (self._hull.vertex_count if self._with_vertices else 0)
-            counts, (self._held, self._error) = await self._hull.read(self._look, rows, min_revision)
-        return Sketch(counts, self._hull.uid, *self._held, error=self._error)
-
-    async def first(self, min_revision: int) -> Event:
-        """A sketch."""
-        return await self._sketch(min_revision)
-
-    async def next(self) -> Event:
-        """A sketch, if it has changed."""
-        before, error = self._held, self._error
-        sketch = await self._sketch()
-        same = self._error == error and all(map(_same, before, self._held))
-        return Progress(sketch.counts) if same else sketch
-
-    async def changed(self, revision: int) -> None:
-        """Wait until the vertices, or with keys or in an inner layer the hull, may have changed."""
-        await _changed(self._hull, revision, any_point=self._with_keys or self._layer > 1)
+            return await self._look_aside(min_revision)
+        return await self._hull.read(self._look, self._rows(self._most * ROWS_A_VERTEX), min_revision)
 
 
-def _same(a: Points | VertexKeys | None, b: Points | VertexKeys | None) -> bool:
+def _same(a: Points | VertexKeys | float | None, b: Points | VertexKeys | float | None) -> bool:
     return a is b or (a is not None and b is not None and np.array_equal(a, b))
