@@ -5,9 +5,12 @@ feed has begun, each call that is to read it asks the worker whether it may, and
 the worker ends the feed: all of its calls then ask again, and go on with the next feed.
 """
 
+import asyncio
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from typing import Generic, Protocol, TypeVar
 
 from google.protobuf.message import Message
@@ -17,6 +20,8 @@ from dynhull_server.rpc.calls import Call
 from dynhull_server.rpc.status import TOKENS_CHANGED, RelayedError
 
 from .again import reason_of
+from .callers import metadata_of_feed
+from .upstream import Upstream, one_request
 from .worker_link import WorkerLink
 
 
@@ -29,6 +34,55 @@ class SharedFeed(Protocol):
 
     def close(self) -> None:
         """End it."""
+
+
+class WatchFeed(ABC):
+    """One watch of a worker, for all watches of a kind.
+
+    Args:
+        link: the worker.
+        method: the path of the method.
+        request: the watch.
+        name: that of what is watched.
+        ending: what it fails with if the worker ends it without a failure, or None.
+
+    Attributes:
+        over: whether it has ended by itself.
+        failure: what it has ended with, or None.
+    """
+
+    def __init__(
+        self, link: WorkerLink, method: str, request: Message, name: str, ending: Exception | None = None
+    ) -> None:
+        self.over = False
+        self.failure: Exception | None = None
+        self._moved = asyncio.Event()
+        self._running = asyncio.create_task(
+            self._run(partial(link.stream, method, metadata_of_feed(name)), request, ending)
+        )
+
+    def close(self) -> None:
+        """End the watch."""
+        self._running.cancel()
+
+    async def _run(self, begin: Callable[[], Upstream], request: Message, ending: Exception | None) -> None:
+        try:
+            async with one_request(begin(), request.SerializeToString(), nullcontext()) as upstream:
+                while (message := await upstream.read()) is not None:
+                    await self._take(message)
+            self.failure = ending
+        except Exception as error:  # each watcher raises it, and logs what is a bug
+            self.failure = error
+        self.over = True
+        self._wake()
+
+    @abstractmethod
+    async def _take(self, message: bytes) -> None:
+        """Take the next response."""
+
+    def _wake(self) -> None:
+        self._moved.set()
+        self._moved = asyncio.Event()
 
 
 F = TypeVar("F", bound=SharedFeed)

@@ -6,10 +6,9 @@ forgotten the next one gets a watch of its own again. So nobody waits for a slow
 Consumers and watches that are limited or conflated stay their callers' own.
 """
 
-import asyncio
 from collections import deque
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack
 from functools import partial
 from typing import NamedTuple
 
@@ -19,8 +18,8 @@ from dynhull_server.rpc.decode_fence import decode_fence_name
 from dynhull_server.rpc.methods import FENCES
 from dynhull_server.rpc.metrics import Metrics
 
-from .callers import metadata_of, metadata_of_feed
-from .feeds import Feeds, require_allowed, tokens_have_changed
+from .callers import metadata_of
+from .feeds import Feeds, WatchFeed, require_allowed, tokens_have_changed
 from .relay import Relay
 from .upstream import one_request
 from .worker_link import WorkerLink
@@ -149,7 +148,7 @@ class Response(NamedTuple):
     sequence: int
 
 
-class FenceFeed:
+class FenceFeed(WatchFeed):
     """One watch of a worker, for all watches of a fence; its responses are numbered from 1.
 
     Args:
@@ -158,26 +157,15 @@ class FenceFeed:
 
     Attributes:
         uid: that of the fence.
-        over: whether it has ended.
-        failure: what it has ended with, or None.
         latest: the number of the last response.
     """
 
     def __init__(self, link: WorkerLink, request: pb.WatchFenceRequest) -> None:
+        super().__init__(link, WATCH_FENCE, request, request.name)
         self.uid = request.uid
-        self.over = False
         self.latest = 0
-        self.failure: Exception | None = None
-        self._link = link
-        self._request = request
         self._recent: deque[Response] = deque()
         self._bytes = 0
-        self._moved = asyncio.Event()
-        self._running = asyncio.create_task(self._run())
-
-    def close(self) -> None:
-        """End the watch."""
-        self._running.cancel()
 
     def number_at(self, sequence: int) -> int | None:
         """The number of the last response that leads to a sequence, None if it is not kept or the feed has ended."""
@@ -206,25 +194,10 @@ class FenceFeed:
         if self.latest == number and self.failure is not None and not tokens_have_changed(self.failure):
             raise self.failure
 
-    async def _run(self) -> None:
-        try:
-            upstream = self._link.stream(WATCH_FENCE, metadata_of_feed(self._request.name))
-            async with one_request(upstream, self._request.SerializeToString(), nullcontext()):
-                while (message := await upstream.read()) is not None:
-                    self._take(Response(message, pb.WatchFenceResponse.FromString(message).sequence))
-        except Exception as error:  # each watcher raises it, and logs what is a bug
-            self.failure = error
-        self.over = True
-        self._wake()
-
-    def _take(self, response: Response) -> None:
-        self._recent.append(response)
-        self._bytes += len(response.message)
+    async def _take(self, message: bytes) -> None:
+        self._recent.append(Response(message, pb.WatchFenceResponse.FromString(message).sequence))
+        self._bytes += len(message)
         self.latest += 1
         while len(self._recent) > RECENT or (self._bytes > RECENT_BYTES and len(self._recent) > 1):
             self._bytes -= len(self._recent.popleft().message)
         self._wake()
-
-    def _wake(self) -> None:
-        self._moved.set()
-        self._moved = asyncio.Event()

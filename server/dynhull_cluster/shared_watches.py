@@ -10,7 +10,7 @@ sketches always does.
 import asyncio
 from collections import OrderedDict
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
@@ -23,8 +23,8 @@ from dynhull_server.rpc.metrics import Metrics
 from dynhull_server.rpc.status import RelayedError
 from dynhull_server.state.errors import HullNotFoundError
 
-from .callers import metadata_of, metadata_of_feed
-from .feeds import Feeds, require_allowed, tokens_have_changed
+from .callers import metadata_of
+from .feeds import Feeds, WatchFeed, require_allowed, tokens_have_changed
 from .held import WatcherHull
 from .relay import Relay
 from .upstream import lost_status, one_request
@@ -161,7 +161,7 @@ class Event:
     kind: str
 
 
-class HullFeed:
+class HullFeed(WatchFeed):
     """One watch of a worker, for all watches of a kind.
 
     Args:
@@ -171,32 +171,20 @@ class HullFeed:
 
     Attributes:
         uid: that of the hull.
-        failure: what it has ended with, or None.
         recent: what watchers hold at the last revisions.
     """
 
     def __init__(self, link: WorkerLink, request: pb.WatchRequest, uid: str) -> None:
+        ending = RelayedError(lost_status())  # watches do not end by themselves
+        super().__init__(link, WATCH, request, request.name, ending)
         self.uid = uid
-        self.failure: Exception | None = None
         self.recent: OrderedDict[int, WatcherHull] = OrderedDict()
-        self._link = link
         self._request = request
         self._number = 0
         self._latest = Event(b"", "")
         self._event = pb.WatchResponse()
         self._measures = pb.WatchResponse().measures
         self._held: WatcherHull | None = None
-        self._moved = asyncio.Event()
-        self._running = asyncio.create_task(self._run())
-
-    @property
-    def over(self) -> bool:
-        """Whether it has ended by itself."""
-        return self.failure is not None
-
-    def close(self) -> None:
-        """End the watch."""
-        self._running.cancel()
 
     async def at(self, revision: int) -> WatcherHull | None:
         """Wait until the feed is at this revision or later; what watchers hold at it, None if that is not known."""
@@ -245,17 +233,6 @@ class HullFeed:
                 response.measures.CopyFrom(measures)
         return last, now, Event(response.SerializeToString(), response.WhichOneof("event"))
 
-    async def _run(self) -> None:
-        try:
-            upstream = self._link.stream(WATCH, metadata_of_feed(self._request.name))
-            async with one_request(upstream, self._request.SerializeToString(), nullcontext()):
-                while (message := await upstream.read()) is not None:
-                    await self._take(message)
-            self.failure = RelayedError(lost_status())  # watches do not end by themselves
-        except Exception as error:  # each watcher raises it, and logs what is a bug
-            self.failure = error
-        self._wake()
-
     async def _take(self, message: bytes) -> None:
         event = pb.WatchResponse.FromString(message)
         if self._held is None:
@@ -275,10 +252,6 @@ class HullFeed:
 
     def _recent_bytes(self) -> int:
         return sum(each.vertices.nbytes for each in self.recent.values())
-
-    def _wake(self) -> None:
-        self._moved.set()
-        self._moved = asyncio.Event()
 
 
 async def _run(function: Callable[..., T], rows: int, *arguments: Any) -> T:
