@@ -3,7 +3,7 @@
 import struct
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import count, pairwise
 from typing import TYPE_CHECKING, Any
@@ -68,14 +68,16 @@ class FenceExamination:
     def run(self) -> FoundFences:
         """Read everything once."""
         found = self._found
+        ledger = self._ledger
         self._fence_rows()
         if self._has_starts:
-            self._starts()
+            ledger.start_ids = self._each("starts", "first, checksum", self._take_start)
         self._events()
-        self._insides()
-        self._consumers()
+        payload = "payload" if self._contents else "NULL"
+        ledger.inside_ids = self._each("insides", f"sequence, part, parts, checksum, {payload}", self._take_inside)
+        ledger.consumer_ids = self._each("consumers", "name, acknowledged, lost, checksum", self._take_consumer)
         if self._has_delays:
-            self._delays()
+            ledger.delay_ids = self._each("delays", "checksum, payload", self._take_delay)
         for number, fence in self._fences.items():
             self._judge(fence)
             self._ledger.runs.begin(number)
@@ -94,20 +96,24 @@ class FenceExamination:
             found = weight(each.checksum, each.number)
             self._fences[each.number] = FenceRows(each.row, found, found)
 
-    def _starts(self) -> None:
+    def _each(self, table: str, columns: str, take: Callable[..., None]) -> "count[int]":
+        """Take the rows of a table with their fences; the others are dead. Returns the numbers of rows to come."""
         newest = 0
-        for place, number, first, stored in self._reader.every("starts", "rowid, fence, first, checksum"):
-            newest = place
+        for newest, number, *values in self._reader.every(table, f"rowid, fence, {columns}"):
             fence = self._fences.get(number)
             if fence is None:
-                self._ledger.dead["starts"].append(place)
-                continue
-            if fence.start is not None or not _begins(number, first, stored):
-                self._blame(fence, "where its events begin is damaged")
-                continue
-            start, _ = Start.at(place, number, first)
-            fence.begin(start, 0)
-        self._ledger.start_ids = count(newest + 1)
+                self._ledger.dead[table].append(newest)
+            else:
+                take(newest, fence, *values)
+        return count(newest + 1)
+
+    def _take_start(self, place: int, fence: FenceRows, first: Any, stored: Any) -> None:
+        number = fence.row.number
+        if fence.start is not None or not _begins(number, first, stored):
+            self._blame(fence, "where its events begin is damaged")
+            return
+        start, _ = Start.at(place, number, first)
+        fence.begin(start, 0)
 
     def _events(self) -> None:
         column = "payload" if self._contents else "CASE fence WHEN 0 THEN payload END"
@@ -152,59 +158,36 @@ class FenceExamination:
         else:
             self._ledger.dead["events"].append(place)
 
-    def _insides(self) -> None:
-        column = "payload" if self._contents else "NULL"
-        columns = f"rowid, fence, sequence, part, parts, checksum, {column}"
-        newest = 0
-        for place, number, sequence, part, parts, stored, payload in self._reader.every("insides", columns):
-            newest = place
-            fence = self._fences.get(number)
-            if fence is None:
-                self._ledger.dead["insides"].append(place)
-                continue
-            keys = number, sequence, part, parts
-            each = self._weight(fence, f"who was inside after event {sequence}", stored, payload, *keys)
-            if each is not None:
-                fence.put_inside(sequence, parts, part, place, each)
-        self._ledger.inside_ids = count(newest + 1)
+    def _take_inside(
+        self, place: int, fence: FenceRows, sequence: Any, part: Any, parts: Any, stored: Any, payload: Any
+    ) -> None:
+        keys = fence.row.number, sequence, part, parts
+        each = self._weight(fence, f"who was inside after event {sequence}", stored, payload, *keys)
+        if each is not None:
+            fence.put_inside(sequence, parts, part, place, each)
 
-    def _consumers(self) -> None:
-        columns = "rowid, fence, name, acknowledged, lost, checksum"
-        newest = 0
-        for place, number, name, acknowledged, lost, stored in self._reader.every("consumers", columns):
-            newest = place
-            fence = self._fences.get(number)
-            if fence is None:
-                self._ledger.dead["consumers"].append(place)
-                continue
-            consumer = Consumer(name, acknowledged, lost)
-            if not _whole(number, consumer, stored):
-                self._blame(fence, f"the consumer {name!r} is damaged")
-                continue
-            fence.put_consumer(consumer, place, weight(stored, number))
-        self._ledger.consumer_ids = count(newest + 1)
+    def _take_consumer(
+        self, place: int, fence: FenceRows, name: Any, acknowledged: Any, lost: Any, stored: Any
+    ) -> None:
+        number, consumer = fence.row.number, Consumer(name, acknowledged, lost)
+        if not _whole(number, consumer, stored):
+            self._blame(fence, f"the consumer {name!r} is damaged")
+            return
+        fence.put_consumer(consumer, place, weight(stored, number))
 
-    def _delays(self) -> None:
-        newest = 0
-        for place, number, stored, payload in self._reader.every("delays", "rowid, fence, checksum, payload"):
-            newest = place
-            fence = self._fences.get(number)
-            if fence is None:
-                self._ledger.dead["delays"].append(place)
-                continue
-            try:
-                whole = checksum(payload, number) == stored
-                subject, _ = decode_delay(payload)
-                each = weight(stored, number)
-            except (ValueError, TypeError, struct.error):
-                whole = False
-            if not whole:
-                self._blame(fence, "a delay is damaged")
-                continue
-            if subject in fence.delays:
-                self._blame(fence, f"the key {subject[1]!r} of the hull {subject[0]!r} has two delays")
-            fence.put_delay(subject, place, each)
-        self._ledger.delay_ids = count(newest + 1)
+    def _take_delay(self, place: int, fence: FenceRows, stored: Any, payload: Any) -> None:
+        try:
+            whole = checksum(payload, fence.row.number) == stored
+            subject, _ = decode_delay(payload)
+            each = weight(stored, fence.row.number)
+        except (ValueError, TypeError, struct.error):
+            whole = False
+        if not whole:
+            self._blame(fence, "a delay is damaged")
+            return
+        if subject in fence.delays:
+            self._blame(fence, f"the key {subject[1]!r} of the hull {subject[0]!r} has two delays")
+        fence.put_delay(subject, place, each)
 
     def _weight(self, fence: FenceRows, what: str, stored: Any, payload: Any, *keys: Any) -> int | None:
         """The weight of a row; None if it is damaged."""

@@ -110,17 +110,7 @@ FORMAT_10 = TABLES | {
     checksum INTEGER NOT NULL,
     payload BLOB NOT NULL
 )""",
-    "totals": """CREATE TABLE totals (
-    id INTEGER PRIMARY KEY,
-    commits INTEGER NOT NULL,
-    hulls INTEGER NOT NULL,
-    batches INTEGER NOT NULL,
-    sum INTEGER NOT NULL,
-    next_number INTEGER NOT NULL,
-    mode INTEGER NOT NULL,
-    fence_rows INTEGER NOT NULL,
-    checksum INTEGER NOT NULL
-)""",
+    "totals": TABLES["totals"].replace("    committed INTEGER NOT NULL,\n", ""),
 }
 # Up to format 6 the rows of events said where the events of a fence begin.
 FORMAT_6 = {table: sql for table, sql in FORMAT_10.items() if table != "starts"}
@@ -128,16 +118,7 @@ FORMAT_6 = {table: sql for table, sql in FORMAT_10.items() if table != "starts"}
 FORMAT_5 = {table: sql for table, sql in FORMAT_6.items() if table != "delays"}
 # Format 3 had no fences.
 FORMAT_3 = {table: sql for table, sql in FORMAT_10.items() if table not in FENCE_TABLES} | {
-    "totals": """CREATE TABLE totals (
-    id INTEGER PRIMARY KEY,
-    commits INTEGER NOT NULL,
-    hulls INTEGER NOT NULL,
-    batches INTEGER NOT NULL,
-    sum INTEGER NOT NULL,
-    next_number INTEGER NOT NULL,
-    mode INTEGER NOT NULL,
-    checksum INTEGER NOT NULL
-)""",
+    "totals": FORMAT_10["totals"].replace("    fence_rows INTEGER NOT NULL,\n", ""),
 }
 # Format 2 had one setting of a hull, and in batches and snapshots neither keys nor times.
 FORMAT_2 = FORMAT_3 | {
