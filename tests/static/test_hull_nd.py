@@ -9,7 +9,6 @@ from math import comb
 import numpy as np
 import oracle
 import pytest
-from scipy.spatial import ConvexHull
 
 from dynhull.static import hull_nd
 
@@ -51,6 +50,8 @@ def test_random_points(d):
     points = np.random.default_rng(d).normal(size=(60, d))
     hull = hull_nd(points)
     assert hull.dimension == d
+    from scipy.spatial import ConvexHull  # here: each process that collects tests would wait for scipy
+
     np.testing.assert_array_equal(hull.vertices, np.unique(points[ConvexHull(points).vertices], axis=0))
     assert hull.faces.shape[1] == d
     assert_outside_is_outside(hull, points)
