@@ -60,7 +60,7 @@ def test_vector_sheet(example, tmp_path):
     drawing = ET.fromstring((tmp_path / "a.svg").read_text(encoding="utf-8"))
     words = {element.text for element in drawing.iter("{http://www.w3.org/2000/svg}text")}
     assert {"graham_scan: example.csv", "13/13  the hull: 5 vertices"} <= words
-    from dynhull_cli.explain.picture import draw_sheet  # here: each process that collects tests would wait for matplotlib
+    from dynhull_cli.explain.picture import draw_sheet  # not by each process that collects tests
 
     draw_sheet(tmp_path / "b.SVG", static_story("graham_scan", "example.csv", EXAMPLE, "drop"))
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.SVG").read_bytes()
