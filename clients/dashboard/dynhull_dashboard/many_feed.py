@@ -2,10 +2,13 @@
 
 import asyncio
 import json
+import time
 from collections import OrderedDict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
+
+import numpy as np
 
 from dynhull_client import AsyncHullClient, AsyncManyWatch, DynhullError, ManyChange
 
@@ -13,7 +16,9 @@ from .degrees import outline, shown
 
 # States of a hull a second, and its vertices: of many hulls each is small in the picture.
 MAX_RATE, MOST_VERTICES = 2.0, 24
-RETRY_SECONDS = 1.0
+RETRY_SECONDS, SLICE_SECONDS = 1.0, 0.02
+# Edges of hulls that are smaller than this, in degrees, are straight in the picture, but near a pole.
+STRAIGHT, POLAR = 1.0, 80.0
 # Names of hulls that are gone, kept for viewers who have yet to hear of it, before these get all hulls again.
 MOST_GONE = 1_000
 
@@ -107,9 +112,13 @@ class ManyFeed:
                 async with self._client.watch_many(
                     self.prefix, contents="outline", max_vertices=MOST_VERTICES, max_rate=MAX_RATE
                 ) as self._watch:
+                    begun = time.monotonic()
                     async for change in self._watch:
                         self._failure = None
                         self._take(change)
+                        if time.monotonic() - begun > SLICE_SECONDS:  # pages are sent what there is meanwhile
+                            await asyncio.sleep(0)
+                            begun = time.monotonic()
             except DynhullError as error:
                 self._failure = error
             self._begin_anew()
@@ -141,7 +150,10 @@ def _drawing(change: ManyChange) -> str:
     """The outline of a hull as JSON, without corners for one that is gone."""
     if change.vertices is None:
         return json.dumps({"hull": change.hull, "revision": 0, "x": [], "y": [], "rings": None, "gone": True})
-    x, y = shown(change.vertices, change.center).T.tolist()
-    # Rings that may have more corners say that it is on the globe: these outlines are small.
-    rings = None if change.center is None else [ring.tolist() for ring in outline(change.vertices, change.center)]
+    corners = shown(change.vertices, change.center)
+    x, y = corners.T.tolist()
+    rings = None
+    if change.center is not None:  # rings say that it is on the globe; great circles take long
+        straight = len(corners) and (np.ptp(corners, axis=0) < STRAIGHT).all() and abs(corners[0, 1]) < POLAR
+        rings = [ring.tolist() for ring in ([corners] if straight else outline(change.vertices, change.center))]
     return json.dumps({"hull": change.hull, "revision": change.revision, "x": x, "y": y, "rings": rings})
