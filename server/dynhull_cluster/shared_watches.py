@@ -225,6 +225,8 @@ class HullFeed(WatchFeed):
             response.clock_time.CopyFrom(event.clock_time)
         if event.HasField("center"):
             response.center.CopyFrom(event.center)
+        if event.HasField("changed_time"):
+            response.changed_time.CopyFrom(event.changed_time)
         if change is None:
             response.progress.SetInParent()
         else:

@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from dynhull_client import Change, Event, HullClient, HullCopy, Measures, Points, Sketch, Snapshot, Watch
+from dynhull_client import Change, Deleted, Event, HullClient, HullCopy, Measures, Points, Sketch, Snapshot, Watch
 
 from .closed_pipe import when_pipe_closes
 from .json_lines import json_line, members
@@ -157,6 +157,7 @@ def _json(event: Event, corners: Corners | None) -> str:
         points=event.points,
         snapshot=isinstance(event, Snapshot),
         **vertices,
+        changed=None if isinstance(event, Deleted) else event.changed,
         **({} if measures is None else members(measures)),
         **({} if corners is None else {"joined": corners.joined, "left": corners.left}),
     )

@@ -50,6 +50,7 @@ class HullCopies(Mapping[str, HullCopy]):
                     change.uid,
                     clock=change.clock,
                     center=change.center,
+                    changed=change.changed,
                 )
             )
         elif change.kind == "gone":

@@ -78,6 +78,7 @@ class HullInfo:
         held: the number of keys in quarantine.
         shards: the number of shards that its points are divided among; None for a hull that is not divided. Of a keyed
             hull over shards `distinct` is 0, because it is not known.
+        changed: when its newest batch was committed, or points last left by time; None where that is not known.
     """
 
     name: str
@@ -96,6 +97,7 @@ class HullInfo:
     quarantine: Quarantine | None = None
     held: int = 0
     shards: int | None = None
+    changed: datetime | None = None
 
     @property
     def restored(self) -> bool:
@@ -295,7 +297,8 @@ class Snapshot(Value, Shown):
     """The whole hull. `uid` identifies it when a watch resumes.
 
     This and the other events have the cause of their revision, "batch", "expiry" or "recenter"; the hull's clock at
-    that revision, None for a hull without one; and the centre of a geographic hull. Keys are None unless requested.
+    that revision, None for a hull without one; the centre of a geographic hull; and when the hull `changed` last, as in
+    `HullInfo`. Keys are None unless requested.
     """
 
     revision: int
@@ -307,6 +310,7 @@ class Snapshot(Value, Shown):
     cause: Cause = "batch"
     clock: datetime | None = None
     center: tuple[float, float] | None = None
+    changed: datetime | None = None
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
@@ -342,6 +346,7 @@ class Change(Value):
     cause: Cause = "batch"
     clock: datetime | None = None
     center: tuple[float, float] | None = None
+    changed: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -362,6 +367,7 @@ class Sketch(Value):
     center: tuple[float, float] | None = None
     error: float = 0.0
     uid: str = ""
+    changed: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -373,6 +379,7 @@ class Progress:
     cause: Cause = "batch"
     clock: datetime | None = None
     center: tuple[float, float] | None = None
+    changed: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -507,6 +514,7 @@ def decode_info(message: hull_pb2.Hull) -> HullInfo:
         decode_quarantine(message.quarantine) if message.HasField("quarantine") else None,
         message.held_count,
         config.shards or None,
+        _changed(message),
     )
 
 
@@ -604,15 +612,17 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
     measures = decode_measures(message.measures) if message.HasField("measures") else None
     head = message.revision, message.point_count
     cause, clock, center = CAUSES.get(message.cause, BATCH), _clock(message), decode_center(message)
+    changed = _changed(message)
     if message.HasField("snapshot"):
         snapshot = message.snapshot
         named = decode_names(snapshot.vertex_keys) if keys else None
-        return Snapshot(*head, decode_points(snapshot.vertices), measures, snapshot.uid, named, cause, clock, center)
+        vertices = decode_points(snapshot.vertices)
+        return Snapshot(*head, vertices, measures, snapshot.uid, named, cause, clock, center, changed)
     if message.HasField("sketch"):
         named = decode_names(message.sketch.keys) if keys else None
         sketch = message.sketch
         vertices = decode_points(sketch.vertices)
-        return Sketch(*head, vertices, measures, named, cause, clock, center, sketch.error, sketch.uid)
+        return Sketch(*head, vertices, measures, named, cause, clock, center, sketch.error, sketch.uid, changed)
     if message.HasField("change"):
         change = message.change
         return Change(
@@ -629,9 +639,10 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
             cause,
             clock,
             center,
+            changed,
         )
     if message.HasField("progress"):
-        return Progress(*head, cause, clock, center)
+        return Progress(*head, cause, clock, center, changed)
     return None
 
 
@@ -674,6 +685,10 @@ def _window(message: hull_pb2.Window) -> Window:
 
 def _clock(message: hull_pb2.Hull | batch_pb2.BatchResult | hull_service_pb2.WatchResponse) -> datetime | None:
     return decode_time(message.clock_time) if message.HasField("clock_time") else None
+
+
+def _changed(message: hull_pb2.Hull | hull_service_pb2.WatchResponse) -> datetime | None:
+    return decode_time(message.changed_time) if message.HasField("changed_time") else None
 
 
 def _only(message: points_pb2.Points) -> tuple[float, float] | None:

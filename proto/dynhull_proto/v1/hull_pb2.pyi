@@ -58,7 +58,7 @@ IDENTITY_STRING_KEYS: Identity
 IDENTITY_INTEGER_KEYS: Identity
 
 class Hull(_message.Message):
-    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid", "clock_time", "center", "quarantine", "held_count")
+    __slots__ = ("name", "config", "revision", "point_count", "distinct_point_count", "create_time", "uid", "clock_time", "center", "quarantine", "held_count", "changed_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     CONFIG_FIELD_NUMBER: _ClassVar[int]
     REVISION_FIELD_NUMBER: _ClassVar[int]
@@ -70,6 +70,7 @@ class Hull(_message.Message):
     CENTER_FIELD_NUMBER: _ClassVar[int]
     QUARANTINE_FIELD_NUMBER: _ClassVar[int]
     HELD_COUNT_FIELD_NUMBER: _ClassVar[int]
+    CHANGED_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     config: HullConfig
     revision: int
@@ -81,7 +82,8 @@ class Hull(_message.Message):
     center: LonLat
     quarantine: Quarantine
     held_count: int
-    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ..., quarantine: _Optional[_Union[Quarantine, _Mapping]] = ..., held_count: _Optional[int] = ...) -> None: ...
+    changed_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ..., quarantine: _Optional[_Union[Quarantine, _Mapping]] = ..., held_count: _Optional[int] = ..., changed_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class HullConfig(_message.Message):
     __slots__ = ("identity", "max_points", "window", "ordering", "frame", "center", "quarantine", "shards")

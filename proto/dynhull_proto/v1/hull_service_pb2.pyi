@@ -1066,7 +1066,7 @@ class WatchResume(_message.Message):
     def __init__(self, uid: _Optional[str] = ..., revision: _Optional[int] = ...) -> None: ...
 
 class WatchResponse(_message.Message):
-    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "sketch", "measures", "cause", "clock_time", "center")
+    __slots__ = ("revision", "point_count", "snapshot", "change", "progress", "sketch", "measures", "cause", "clock_time", "center", "changed_time")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     POINT_COUNT_FIELD_NUMBER: _ClassVar[int]
     SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
@@ -1077,6 +1077,7 @@ class WatchResponse(_message.Message):
     CAUSE_FIELD_NUMBER: _ClassVar[int]
     CLOCK_TIME_FIELD_NUMBER: _ClassVar[int]
     CENTER_FIELD_NUMBER: _ClassVar[int]
+    CHANGED_TIME_FIELD_NUMBER: _ClassVar[int]
     revision: int
     point_count: int
     snapshot: HullSnapshot
@@ -1087,7 +1088,8 @@ class WatchResponse(_message.Message):
     cause: _batch_pb2.Cause
     clock_time: _timestamp_pb2.Timestamp
     center: _hull_pb2.LonLat
-    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., cause: _Optional[_Union[_batch_pb2.Cause, str]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ...) -> None: ...
+    changed_time: _timestamp_pb2.Timestamp
+    def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., cause: _Optional[_Union[_batch_pb2.Cause, str]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ..., changed_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class HullSnapshot(_message.Message):
     __slots__ = ("vertices", "uid", "vertex_keys")

@@ -160,7 +160,14 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
     message.create_time.FromDatetime(hull.created)
     if counts.clock is not None:
         message.clock_time.FromMicroseconds(counts.clock)
+    encode_changed(hull, message)
     return message
+
+
+def encode_changed(hull: LiveHull, message: hull_pb2.Hull | hull_service_pb2.WatchResponse) -> None:
+    """Write when a hull changed last."""
+    if hull.committed is not None:
+        message.changed_time.FromMicroseconds(hull.committed.time)
 
 
 def encode_positions(

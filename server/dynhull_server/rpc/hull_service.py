@@ -510,6 +510,7 @@ class HullService:
                         event = await anext(events)
                         call.require_entitled()
                         message = await encode.encode_watched(event, encoding, self._aside, measure)
+                        encode.encode_changed(hull, message)
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
                         await call.write_within(self._max_watch_lag, message)
 

@@ -3,6 +3,7 @@
 import asyncio
 import signal
 from collections.abc import Iterator
+from datetime import timedelta
 from itertools import count
 from pathlib import Path
 
@@ -84,6 +85,22 @@ def test_a_summary_has_what_the_hull_has(client: HullClient, name: str) -> None:
     assert state.measures.diameter == client.get_measures(name).diameter
     assert state.vertices is None
     assert state.changed is not None
+
+
+def test_every_look_says_the_same_measures_and_when_the_hull_changed(client: HullClient, name: str) -> None:
+    client.create_hull(name)
+    created = client.get_hull(name).info
+    client.apply(name, insert=SQUARE)
+    hull = client.get_hull(name)
+    assert created.created - timedelta(seconds=1) < created.changed <= hull.info.changed
+    with client.watch_many(names=[name]) as many, client.watch(name, measures=True) as watch:
+        state, event = next(many), next(watch)
+        assert hull.measures == state.measures == event.measures
+        assert hull.info.changed == state.changed == event.changed
+        client.apply(name, insert=[[9, 9]])
+        event = next(watch)
+        assert client.get_hull(name).info.changed == event.changed >= state.changed
+    assert client.series(name).changed_times[-1] == np.datetime64(event.changed.replace(tzinfo=None))
 
 
 def test_an_outline_within_an_error(client: HullClient, name: str) -> None:

@@ -7,6 +7,7 @@ import dynhull_client
 from ..answers import Place, Rows, answering
 from ..schemas import Measures, Response, SubjectsInside
 
+CHANGED = "When the newest batch was committed, or points last left by time."
 # The id of an event says after which sequence to go on.
 STATE = [name for name in dynhull_client.ManyChange.__dataclass_fields__ if name not in ("kind", "position")]
 SENT = [name for name in dynhull_client.FenceEvent.__dataclass_fields__ if name != "after"]
@@ -26,6 +27,7 @@ class HullSnapshot(HullEvent):
     vertex_keys: list[str] | list[int] | None = Field(None, description="With keys=true, the key of each vertex.")
     center: Place | None = Field(description="Of a hull on the globe, longitude and latitude of its centre.")
     measures: Measures | None = Field(None, description="With measures=true.")
+    changed: str | None = Field(None, description=CHANGED)
     error: float | None = Field(
         None,
         description="With max_vertices, the distance by which the hull reaches beyond the vertices, rounded up; "
@@ -54,6 +56,7 @@ class HullChange(HullEvent):
     cause: str = Field(description="What has changed the hull: batch, expiry or recenter.")
     clock: str | None = Field(None, description="The clock of a hull with a window.")
     center: Place | None = Field(None, description="Of a hull on the globe whose centre has moved.")
+    changed: str | None = Field(None, description=CHANGED)
 
 
 class HullProgress(HullEvent):
@@ -63,6 +66,7 @@ class HullProgress(HullEvent):
     cause: str = Field(description="As in a change.")
     clock: str | None = Field(None, description="As in a change.")
     center: Place | None = Field(None, description="As in a change.")
+    changed: str | None = Field(None, description="As in a change.")
 
 
 @answering(dynhull_client.FenceEvent, SENT, partial=True)

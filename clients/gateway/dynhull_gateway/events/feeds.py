@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 from time import monotonic
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from dynhull_client import (
     AsyncHullClient,
@@ -28,6 +28,9 @@ from dynhull_client import (
 from ..figures import Figures
 from .messages import COMMENT, message, problem
 from .shared import SharedWatch
+
+if TYPE_CHECKING:
+    from datetime import datetime
 
 Form = Literal["changes", "vertices", "geojson"]
 
@@ -66,6 +69,7 @@ class Feed(SharedWatch[Event]):
         self._copy = HullCopy()
         self._known = False  # whether the copy holds the hull
         self._measures: Measures | None = None
+        self._changed: datetime | None = None
         self._error: float | None = None  # how far the hull reaches beyond the vertices of a sketch
         self._events: deque[_Sent] = deque(maxlen=KEPT)
         self._count = 0
@@ -141,6 +145,7 @@ class Feed(SharedWatch[Event]):
             text = message("deleted", "", {"revision": event.revision})
             self._events.clear()
         else:
+            self._changed = event.changed
             if not isinstance(event, Progress):
                 self._measures = event.measures
             text = self._text(event)
@@ -166,6 +171,8 @@ class Feed(SharedWatch[Event]):
         head: dict[str, Any] = {"revision": copy.revision, "points": copy.points}
         if self._measures is not None:
             head["measures"] = shown(self._measures)
+        if self._changed is not None:
+            head["changed"] = self._changed
         if self._error is not None:
             head["error"] = self._error
         if self._view.form == "geojson":
@@ -188,7 +195,7 @@ def shown(value: Any) -> dict[str, Any]:
 def _whole_sketch(sketch: Sketch) -> Snapshot:
     """A sketch as the snapshot of a hull that has only these vertices."""
     head = sketch.revision, sketch.points, sketch.vertices, sketch.measures
-    return Snapshot(*head, vertex_keys=sketch.keys, center=sketch.center)
+    return Snapshot(*head, vertex_keys=sketch.keys, center=sketch.center, changed=sketch.changed)
 
 
 def _plain(value: Any) -> Any:
