@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 
 
 def prepare(modules: Sequence[str]) -> None:
-    """Have the process that forks others import what they will run, with these modules; before the first is started."""
+    """Have the process that forks others import what they will run, these modules; before the first is started."""
     PROCESSES.set_forkserver_preload([*IMPORTED, *modules])
 
 

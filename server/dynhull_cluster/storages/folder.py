@@ -23,9 +23,7 @@ from dynhull_server.storage.worker_folders import (
 )
 
 from ..divisions.divisions import ServedDivisions
-from ..gateway import Gateway
 from ..sockets import Sockets, socket_folder
-from ..worker import worker_server
 from .kind import Begin, Serving, Shared
 
 # Seconds in which the processes of a supervisor that was killed have ended, too.
@@ -37,7 +35,7 @@ log = logging.getLogger(__name__)
 class FolderKind:
     """Serves hulls in the data folder."""
 
-    preloads: Sequence[str] = ()
+    preloads: Sequence[str] = (__name__, "dynhull_cluster.gateway", "dynhull_cluster.worker")
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -70,11 +68,15 @@ class FolderKind:
 
     async def worker(self, number: int, begin: Begin) -> Serving:
         """The server of a worker, on its own part of the folder."""
+        from ..worker import worker_server
+
         storage = SQLiteStorage(worker_folder(self._data, number), self._settings.durability)
         return worker_server(self._settings, number, Sockets(Path(begin["sockets"])), storage)
 
     async def gateway(self, begin: Begin) -> Serving:
         """A gateway to the sockets."""
+        from ..gateway import Gateway
+
         return Gateway(self._settings, self._settings.workers or 1, Sockets(Path(begin["sockets"])))
 
 

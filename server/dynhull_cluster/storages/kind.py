@@ -41,7 +41,7 @@ class StorageKind(Protocol):
     """Makes what the processes of a server serve, for the settings it was made with.
 
     Attributes:
-        preloads: modules that workers and gateways run besides; what is not installed is left out.
+        preloads: the modules that workers and gateways run; what is not installed is left out.
     """
 
     preloads: Sequence[str]

@@ -10,16 +10,14 @@ from dynhull_server.settings import Settings
 from dynhull_server.storage.memory import MemoryStorage
 
 from ..divisions.divisions import ServedDivisions
-from ..gateway import Gateway
 from ..sockets import Sockets, socket_folder
-from ..worker import worker_server
 from .kind import Begin, Serving, Shared
 
 
 class MemoryKind:
     """Serves hulls in memory."""
 
-    preloads: Sequence[str] = ()
+    preloads: Sequence[str] = (__name__, "dynhull_cluster.gateway", "dynhull_cluster.worker")
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -36,8 +34,12 @@ class MemoryKind:
 
     async def worker(self, number: int, begin: Begin) -> Serving:
         """The server of a worker."""
+        from ..worker import worker_server
+
         return worker_server(self._settings, number, Sockets(Path(begin["sockets"])), MemoryStorage(keeps=False))
 
     async def gateway(self, begin: Begin) -> Serving:
         """A gateway to the sockets."""
+        from ..gateway import Gateway
+
         return Gateway(self._settings, self._settings.workers or 1, Sockets(Path(begin["sockets"])))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class PostgresKind:
     """Serves hulls in a database of PostgreSQL."""
 
-    preloads: Sequence[str] = "dynhull_cluster.machines.member", "dynhull_cluster.machines.public"
+    preloads: Sequence[str] = (__name__, "dynhull_cluster.machines.member", "dynhull_cluster.machines.public")
 
     def __init__(self, settings: Settings) -> None:
         if not settings.cluster:  # nobody else reaches its workers
