@@ -45,6 +45,27 @@ def test_each_batch_is_acknowledged_in_order(stub: HullServiceStub, hull: str) -
     assert vertices.tolist() == DynamicHull(np.concatenate(batches)).vertices().tolist()
 
 
+@pytest.mark.parametrize("rows", [1, 20_000], ids=["small", "decoded in a thread"])
+def test_a_batch_that_cannot_be_decoded_is_refused_in_its_turn(stub: HullServiceStub, hull: str, rows: int) -> None:
+    """Not where its number has already been applied: it is a duplicate, whatever it holds now."""
+
+    def requests(*batches: tuple[int, object]) -> Iterator[pb.StreamRequest]:
+        for sequence, xy in batches:
+            yield pb.StreamRequest(name=hull, producer="p", sequence=sequence, batch=insert(xy))
+
+    many, wrong = np.ones((rows, 2)), np.full((rows, 2), np.nan)
+    responses = [*stub.Stream(requests((1, many), (2, [[3, 4]]), (1, wrong), (2, many), (3, [[5, 6]])))]
+    assert [each.result.duplicate for each in responses] == [False, False, True, True, False]
+    acknowledged = []
+
+    def take() -> None:
+        acknowledged.extend(each.sequence for each in stub.Stream(requests((4, many), (5, wrong), (6, many))))
+
+    _, info, _ = refusal(take)
+    assert (info.reason, info.metadata["field"], info.metadata["row"]) == ("INVALID_FIELD", "batch.inserts", "0")
+    assert acknowledged == [4]
+
+
 def test_an_acknowledgement_does_not_wait_for_the_next_batch(stub: HullServiceStub, hull: str) -> None:
     turns: SimpleQueue[int] = SimpleQueue()
 
