@@ -8,6 +8,7 @@ import numpy as np
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
 from ..state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, Initial, PolygonArea, Ring, SubjectKind
+from . import encode_fence
 from .decode import (
     LARGEST_INTEGER,
     NAME,
@@ -27,9 +28,7 @@ BOUNDARIES = {
 }
 INITIALS: dict[int, Initial] = {
     fence_pb2.FENCE_INITIAL_UNSPECIFIED: "snapshot",
-    fence_pb2.FENCE_INITIAL_SNAPSHOT: "snapshot",
-    fence_pb2.FENCE_INITIAL_EVENTS: "events",
-    fence_pb2.FENCE_INITIAL_NONE: "none",
+    **{number: initial for initial, number in encode_fence.INITIALS.items()},
 }
 KINDS: dict[str, SubjectKind] = {"subject_hull": "hull", "subject_prefix": "prefix", "other_hull": "other"}
 BYTES_PER_POINT = 16

@@ -1,6 +1,7 @@
 """Conversion of fences and their events to messages."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
@@ -30,16 +31,8 @@ ALL_CAUSES: tuple[fence_pb2.FenceCause, ...] = (
 )
 # The causes of each set of them: the bit n stands for the nth of ALL_CAUSES.
 CAUSES = [[cause for bit, cause in enumerate(ALL_CAUSES) if causes >> bit & 1] for causes in range(256)]
-TYPES: dict[EventType, fence_pb2.FenceEventType] = {
-    EventType.ENTER: fence_pb2.FENCE_EVENT_TYPE_ENTER,
-    EventType.EXIT: fence_pb2.FENCE_EVENT_TYPE_EXIT,
-    EventType.CROSS: fence_pb2.FENCE_EVENT_TYPE_CROSS,
-    EventType.DWELL: fence_pb2.FENCE_EVENT_TYPE_DWELL,
-    EventType.TRANSFER: fence_pb2.FENCE_EVENT_TYPE_TRANSFER,
-    EventType.BEGIN: fence_pb2.FENCE_EVENT_TYPE_BEGIN,
-    EventType.CEASE: fence_pb2.FENCE_EVENT_TYPE_CEASE,
-    EventType.SNAPSHOT: fence_pb2.FENCE_EVENT_TYPE_SNAPSHOT,
-    EventType.CLOSED: fence_pb2.FENCE_EVENT_TYPE_CLOSED,
+TYPES: dict[EventType, Any] = {
+    kind: fence_pb2.FenceEventType.Value(f"FENCE_EVENT_TYPE_{kind.name}") for kind in EventType
 }
 PACKED = points_pb2.POINT_ENCODING_PACKED
 
