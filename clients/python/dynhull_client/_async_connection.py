@@ -10,7 +10,7 @@ from weakref import WeakSet
 import grpc
 
 from ._calls import Call
-from ._connection import BlockingConnection, Connection, client_is_closed
+from ._connection import BlockingConnection, Connection, Dialling, client_is_closed
 from ._errors import DynhullError
 from ._retry import Attempts
 
@@ -59,13 +59,13 @@ class AsyncConnection(Connection):
     _grpc: ClassVar[Any] = grpc.aio
     _event = asyncio.Event
 
-    def __init__(self, address: str, **options: Any) -> None:
-        super().__init__(address, **options)
+    def __init__(self, address: str, dialling: Dialling) -> None:
+        super().__init__(address, dialling)
         self._others: WeakSet[BlockingConnection] = WeakSet()  # shared with those of other tokens
 
     def blocking(self) -> BlockingConnection:
         """A connection like this one for threads, which ends with this one."""
-        other = self._blocking()
+        other = BlockingConnection(self.address, self._dialling)
         self._others.add(other)
         return other
 

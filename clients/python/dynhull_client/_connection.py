@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from copy import copy
-from functools import partial
+from dataclasses import dataclass, replace
 from threading import Condition, Event
 from types import SimpleNamespace
 from typing import Any, ClassVar, Self, TypeVar
@@ -41,8 +41,21 @@ OPTIONS = [
 Result = TypeVar("Result")
 
 
+@dataclass(frozen=True, slots=True, repr=False)  # a token is no text for tracebacks
+class Dialling:
+    """How to connect, and how calls are made. Attributes as the arguments of `HullClient`."""
+
+    timeout: float | None
+    wait_for_ready: bool
+    token: str | None
+    tls: grpc.ChannelCredentials | None
+    retries: int
+    ping_interval: float
+    read_ahead: int | None
+
+
 class Connection:
-    """A channel with what every call on it needs. Arguments as for `HullClient`.
+    """A channel with what every call on it needs.
 
     Attributes:
         address: host:port.
@@ -52,45 +65,22 @@ class Connection:
     _grpc: ClassVar[Any]
     _event: ClassVar[type[Any]]
 
-    def __init__(
-        self,
-        address: str,
-        *,
-        timeout: float | None,
-        wait_for_ready: bool,
-        token: str | None,
-        tls: grpc.ChannelCredentials | None,
-        retries: int,
-        ping_interval: float,
-        read_ahead: int | None,
-    ) -> None:
-        require_not_negative(timeout=timeout, retries=retries, read_ahead=read_ahead)
-        self._options = [*OPTIONS, *_pings(ping_interval)]
+    def __init__(self, address: str, dialling: Dialling) -> None:
+        read_ahead = dialling.read_ahead
+        require_not_negative(timeout=dialling.timeout, retries=dialling.retries, read_ahead=read_ahead)
+        self._options = [*OPTIONS, *_pings(dialling.ping_interval)]
         if read_ahead is not None:
             self._options += [("grpc.http2.lookahead_bytes", read_ahead), ("grpc.http2.bdp_probe", 0)]
         self.address, encrypted = target(address)
         if is_local(self.address):
             self._options.append(("grpc.enable_http_proxy", 0))
         self._proxy = proxy_of(self.address)
-        if tls is None and encrypted:
-            tls = grpc.ssl_channel_credentials()
-        self._blocking = partial(
-            BlockingConnection,
-            self.address,
-            timeout=timeout,
-            wait_for_ready=wait_for_ready,
-            token=token,
-            tls=tls,
-            retries=retries,
-            ping_interval=ping_interval,
-            read_ahead=read_ahead,
-        )
-        self._timeout = timeout
-        self._tls = tls
-        self.retries = retries
-        self._wait_for_ready = wait_for_ready
+        if dialling.tls is None and encrypted:
+            dialling = replace(dialling, tls=grpc.ssl_channel_credentials())
+        self._dialling = dialling
+        self.retries = dialling.retries
         self._closed = self._event()  # shared with those of other tokens
-        self._metadata = _authorization(token)
+        self._metadata = _authorization(dialling.token)
         self._open()
 
     @property
@@ -102,14 +92,14 @@ class Connection:
         """The same connection for a caller with another token; None for none."""
         other = copy(self)
         other._metadata = _authorization(token)
-        other._blocking = partial(self._blocking, token=token)
+        other._dialling = replace(self._dialling, token=token)
         return other
 
     def begin(self, method: Callable[..., Any], requests: Any, timeout: float | None) -> Any:
         """Begin a call: a method of the stub with a message, or with an iterator of messages."""
         if self._closed.is_set():
             raise client_is_closed()
-        return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._wait_for_ready)
+        return method(requests, timeout=timeout, metadata=self._metadata, wait_for_ready=self._dialling.wait_for_ready)
 
     @property
     def closed(self) -> bool:
@@ -120,21 +110,21 @@ class Connection:
         """The error that a finished call of a method ended with."""
         error = error_of(call, method, self._proxy)
         if not_sent(error):
-            tls = "without" if self._tls is None else "with"
+            tls = "without" if self._dialling.tls is None else "with"
             error.add_note(f"Is a server running at {self.address} (dynhull serve), {tls} TLS?")
         return error
 
     def _open(self) -> None:
         require_grpc()
-        if self._tls is None:
+        if (tls := self._dialling.tls) is None:
             self._channel = self._grpc.insecure_channel(self.address, self._options)
         else:
-            self._channel = self._grpc.secure_channel(self.address, self._tls, self._options)
+            self._channel = self._grpc.secure_channel(self.address, tls, self._options)
         stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel)
         self._stub = SimpleNamespace(**{name: method for stub in stubs for name, method in vars(stub).items()})
 
     def _attempts(self, call: Call[Any]) -> Attempts:
-        return Attempts(call, self._timeout if call.timeout is None else call.timeout, self.retries)
+        return Attempts(call, self._dialling.timeout if call.timeout is None else call.timeout, self.retries)
 
 
 def _pings(seconds: float) -> list[tuple[str, int]]:
@@ -172,8 +162,8 @@ class BlockingConnection(Connection):
     _grpc: ClassVar[Any] = grpc
     _event = Event
 
-    def __init__(self, address: str, **options: Any) -> None:
-        super().__init__(address, **options)
+    def __init__(self, address: str, dialling: Dialling) -> None:
+        super().__init__(address, dialling)
         self._news = Condition()
         self._home = Home("client")
 

@@ -9,7 +9,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
 import grpc
 
 from ._arguments import require_not_negative
-from ._connection import DEFAULT_ADDRESS, DEFAULT_PING_INTERVAL, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection
+from ._connection import DEFAULT_ADDRESS, DEFAULT_PING_INTERVAL, DEFAULT_RETRIES, DEFAULT_TIMEOUT, Connection, Dialling
 
 P = ParamSpec("P")
 Description = TypeVar("Description")
@@ -46,16 +46,8 @@ class Client(Generic[AnyConnection]):
         ping_interval: float = DEFAULT_PING_INTERVAL,
         read_ahead: int | None = None,
     ) -> None:
-        self._connection = self._connect(
-            address,
-            timeout=timeout,
-            wait_for_ready=wait_for_ready,
-            token=token,
-            tls=tls,
-            retries=retries,
-            ping_interval=ping_interval,
-            read_ahead=read_ahead,
-        )
+        dialling = Dialling(timeout, wait_for_ready, token, tls, retries, ping_interval, read_ahead)
+        self._connection = self._connect(address, dialling)
 
     @property
     def address(self) -> str:
