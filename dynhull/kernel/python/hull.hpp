@@ -31,6 +31,21 @@ inline Gnomonic gnomonic_of(const nb::object& parameters) {
 inline nb::object globe_module(const char* name) { return nb::module_::import_("dynhull._globe").attr(name); }
 
 class Hull {
+ protected:
+  // What `work` returns while nobody changes the tree.
+  template <class Work>
+  auto reading(Work work) {
+    const ReadLock lock(lock_);
+    return work();
+  }
+
+  // Calls `work` with the number of each row and its point, while nobody changes the tree.
+  template <class Work>
+  void for_rows(const Rows& rows, Work work) {
+    const ReadLock lock(lock_, rows.shape(0));
+    for (std::size_t i = 0; i < rows.shape(0); ++i) work(i, points_of(rows)[i]);
+  }
+
  public:
   Hull() = default;
   explicit Hull(HullTree tree) : tree_(std::move(tree)) {}
@@ -69,34 +84,23 @@ class Hull {
   }
 
   PointArray points() {
-    std::vector<Point> all;
-    {
-      const ReadLock lock(lock_);
+    return array_of(reading([&] {
+      std::vector<Point> all;
       all.reserve(tree_.size());
       tree_.for_each([&](Point p, std::uint64_t copies) {
         for (; copies > 0; --copies) all.push_back(p);
       });
-    }
-    return array_of(std::move(all));
+      return all;
+    }));
   }
 
   PointArray chain(int side) {
     if (side != UPPER && side != LOWER) throw nb::value_error("side must be 0 (upper) or 1 (lower)");
-    std::vector<Point> chain;
-    {
-      const ReadLock lock(lock_);
-      chain = tree_.plane().chain(static_cast<Side>(side));
-    }
-    return array_of(std::move(chain));
+    return array_of(reading([&] { return tree_.plane().chain(static_cast<Side>(side)); }));
   }
 
   PointArray vertices() {
-    std::vector<Point> vertices;
-    {
-      const ReadLock lock(lock_);
-      vertices = tree_.vertices();
-    }
-    return array_of(std::move(vertices));
+    return array_of(reading([&] { return tree_.vertices(); }));
   }
 
   SignArray locate(const nb::object& xy) {
@@ -114,116 +118,77 @@ class Hull {
   }
 
   CountArray count_many(const Rows& rows) {
-    const std::size_t count = rows.shape(0);
-    const Output<std::int64_t> output(count);
-    {
-      const ReadLock lock(lock_, count);
-      for (std::size_t i = 0; i < count; ++i)
-        output.data()[i] = static_cast<std::int64_t>(tree_.count(points_of(rows)[i]));
-    }
+    const Output<std::int64_t> output(rows.shape(0));
+    for_rows(rows, [&](std::size_t i, Point p) { output.data()[i] = static_cast<std::int64_t>(tree_.count(p)); });
     return output.array();
   }
 
   PointArray support(const Rows& directions) {
-    const std::size_t count = directions.shape(0);
-    const Output<double, 2> output(count);
-    {
-      const ReadLock lock(lock_, count);
-      auto* rows = reinterpret_cast<Point*>(output.data());
-      if (tree_.size() > 0)
-        for (std::size_t i = 0; i < count; ++i)
-          rows[i] = dynhull::support(tree_.plane().nodes(), points_of(directions)[i]);
-      else
-        std::fill_n(rows, count, NO_EDGE.a);
-    }
+    const Output<double, 2> output(directions.shape(0));
+    auto* vertices = reinterpret_cast<Point*>(output.data());
+    for_rows(directions, [&](std::size_t i, Point direction) {
+      vertices[i] = tree_.size() > 0 ? dynhull::support(tree_.plane().nodes(), direction) : NO_EDGE.a;
+    });
     return output.array();
   }
 
   EdgeArray tangents(const Rows& points) {
-    const std::size_t count = points.shape(0);
-    const Output<double, 2, 2> output(count);
-    const bool near = [&] {
-      const ReadLock lock(lock_, count);
-      const Frame& frame = tree_.frame();
-      auto* rows = reinterpret_cast<Edge*>(output.data());
-      bool all_near = true;
-      for (std::size_t i = 0; i < count; ++i) {
-        const std::optional<Point> place = frame(points_of(points)[i]);
-        const std::optional<Edge> edge = place ? dynhull::tangents(tree_.plane().nodes(), *place) : std::nullopt;
-        rows[i] = edge ? Edge{tree_.given_at(edge->a), tree_.given_at(edge->b)} : NO_EDGE;
-        all_near &= place || !frame.projection();
-      }
-      return all_near;
-    }();
-    if (!near) checked(points, INSERT);
+    const Output<double, 2, 2> output(points.shape(0));
+    auto* edges = reinterpret_cast<Edge*>(output.data());
+    bool all_near = true;
+    for_rows(points, [&](std::size_t i, Point p) {
+      const std::optional<Point> place = tree_.frame()(p);
+      const std::optional<Edge> edge = place ? dynhull::tangents(tree_.plane().nodes(), *place) : std::nullopt;
+      edges[i] = edge ? Edge{tree_.given_at(edge->a), tree_.given_at(edge->b)} : NO_EDGE;
+      all_near &= place || !tree_.frame().projection();
+    });
+    if (!all_near) checked(points, INSERT);
     return output.array();
   }
 
   DoubleArray distance(const Rows& points) {
-    const std::size_t count = points.shape(0);
-    const Output<double> output(count);
-    {
-      const ReadLock lock(lock_, count);
-      for (std::size_t i = 0; i < count; ++i)
-        output.data()[i] = dynhull::distance(tree_.plane().nodes(), points_of(points)[i]);
-    }
+    const Output<double> output(points.shape(0));
+    for_rows(points, [&](std::size_t i, Point p) { output.data()[i] = dynhull::distance(tree_.plane().nodes(), p); });
     return output.array();
   }
 
   EdgeArray intersect_lines(const Rows& p, const Rows& q) {
-    const std::size_t count = p.shape(0);
-    if (q.shape(0) != count) throw nb::value_error("p and q must have the same length");
-    const Output<double, 2, 2> output(count);
-    {
-      const ReadLock lock(lock_, count);
-      auto* rows = reinterpret_cast<Edge*>(output.data());
-      for (std::size_t i = 0; i < count; ++i)
-        rows[i] = intersect_line(tree_.plane().nodes(), points_of(p)[i], points_of(q)[i]).value_or(NO_EDGE);
-    }
+    if (q.shape(0) != p.shape(0)) throw nb::value_error("p and q must have the same length");
+    const Output<double, 2, 2> output(p.shape(0));
+    auto* edges = reinterpret_cast<Edge*>(output.data());
+    for_rows(p, [&](std::size_t i, Point start) {
+      edges[i] = intersect_line(tree_.plane().nodes(), start, points_of(q)[i]).value_or(NO_EDGE);
+    });
     return output.array();
   }
 
   std::vector<PointArray> layers(std::size_t count) {
-    std::vector<std::vector<Point>> layers;
-    {
-      const ReadLock lock(lock_);
-      layers = layers_of(tree_.plane(), count);
-    }
     std::vector<PointArray> arrays;
-    for (std::vector<Point>& layer : layers) arrays.push_back(array_of(std::move(layer)));
+    for (std::vector<Point>& layer : reading([&] { return layers_of(tree_.plane(), count); }))
+      arrays.push_back(array_of(std::move(layer)));
     return arrays;
   }
 
   DoubleArray influence() {
-    std::vector<double> areas;
-    {
-      const ReadLock lock(lock_);
-      areas = influence_of(tree_.plane());
-    }
+    const std::vector<double> areas = reading([&] { return influence_of(tree_.plane()); });
     const Output<double> output(areas.size());
     std::copy(areas.begin(), areas.end(), output.data());
     return output.array();
   }
 
   std::pair<PointArray, PointArray> sketch(std::size_t most) {
-    Sketch sketch;
-    {
-      const ReadLock lock(lock_);
-      sketch = sketch_of(tree_.plane(), most);
-    }
+    Sketch sketch = reading([&] { return sketch_of(tree_.plane(), most); });
     std::vector<Point> beyond;
     for (const auto& [edge, farthest] : sketch.beyond) beyond.insert(beyond.end(), {edge.a, edge.b, farthest});
     return {array_of(std::move(sketch.vertices)), array_of(std::move(beyond))};
   }
 
   Hull* copy() {
-    const ReadLock lock(lock_);
-    return new Hull(*this);
+    return reading([&] { return new Hull(*this); });
   }
 
   void check() {
-    const ReadLock lock(lock_);
-    tree_.check();
+    reading([&] { tree_.check(); });
   }
 
   std::pair<std::size_t, std::size_t> memory() {

@@ -110,13 +110,11 @@ class Window : public Hull {
   void clear() { expiry_.clear(writable()); }
 
   DoubleArray times() {
-    std::vector<Dated> items;
-    {
-      const ReadLock lock(lock_);
-      items = expiry_.items();
+    return times_of(reading([&] {
+      std::vector<Dated> items = expiry_.items();
       std::stable_sort(items.begin(), items.end(), [](const Dated& a, const Dated& b) { return a.p < b.p; });
-    }
-    return times_of(items);
+      return items;
+    }));
   }
 
   WindowState state() {
