@@ -1,5 +1,5 @@
 // All hulls of some prefixes: outlines alone, each prefix in one colour.
-const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, LEAST_PIXELS = 3, MOST_FILLED = 2_000
+const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, LEAST_PIXELS = 3, MOST_FILLED = 2_000, CROWD_ALPHA = 0.5
 // What is drawn of one of many hulls, with the extreme corners alone for the extent of the picture.
 class Outline extends Hull {
   take(message) {
@@ -47,22 +47,24 @@ class Many {
     return [...this.prefixes.values()].flatMap(({hulls}) => [...hulls.values()])
   }
 }
-// Each by itself: one path of thousands takes seconds. So do thousands of fills: of very many the lines are enough.
+// Each by itself: one path of thousands takes seconds. Of a crowd the lines are enough, through which others can be seen.
 function draw_many(canvas, {view, many}) {
   canvas.lineWidth = 1
   for (const {look, hulls} of many.prefixes.values()) {
+    const crowded = hulls.size > MOST_FILLED, line_alpha = crowded ? CROWD_ALPHA : 1
     canvas.fillStyle = canvas.strokeStyle = look.colour
     for (const hull of hulls.values()) {
       canvas.beginPath()
       hull.trace(canvas, view)
-      if (hulls.size <= MOST_FILLED) {
+      if (!crowded) {
         canvas.globalAlpha = MANY_ALPHA
         canvas.fill()
-        canvas.globalAlpha = 1
       }
+      canvas.globalAlpha = line_alpha
       canvas.stroke()
     }
   }
+  canvas.globalAlpha = 1
 }
 // What a message about many hulls says of each, as messages that are kept one by one; `known` are those there were.
 function* told_apart({prefix, whole, hulls}, known) {
