@@ -479,10 +479,15 @@ def test_all_hulls_of_a_prefix_are_picked(browser: Browser, url: str, client: Hu
         assert f"prefix={name}" in page.url.replace("%2F", "/")
         table = page.get_by_role("table").filter(has_text=f"{name}/*")
         expect(table).to_contain_text("2 hulls, the last changed first")
+        page.get_by_role("button", name="Pause").click()
         client.create_hull(f"{name}/c")
         client.apply(f"{name}/b", insert=[[9, 9], [1, 1]])
         client.delete_hull(f"{name}/a")
         client.apply(f"{name}/c", insert=[[7, 7], [9, 7], [8, 8]])
+        recorded = 'name => [...recorder.tracks.values()].some(({texts}) => texts.at(-1).includes(`"${name}"`))'
+        page.wait_for_function(recorded, arg=f"{name}/c")
+        assert [part for part, _ in page.evaluate(outlines)] == [f"{name}/a", f"{name}/b"]
+        page.get_by_role("button", name="To now").click()
         page.wait_for_function(
             f"expected => JSON.stringify(({outlines})()) == JSON.stringify(expected)",
             arg=[[f"{name}/b", 4], [f"{name}/c", 3]],

@@ -90,7 +90,8 @@ class ManyFeed:
     def since(self, place: Place) -> tuple[Place, str | None]:
         """What has changed since a viewer was sent something, as JSON, and how far it is then."""
         now = Place(self._generation, self._version)
-        if now == place or not self.complete:
+        # Those that the page has stay until all are there again; before there were any, each is shown as it comes.
+        if now == place or (self._generation and not self.complete):
             return place, None
         whole = place.generation != now.generation
         texts = [each.text for each in self._after(-1 if whole else place.version) if each.state or not whole]
