@@ -10,7 +10,7 @@ from . import completion
 from .connected import AsJson, connected
 from .durations import shown
 from .json_lines import json_line, members
-from .listing import below, confirm_deletion, existing, listed, print_list
+from .listing import below, confirm_deletion, existing, listed, made, print_list
 from .lon_lat import lon_lat
 from .plural import plural
 from .quarantine import Confirmations, MaxGrowth, MaxSpeed, given_rules, rule_members, shown_rules
@@ -73,14 +73,7 @@ def create(
     if chosen["quarantine"] is not None and chosen["keyed"] is None:
         raise ValueError(f"{'--max-speed' if max_speed is not None else '--max-growth'} is given with --keyed")
     for name in names:
-        try:
-            client.create_hull(name, **chosen)
-            created = True
-        except HullExistsError:
-            if not exist_ok:
-                raise
-            client.create_hull(name, **chosen, exist_ok=True)  # refuses other settings
-            created = False
+        _, created = made(client.create_hull, HullExistsError, exist_ok=exist_ok, name=name, **chosen)
         typer.echo(
             json_line(name=name, created=created) if as_json else f"{name}: {'created' if created else 'exists'}"
         )

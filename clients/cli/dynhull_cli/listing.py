@@ -1,4 +1,4 @@
-"""What has names: lists, which may be empty, and deletions."""
+"""What has names: lists, which may be empty, creations and deletions."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -49,6 +49,16 @@ def print_list(
         return
     for row in rows:
         typer.echo(json_line(**members(row)) if as_json else line(row))
+
+
+def made(make: Callable[..., Row], exists: type[Exception], *, exist_ok: bool, **settings: Any) -> tuple[Row, bool]:
+    """What is made with these settings, or with `exist_ok` is there with the same ones; and whether it is new."""
+    try:
+        return make(**settings), True
+    except exists:
+        if not exist_ok:
+            raise
+        return make(**settings, exist_ok=True), False  # refuses other settings
 
 
 def existing(names: Iterable[str], get: Callable[[str], Row], missing: type[Exception] | None) -> list[Row]:

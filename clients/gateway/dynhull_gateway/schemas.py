@@ -622,22 +622,14 @@ def _form_of_area(area: Any) -> str:
     return "hull" if "hull" in fields else "circle" if {"center", "radius"} & set(fields) else "polygon"
 
 
-Area = Annotated[
-    Annotated[HullArea, Tag("hull")]
-    | Annotated[CircleArea, Tag("circle")]
-    | Annotated[PolygonArea, Tag("polygon")]
-    | Annotated[list[PolygonArea], Tag("polygons")],
-    Discriminator(_form_of_area),
-]
-
-GivenArea = Annotated[
+OwnForms = (
     Annotated[HullArea, Tag("hull")]
     | Annotated[CircleArea, Tag("circle")]
     | Annotated[PolygonArea, Tag("polygon")]
     | Annotated[list[PolygonArea], Tag("polygons")]
-    | Annotated[GeometryArea, Tag("geometry")],
-    Discriminator(_form_of_area),
-]
+)
+Area = Annotated[OwnForms, Discriminator(_form_of_area)]
+GivenArea = Annotated[OwnForms | Annotated[GeometryArea, Tag("geometry")], Discriminator(_form_of_area)]
 
 
 @with_settings(surface.FenceSettings)

@@ -762,9 +762,8 @@ def writer(
     """
     if may_skip and producer is None:
         raise ValueError("may_skip needs a producer, whose numbers go on after a restart")
-    for argument, value in (("batch_points", batch_points), ("in_flight", in_flight)):
-        if value < 1:
-            raise ValueError(f"{argument} must be at least 1, got {value}")
+    positive("batch_points", batch_points)
+    positive("in_flight", in_flight)
     producer = f"writer-{uuid4().hex}" if producer is None else producer
     if coalesce not in (None, "last"):
         raise ValueError(f'coalesce must be None or "last", got {coalesce!r}')
@@ -808,9 +807,8 @@ def pipeline(*, batch_reads: int = 256, in_flight: int = 4096) -> Piping:
         batch_reads: the most reads of a message.
         in_flight: the most reads that are sent and not answered. As many more may wait to be sent.
     """
-    for argument, value in (("batch_reads", batch_reads), ("in_flight", in_flight)):
-        if value < 1:
-            raise ValueError(f"{argument} must be at least 1, got {value}")
+    positive("batch_reads", batch_reads)
+    positive("in_flight", in_flight)
     return Piping(batch_reads, in_flight)
 
 

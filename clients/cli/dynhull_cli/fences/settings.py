@@ -9,6 +9,7 @@ from dynhull_surface.settings import FenceSettings
 from ..completion import fences
 from ..connected import AsJson, connected
 from ..json_lines import json_line
+from ..listing import made
 from ..setting_options import choosing, settings_options
 
 if TYPE_CHECKING:
@@ -90,14 +91,7 @@ def create(
     """
     from dynhull_client import FenceExistsError
 
-    created = True
-    try:
-        fence = client.create_fence(name, **chosen)
-    except FenceExistsError:
-        if not exist_ok:
-            raise
-        fence = client.create_fence(name, **chosen, exist_ok=True)  # refuses other settings
-        created = False
+    fence, created = made(client.create_fence, FenceExistsError, exist_ok=exist_ok, name=name, **chosen)
     _remark_on_degrees(client, fence)
     _print(fence, "created" if created else "exists", as_json)
 
