@@ -65,22 +65,11 @@ def put_parts(
 
     A new part begins with a row that must not go into the same batch as the rows before it.
     """
-    if keys is None or points is None:
-        batch = Batch(
-            keys=keys,
-            points=points,
-            times=times,
-            insert=insert,
-            delete=delete,
-            move=move,
-            only=only,
-            ttl=ttl,
-            expire_times=expire_times,
-            missing=writing.missing,
-        )
-        return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
     options: Any = {"insert": insert, "delete": delete, "move": move, "only": only, "ttl": ttl}
     options["missing"] = writing.missing
+    if keys is None or points is None:
+        batch = Batch(**options, keys=keys, points=points, times=times, expire_times=expire_times)
+        return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
     checked, xy = checked_keys(keys), as_points(points, "points", on_globe=None)
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 # The greatest distance in metres between neighbours on a line, so that great circles are drawn as they are.
 SEGMENT = 20_000.0
-KILOMETRE = 1000.0
 CIRCLE_CORNERS = 180
 # Coasts are drawn up to this far from the centre.
 FARTHEST = 70.0
