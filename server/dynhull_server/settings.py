@@ -150,7 +150,7 @@ class Settings(BaseModel):
         "changes; 0 for none.",
     )
     series_bytes: int = Field(
-        256 * 2**20, ge=0, description="Memory for these measures of all hulls; the oldest ones go when it is full."
+        320 * 2**20, ge=0, description="Memory for these measures of all hulls; the oldest ones go when it is full."
     )
 
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")

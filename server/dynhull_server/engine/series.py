@@ -22,7 +22,7 @@ from ..state.records import NO_TIME
 from .driver import Driver
 from .live_hull import LiveHull
 from .server_time import MICROSECONDS
-from .steps import SLICE
+from .steps import SLICE, Slices
 
 # Seconds between two samples of a hull, and between looks whether it is time for them.
 SERIES_SECONDS, LOOK_SECONDS = 10, 0.25
@@ -32,6 +32,7 @@ REST = 9.0
 BUSY_SECONDS = 1.0
 
 _PACKED = Struct("<qqQQIdddd")
+_TIME = Struct("<q")
 SAMPLE = np.dtype(
     [
         ("time", "<i8"),
@@ -42,8 +43,8 @@ SAMPLE = np.dtype(
         *((name, "<f8") for name in ("area", "perimeter", "diameter", "width")),
     ]
 )
-# What a sample takes, with its place in a round, and what a hull takes beside its samples.
-SAMPLE_BYTES, HULL_BYTES = _PACKED.size + 8, 400
+# What a sample takes, with room to grow and its place in a round, and what a hull takes beside its samples.
+SAMPLE_BYTES, HULL_BYTES = _PACKED.size * 9 // 8 + 8, 400
 
 Samples = npt.NDArray[np.void]
 
@@ -84,12 +85,14 @@ class KeptSeries:
 
     Attributes:
         seconds: for which samples are kept; 0 for none.
+        interval: seconds between two samples of a hull that changes all the time; longer if a round takes longer.
         bytes: those of the samples that are kept, about.
         lost: the number of samples that were dropped early, or not kept, because there were too many.
     """
 
     def __init__(self, find: Callable[[Hull], LiveHull], driver: Driver) -> None:
         self.seconds = 0.0
+        self.interval = float(SERIES_SECONDS)
         self.bytes = 0
         self.lost = 0
         self._find = find
@@ -138,7 +141,7 @@ class KeptSeries:
     async def round(self) -> None:
         """Sample what has changed since the last round, if it is time for that."""
         now = self._driver.time()
-        self._trim(now)
+        await self._trim(now)
         if now < self._next:
             return
         self._next = now + SERIES_SECONDS * MICROSECONDS
@@ -163,6 +166,7 @@ class KeptSeries:
             if self._spent > SLICE:
                 await clock.sleep(self._spent * REST)
                 self._spent = 0.0
+        self.interval = max(float(SERIES_SECONDS), (self._driver.time() - now) / MICROSECONDS)
 
     async def _sample(self, hull: LiveHull) -> bytes:
         """A sample of now. Raises HullNotFoundError if the hull is gone."""
@@ -191,8 +195,9 @@ class KeptSeries:
         kept = self._series.get(number)
         need = SAMPLE_BYTES + (HULL_BYTES if kept is None else 0)
         while self.bytes + need > self._most and len(self._rounds) > 1:
+            self._say_short()
             self._begun = self._rounds[0].time
-            self._drop(early=True)
+            self.lost += self._drop_some()
         if self.bytes + need > self._most:
             self._say_short()
             self.lost += 1
@@ -204,21 +209,24 @@ class KeptSeries:
         current.time = self._driver.time()
         current.hulls.append(kept)
 
-    def _trim(self, now: int) -> None:
+    async def _trim(self, now: int) -> None:
+        slices = Slices()
         while self._rounds and self._rounds[0].time < now - self._kept:
-            self._drop(early=False)
+            self._drop_some()
+            await slices.others()
 
-    def _drop(self, *, early: bool) -> None:
-        """Drop what the hulls of the oldest round had before it: what they had then is how they were since then."""
-        oldest = self._rounds.popleft()
-        if early:
-            self._say_short()
-        for kept in oldest.hulls:
-            samples = kept.samples
-            while len(samples) > _PACKED.size and _PACKED.unpack_from(samples, _PACKED.size)[0] <= oldest.time:
-                del samples[: _PACKED.size]
-                self.bytes -= SAMPLE_BYTES
-                self.lost += early
+    def _drop_some(self) -> int:
+        """Drop what a hull of the oldest round had before it: that sample lasts. Returns how many were dropped."""
+        oldest = self._rounds[0]
+        if not oldest.hulls:
+            self._rounds.popleft()
+            return 0
+        samples, dropped = oldest.hulls.pop().samples, 0
+        while len(samples) > _PACKED.size and _TIME.unpack_from(samples, _PACKED.size)[0] <= oldest.time:
+            del samples[: _PACKED.size]
+            dropped += 1
+        self.bytes -= SAMPLE_BYTES * dropped
+        return dropped
 
     def _forget(self, number: int) -> None:
         kept = self._series.pop(number, None)

@@ -1,6 +1,7 @@
 """Conversion of values to messages."""
 
 from collections.abc import Awaitable, Callable
+from datetime import timedelta
 from functools import partial
 from itertools import compress
 from operator import attrgetter
@@ -18,7 +19,7 @@ from ..engine.difference import Difference
 from ..engine.layers import Layers
 from ..engine.live_hull import LiveHull
 from ..engine.measures import HullMeasures
-from ..engine.series import SERIES_SECONDS, Series
+from ..engine.series import Series
 from ..engine.steps import BLOCK, Run
 from ..engine.verification import Verification
 from ..engine.views import Change, Event, Progress, Sketch, Snapshot
@@ -258,9 +259,9 @@ def encode_measures(found: HullMeasures) -> hull_pb2.Measures:
 
 
 def encode_series(
-    hull: LiveHull, series: Series, encoding: points_pb2.PointEncoding, *, keeps: bool
+    hull: LiveHull, series: Series, encoding: points_pb2.PointEncoding, interval: float
 ) -> hull_service_pb2.GetSeriesResponse:
-    """The measures of the last time."""
+    """The measures of the last time, about so many seconds apart; 0 where none are kept."""
     rows = series.rows
     message = hull_service_pb2.GetSeriesResponse(
         uid=hull.uid,
@@ -276,8 +277,8 @@ def encode_series(
         widths=rows["width"].tolist(),
     )
     message.since_time.FromMicroseconds(series.since)
-    if keeps:
-        message.interval.FromSeconds(SERIES_SECONDS)
+    if interval:
+        message.interval.FromTimedelta(timedelta(seconds=interval))
     return message
 
 

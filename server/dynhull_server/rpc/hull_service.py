@@ -401,8 +401,9 @@ class HullService:
     async def GetSeries(self, request: pb.GetSeriesRequest, call: Call) -> pb.GetSeriesResponse:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        series = await self._hulls.series.read(hull, decode.decode_last(request))
-        return encode.encode_series(hull, series, encoding, keeps=bool(self._hulls.series.seconds))
+        kept = self._hulls.series
+        series = await kept.read(hull, decode.decode_last(request))
+        return encode.encode_series(hull, series, encoding, kept.interval if kept.seconds else 0)
 
     async def Separate(self, request: pb.SeparateRequest, call: Call) -> pb.SeparateResponse:
         hull, other = self._read(call, request.name), self._read(call, request.other_name, "other_name")
