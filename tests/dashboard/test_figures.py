@@ -68,11 +68,12 @@ def test_time_lines_begin_with_what_the_server_has_kept() -> None:
     since = datetime(1970, 1, 1, 0, 0, 50, tzinfo=UTC)
     sizes = np.array([3, 4, 5], np.uint64), np.array([3, 4, 4], np.uint32)
     kept = Series("u", True, since, 60.0, minutes, minutes, np.array([1, 4, 10], np.uint64), *sizes, *4 * [floats])
-    first, *rows = past_rows(kept)
+    first, *rows = past_rows(kept, 1_260_000)
     assert first[:4] == (50_000, 3, 3, 1)
     assert rows == [(60_000, 4, 4, 2, 0.05), (1_200_000, 4, 4, 2, 0), (1_260_000, 5, 4, 3, 0.1)]
     history = History("time", "points", "vertices", "area", "rate")
-    history.begin(past_rows(kept))
+    history.begin(past_rows(kept, 1_260_000))
+    assert next(past_rows(kept, 2_260_000))[0] == 1_050_000  # by the dashboard's clock
     assert history.since(0)["time"] == []
     history.append(1_261_000, 5, 4, 3, 0)
     assert history.since(0)["time"] == [50_000, 60_000, 1_200_000, 1_260_000, 1_261_000]

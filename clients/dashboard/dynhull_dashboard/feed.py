@@ -184,7 +184,7 @@ class HullFeed:
         """Begin the history with what the server has kept, then add a row every second."""
         with suppress(DynhullError):  # the server is away or of an earlier version, or the hull is not there
             series = await self._client.series(self.name, LONGEST_SECONDS, timeout=PAST_SECONDS)
-            self.history.begin(past_rows(series))
+            self.history.begin(past_rows(series, time.time() * 1000))
         before, then = self.revision, time.monotonic()
         while True:
             await asyncio.sleep(TICK_SECONDS)
