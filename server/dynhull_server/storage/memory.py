@@ -19,9 +19,11 @@ from ..state.fences.model.records import (
     PutDelays,
 )
 from ..state.records import Append, CommitStamp, Create, Delete, HullRow, Kept, Record
+from .past import Moment, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 
 KEPT_SNAPSHOTS = 2
+STEP_RECORDS = 1024  # of a read of the past
 FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | PutDelays | DropEvents | PutConsumer | DropConsumer
 
 
@@ -134,6 +136,35 @@ class MemoryStorage:
         if not self.keeps:
             return NEWEST
         return hull.snapshots[0].kept.revision if len(hull.snapshots) == KEPT_SNAPSHOTS else 0
+
+    def oldest_moment(self, number: int, *, timed: bool = False) -> Moment:
+        """The oldest revision that can be read. All commits are known."""
+        del timed
+        with self._turn:
+            hull = self._hulls[number]
+            if not self.keeps:
+                return Moment(hull.last, None)
+            base = hull.snapshots[0].kept if len(hull.snapshots) == KEPT_SNAPSHOTS else Kept()
+            return Moment(base.revision, base.committed if base.revision else created(hull.row))
+
+    def moment(self, number: int, time: int) -> Moment | None:
+        """The last revision committed at or before a time."""
+        oldest = self.oldest_moment(number)
+        with self._turn:
+            found = [oldest, *(Moment(each.revision, each.committed) for each in self._hulls[number].records)]
+        before = [each for each in found if each.committed is not None and each.committed.time <= time]
+        return before[-1] if before else None
+
+    def state(self, number: int, until: int) -> Kept:
+        """The newest snapshot of a revision not after `until`, without the batches after it."""
+        return replace(self.read(number, until), records=[])
+
+    def batches(self, number: int, after: int, until: int) -> list[Record]:
+        """The batches that follow a revision."""
+        if not self.keeps or after < self.oldest(number):
+            raise DamagedError(f"revision {after + 1} of hull {self._hulls[number].row.name!r} is no longer kept")
+        with self._turn:
+            return [each for each in self._hulls[number].records if after < each.revision <= until][:STEP_RECORDS]
 
     def snapshot(self, number: int, kept: Kept) -> Iterator[StorageStep]:
         """One step."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from ..state.fences.model.records import FenceEvent, FenceRow, Inside, KeptFence
 from ..state.records import CommitStamp, HullRow, Kept, Record
+from .past import Past
 from .refusals import Meaning
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ class StoredContents:
     commits: int = 0
 
 
-class Storage(Protocol):
+class Storage(Past, Protocol):
     """Keeps hulls and fences.
 
     Attributes:

@@ -28,8 +28,8 @@ def read_hull(reader: Reader, hull: HullRows, until: int) -> Kept:
     """
     if until < hull.oldest:
         raise DamagedError(f"revision {until} of hull {hull.row.name!r} is no longer kept")
-    with _as_damage(hull):
-        kept = _newest_snapshot(reader, hull, until)
+    with as_damage(hull):
+        kept = newest_snapshot(reader, hull, until)
         rows = batch_rows(reader, hull.between(kept.revision, until))
         _add_records(kept, hull, rows, until)
     return kept
@@ -42,7 +42,7 @@ def read_records(reader: Reader, hull: HullRows, after: int) -> list[Record]:
         DamagedError: a row is damaged or missing.
     """
     kept = Kept(revision=after)
-    with _as_damage(hull):
+    with as_damage(hull):
         rows = batch_rows(reader, hull.between(after, hull.last))
         _add_records(kept, hull, rows, hull.last)
     return kept.records
@@ -61,7 +61,7 @@ def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
             yield read_hull(reader, hull, hull.last)
             continue
         kept = Kept()
-        with _as_damage(hull):
+        with as_damage(hull):
             _add_records(kept, hull, islice(rows, len(hull.ids)), hull.last)
         yield kept
 
@@ -93,7 +93,7 @@ def whole_records(hull: HullRows, rows: Iterable[tuple[Any, ...]]) -> Iterator[R
 
 
 @contextmanager
-def _as_damage(hull: HullRows) -> Iterator[None]:
+def as_damage(hull: HullRows) -> Iterator[None]:
     """Name the hull of a row that the database cannot read."""
     try:
         yield
@@ -101,7 +101,8 @@ def _as_damage(hull: HullRows) -> Iterator[None]:
         raise DamagedError(f"hull {hull.row.name!r} cannot be read ({error}): restore a backup") from error
 
 
-def _newest_snapshot(reader: Reader, hull: HullRows, until: int) -> Kept:
+def newest_snapshot(reader: Reader, hull: HullRows, until: int) -> Kept:
+    """The newest snapshot of a revision not after `until` that is not damaged; the empty hull where there is none."""
     for snapshot in reversed(hull.snapshots):
         if snapshot.revision <= until:
             kept = _snapshot(reader, hull.row.number, snapshot)

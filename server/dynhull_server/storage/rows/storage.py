@@ -12,6 +12,7 @@ from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
 from ...state.records import CommitStamp, HullRow, Kept, Record
+from ..past import Moment
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from . import chunks
 from .divided import newest_rows
@@ -21,6 +22,7 @@ from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
 from .group import Chunk, DropBatches, DropDead, DropSnapshot, Finish, Group
 from .ledger import DROPPED, KEPT, HullRows, Ledger, StoredSnapshot
+from .past_rows import batches_after, moment_at, oldest_moment, state_until
 from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader
@@ -127,6 +129,30 @@ class RowStorage(ABC):
         """The oldest revision that `read` can return."""
         with self._visible:
             return self._settled().hulls[number].oldest
+
+    def oldest_moment(self, number: int, *, timed: bool = False) -> Moment:
+        """The oldest revision that can be read."""
+        with self._of_hull(number) as (reader, hull):
+            return oldest_moment(reader, hull, timed=timed)
+
+    def moment(self, number: int, time: int) -> Moment | None:
+        """The last revision committed at or before a time."""
+        with self._of_hull(number) as (reader, hull):
+            return moment_at(reader, hull, time)
+
+    def state(self, number: int, until: int) -> Kept:
+        """The newest snapshot of a revision not after `until`, without the batches after it."""
+        with self._of_hull(number) as (reader, hull):
+            return state_until(reader, hull, until)
+
+    def batches(self, number: int, after: int, until: int) -> list[Record]:
+        """The batches that follow a revision."""
+        with self._of_hull(number) as (reader, hull):
+            return batches_after(reader, hull, after, until)
+
+    def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
+        """A reader, and the rows of a hull as of the same moment; KeyError if no hull has that number."""
+        return self._reading(lambda ledger: ledger.hulls[number].copy())
 
     def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
         """Fences as last committed."""

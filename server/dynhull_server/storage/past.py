@@ -1,0 +1,55 @@
+"""The port to the past: what a reader of earlier revisions asks of whatever keeps them."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..state.records import CommitStamp, HullRow, Kept, Record
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A revision of a hull.
+
+    Attributes:
+        revision: the revision.
+        committed: its commit; None where formats before 11 did not store it. The commit of revision 0 has the number 0,
+            and the time at which the hull was created.
+    """
+
+    revision: int
+    committed: CommitStamp | None
+
+
+def created(row: HullRow) -> CommitStamp:
+    """The commit of revision 0 of a hull."""
+    return CommitStamp(0, round(row.created * 1_000_000))
+
+
+class Past(Protocol):
+    """Reads hulls as they were, from a state and the batches after it.
+
+    Any thread may read at any time, and no read holds up a commit. Reads are short: a revision takes several, and what
+    the first of them relies on may have been dropped before the last. They raise an error then, and `oldest_moment`
+    says what is left.
+
+    Every method raises KeyError if no hull has that number, DamagedError if data is damaged or no longer kept, and
+    StorageError if it cannot be read at present.
+    """
+
+    def oldest_moment(self, number: int, *, timed: bool = False) -> Moment:
+        """The oldest revision that can be read; or, `timed`, the oldest whose commit is known."""
+
+    def moment(self, number: int, time: int) -> Moment | None:
+        """The last revision committed at or before a time, in microseconds since 1970.
+
+        None if the time is before that of the oldest revision whose commit is known.
+        """
+
+    def state(self, number: int, until: int) -> Kept:
+        """The newest state that is kept of a revision not after `until`, without the batches after it."""
+
+    def batches(self, number: int, after: int, until: int) -> list[Record]:
+        """The batches that follow revision `after`, in order and without a gap, none after `until`.
+
+        At least one, if `after` is before `until`; as many as are read and applied in some milliseconds.
+        """

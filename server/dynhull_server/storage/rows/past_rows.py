@@ -1,0 +1,98 @@
+"""Reading hulls as they were, from the rows that there are."""
+
+from array import array
+
+from ...state.records import CommitStamp, Kept, Record
+from ..past import Moment, created
+from ..port import DamagedError
+from .batch_rows import is_whole
+from .ledger import HullRows
+from .reading import as_damage, batch_rows, commit_of, newest_snapshot, whole_records
+from .tables import Reader
+
+# About the rows of points that one read has, and the rows of batches that it looks at.
+STEP_POINTS, STEP_ROWS = 8192, 1024
+
+
+def oldest_moment(reader: Reader, hull: HullRows, *, timed: bool) -> Moment:
+    """The oldest revision that can be read; or, `timed`, the oldest whose commit is known."""
+    oldest = hull.oldest
+    if not oldest:
+        return Moment(0, created(hull.row))
+    with as_damage(hull):
+        committed = commit_of(reader, hull, oldest)
+        if committed is not None or not timed:
+            return Moment(oldest, committed)
+        low, high = 0, len(hull.ids)
+        while low < high:  # those of earlier formats, which have no commit, come first
+            middle = (low + high) // 2
+            if _row(reader, hull, middle)[2] is None:
+                low = middle + 1
+            else:
+                high = middle
+        if low == len(hull.ids):
+            return Moment(hull.last, None)
+        first, _, committed = _row(reader, hull, low)
+        return Moment(max(first, oldest), committed)
+
+
+def moment_at(reader: Reader, hull: HullRows, time: int) -> Moment | None:
+    """The last revision committed at or before a time; None if that is before what is kept, or not known."""
+    with as_damage(hull):
+        low, high = 0, len(hull.ids)
+        while low < high:
+            middle = (low + high) // 2
+            committed = _row(reader, hull, middle)[2]
+            if committed is None or committed.time <= time:
+                low = middle + 1
+            else:
+                high = middle
+        if low:
+            _, last, committed = _row(reader, hull, low - 1)
+            return None if committed is None or last < hull.oldest else Moment(last, committed)
+        oldest = oldest_moment(reader, hull, timed=False)
+    return oldest if oldest.committed is not None and oldest.committed.time <= time else None
+
+
+def state_until(reader: Reader, hull: HullRows, until: int) -> Kept:
+    """The newest snapshot of a revision not after `until`; the empty hull where there is none."""
+    require_kept(hull, until)
+    with as_damage(hull):
+        return newest_snapshot(reader, hull, until)
+
+
+def batches_after(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:
+    """The batches after a revision, as many as are read and applied in some milliseconds."""
+    require_kept(hull, after)
+    found: list[Record] = []
+    points = 0
+    with as_damage(hull):
+        for record in whole_records(hull, batch_rows(reader, hull.between(after, until)[:STEP_ROWS])):
+            if record.revision <= after:
+                continue
+            if record.revision > until or points >= STEP_POINTS:
+                break
+            if record.revision != after + len(found) + 1:
+                raise DamagedError(
+                    f"hull {hull.row.name!r}: revision {after + len(found) + 1} is missing: restore a backup"
+                )
+            found.append(record)
+            points += len(record.rows)
+    if not found and after < min(until, hull.last):
+        raise DamagedError(f"hull {hull.row.name!r}: revision {after + 1} is missing: restore a backup")
+    return found
+
+
+def require_kept(hull: HullRows, revision: int) -> None:
+    """Raise DamagedError if a revision is no longer kept."""
+    if revision < hull.oldest:
+        raise DamagedError(f"revision {revision} of hull {hull.row.name!r} is no longer kept")
+
+
+def _row(reader: Reader, hull: HullRows, index: int) -> tuple[int, int, CommitStamp | None]:
+    """The first and the last revision of a row of batches, and their commit."""
+    row = next(batch_rows(reader, array("q", [hull.ids[index]])), None)
+    if row is None or not is_whole(row[2], row[3], hull.row.number, row[0], row[1], *row[4:]):
+        raise DamagedError(f"hull {hull.row.name!r}: a row of batches is damaged or missing: restore a backup")
+    first, last, _, _, *commit = row
+    return first, last, None if None in commit else CommitStamp(*commit)
