@@ -15,6 +15,14 @@ TARGET_HELP = "The address of an empty database, or the folder to create."
 def move(
     source: Annotated[str, typer.Argument(metavar="FROM", help=SOURCE_HELP)],
     target: Annotated[str, typer.Argument(metavar="TO", help=TARGET_HELP)],
+    history_dir: Annotated[
+        Path | None,
+        typer.Option(
+            "--history-dir",
+            help="The folder of the past of the hulls in the database, if they have any.",
+            file_okay=False,
+        ),
+    ] = None,
 ) -> None:
     """Copy a data folder into a PostgreSQL database, or a database into a folder.
 
@@ -39,9 +47,9 @@ def move(
     try:
         with progress_bar("rows") as progress:
             if to_database:
-                moved = transfer.to_database(Path(source), Database(target), progress)
+                moved = transfer.to_database(Path(source), Database(target), progress, history_dir)
             else:
-                moved = transfer.to_folder(Database(source), Path(target), progress)
+                moved = transfer.to_folder(Database(source), Path(target), progress, history_dir)
     except (StorageError, OSError, ValueError) as error:
         fail(text_of(error), code_of(error))
     for note in moved.notes:

@@ -11,6 +11,13 @@ from dynhull_cli.connected import Connect, connecting
 from .storage.databases import is_database
 
 DATA = Path("dynhull-data")
+HistoryDir = Annotated[
+    Path | None,
+    typer.Option("--history-dir", help="The folder of the past of the hulls. Default: `history` in the data folder."),
+]
+WithoutHistory = Annotated[
+    bool, typer.Option("--without-history", help="Leave the past of the hulls out: as much as the journal drops.")
+]
 
 
 def _folder(path: Path | None) -> Path | None:
@@ -23,15 +30,18 @@ def _folder(path: Path | None) -> Path | None:
 def backup(
     target: Annotated[Path, typer.Argument(metavar="TARGET", help="The folder to create.", callback=_folder)],
     data: Annotated[Path, typer.Option(help="The data folder; a server may be using it.", callback=_folder)] = DATA,
+    history_dir: HistoryDir = None,
+    without_history: WithoutHistory = False,
 ) -> None:
     """Copy a data folder consistently, also while a server uses it.
 
-    The copy is examined in full. It is a data folder itself, so `dynhull serve --data COPY` serves it. A copy that was
-    interrupted is refused by all commands.
+    The past of hulls that keep theirs is copied, too, as hard links where that is possible. The copy is examined in
+    full. It is a data folder itself, so `dynhull serve --data COPY` serves it. A copy that was interrupted is refused
+    by all commands.
     """
     from .data_folders import copy_folder
 
-    copy_folder(data, target)
+    copy_folder(data, target, history=history_dir, without_history=without_history)
 
 
 def restore(
@@ -45,11 +55,20 @@ def restore(
     accept_loss: Annotated[
         bool, typer.Option(help="If the log is missing or damaged, continue without the commits in it.")
     ] = False,
+    history_dir: HistoryDir = None,
+    without_history: WithoutHistory = False,
 ) -> None:
     """Create a data folder from a backup, after checking that every hull in it is intact."""
     from .data_folders import copy_folder
 
-    copy_folder(backup, data, accept_loss=accept_loss, restores=True)
+    copy_folder(
+        backup,
+        data,
+        accept_loss=accept_loss,
+        restores=True,
+        history=history_dir,
+        without_history=without_history,
+    )
 
 
 def check(
@@ -57,6 +76,7 @@ def check(
         Path,
         typer.Argument(metavar="DATA", help="A data folder or a backup; a server may be using it.", callback=_folder),
     ] = DATA,
+    history_dir: HistoryDir = None,
 ) -> None:
     """Examine a data folder or a backup, and report on each hull and fence. Nothing is changed.
 
@@ -70,7 +90,7 @@ def check(
     """
     from .data_folders import check_folder
 
-    raise typer.Exit(0 if check_folder(data) else 1)
+    raise typer.Exit(0 if check_folder(data, history_dir) else 1)
 
 
 @partial(connecting, optional=True)

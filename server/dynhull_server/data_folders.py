@@ -19,15 +19,27 @@ from .storage.sqlite import copies
 from .storage.worker_folders import parts_of, workers_of, write_manifest
 
 
-def copy_folder(source: Path, target: Path, *, accept_loss: bool = False, restores: bool = False) -> None:
+def copy_folder(
+    source: Path,
+    target: Path,
+    *,
+    accept_loss: bool = False,
+    restores: bool = False,
+    history: Path | None = None,
+    without_history: bool = False,
+) -> None:
     """Copy a data folder, and print what was lost and how many hulls it has; of one with workers, each part."""
     with _errors_reported():
         workers = workers_of(source)
         if workers is not None and target.exists() and any(target.iterdir()):
             raise StorageError(f"{target} is not empty")
         folders = [(part, target / part.relative_to(source)) for part in parts_of(source)]
+        if not accept_loss and (size := copies.history_size(parts_of(source))):
+            left = "left out" if without_history else "linked where that is possible, otherwise copied"
+            typer.echo(f"{source}: {plural(size, 'byte')} of past, {left}")
         with progress_bar("pages") as progress:
-            copied = list(copies.copy_all(folders, progress, accept_loss=accept_loss, restores=restores))
+            options = {"accept_loss": accept_loss, "restores": restores, "without_history": without_history}
+            copied = list(copies.copy_all(folders, progress, history=history, **options))
         for copy, report in copied:
             for note in report.notes:
                 typer.echo(note, err=True)
@@ -36,11 +48,11 @@ def copy_folder(source: Path, target: Path, *, accept_loss: bool = False, restor
             write_manifest(target, workers, complete=True)  # at the end: without it, the copy is refused
 
 
-def check_folder(data: Path) -> bool:
+def check_folder(data: Path, history: Path | None = None) -> bool:
     """Examine a data folder and print a report, of one with workers on each part; returns whether all is intact."""
     with _errors_reported():
         parts = parts_of(data)
-        whole = [_check_part(part) for part in parts]
+        whole = [_check_part(part, history) for part in parts]
         if not all(whole):
             return False
         try:
@@ -52,9 +64,9 @@ def check_folder(data: Path) -> bool:
     return True
 
 
-def _check_part(data: Path) -> bool:
+def _check_part(data: Path, history: Path | None) -> bool:
     with _errors_reported(), progress_bar("rows") as progress:
-        report = copies.check(data, progress)
+        report = copies.check(data, progress, history)
     for hull in report.hulls:
         typer.echo(f"{hull.name}: {hull.summary}: {'whole' if hull.whole else 'DAMAGED'}")
     for fence in report.fences:

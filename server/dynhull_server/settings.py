@@ -1,6 +1,7 @@
 """The settings of the server, defined once for flags, environment, file and help."""
 
 import ipaddress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, Self
 
@@ -91,6 +92,21 @@ class Settings(BaseModel):
         250_000,
         ge=1,
         description="Least number of points written to a hull between snapshots; also at least as many as it has.",
+    )
+
+    history_dir: Path | None = Field(
+        None,
+        description="Folder for the past of hulls that keep theirs; by default `history` in the data folder. Servers "
+        "of one database share it.",
+    )
+    max_history_age: float = Field(
+        0.0,
+        ge=0,
+        le=1e9,
+        description="Seconds for which the past of any hull is kept at most; 0 for as long as it says.",
+    )
+    max_history_bytes: int = Field(
+        0, ge=0, description="Bytes that the past of all hulls takes at most; the oldest goes first. 0 for any number."
     )
 
     tls_cert: Path | None = Field(None, description="PEM file: the server's certificate and its chain up to the root.")
@@ -225,6 +241,10 @@ class Settings(BaseModel):
                 f"--cluster-host {self.cluster_host} can be reached by other machines: give --cluster-ca, or "
                 "--insecure to connect servers without TLS"
             )
+        if self.history_dir is not None and self.in_memory:
+            raise ValueError("--history-dir keeps what --in-memory does not store: give one of them")
+        if self.history_dir is not None and find_spec("pyarrow") is None:
+            raise ValueError("--history-dir needs pyarrow: pip install 'dynhull[history]'")
         protected = self.tls_cert and self.tokens
         for host in (self.host, *([] if self.metrics_port is None else [self.metrics_host])):
             if not is_loopback(host) and not protected and not self.insecure:

@@ -86,7 +86,7 @@ def test_pages_run_one_after_the_other(
     pages: dict[str, list[Block]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with server_process() as server:
+    with server_process("--data", str(tmp_path / "data")) as server:
         monkeypatch.setenv("DYNHULL_ADDRESS", server.address)
         failed = {
             name: failures(name, [each for each in pasted if not each.title], server.address)

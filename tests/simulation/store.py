@@ -183,6 +183,13 @@ class FaultyStorage:
             self._fail("sweep")
             yield step
 
+    def file_history(self, now: int) -> Iterator[StorageStep]:
+        """Steps; each may fail."""
+        for step in self._inner.file_history(now):
+            self.give_way()
+            self._fail("history")
+            yield step
+
     def sync(self) -> None:
         """Fails, perhaps."""
         self.give_way()

@@ -135,6 +135,7 @@ BODIES = [
     ("frontier", schemas.FrontierQuestion, {}),
     ("recenter", schemas.Recenter, {}),
     ("reshard", schemas.Reshard, {}),
+    ("set_history", schemas.KeptHistory, {}),
 ]
 
 

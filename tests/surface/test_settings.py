@@ -16,7 +16,18 @@ from dynhull_surface.settings import FenceSettings, HullSettings
 
 CALLS = {"create_hull": HullSettings, "create_fence": FenceSettings, "replace_fence": FenceSettings}
 # What has another form in each of the calls.
-OWN = {"self", "name", "area", "subjects", "other_hull", "quarantine", "exist_ok", "timeout"}
+OWN = {
+    "self",
+    "name",
+    "area",
+    "subjects",
+    "other_hull",
+    "quarantine",
+    "history",
+    "history_bytes",
+    "exist_ok",
+    "timeout",
+}
 # As they are written.
 KINDS = {
     timedelta: "float | timedelta",
@@ -52,7 +63,7 @@ def test_documentation(call: str) -> None:
         assert f" {each.name}: {each.meaning[0].lower()}{each.meaning[1:]}" in said
 
 
-# Areas, subjects and a quarantine have a form of their own, in messages of their own.
+# Areas, subjects, a quarantine and a history have a form of their own, in messages of their own.
 WITHOUT_SETTING = {
     "area",
     "subject_hull",
@@ -62,6 +73,7 @@ WITHOUT_SETTING = {
     "circle_area",
     "hull_area.name",
     "quarantine",
+    "history",
 }
 
 

@@ -36,6 +36,7 @@ PANELS = {
         "import",
         "ingest",
         "quarantine",
+        "history",
     ),
     "Questions": ("query", "watch", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Fences": ("fences", "relay"),

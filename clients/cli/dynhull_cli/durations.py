@@ -1,32 +1,18 @@
 """Time spans, as people write them."""
 
-import re
 from datetime import timedelta
 
-UNITS = {
-    "": timedelta(seconds=1),
-    "ms": timedelta(milliseconds=1),
-    "s": timedelta(seconds=1),
-    "m": timedelta(minutes=1),
-    "h": timedelta(hours=1),
-    "d": timedelta(days=1),
-}
-SPAN = re.compile(r"(\d+(?:\.\d+)?)\s*(ms|s|m|h|d|)")
+from dynhull_surface.spans import FORMS, UNITS, span_of
 
 
 def duration(text: str | None, option: str) -> timedelta | None:
     """A time span such as 30m; None for None. ValueError names the option."""
     if text is None:
         return None
-    found = SPAN.fullmatch(text.strip())
-    try:
-        if found is not None:
-            return float(found[1]) * UNITS[found[2]]
-    except OverflowError:
-        pass
-    raise ValueError(
-        f"{option} {text!r} is not a time span: write for example 500ms, 90s, 30m, 2h or 7d; a number alone is seconds"
-    )
+    found = span_of(text)
+    if found is None:
+        raise ValueError(f"{option} {text!r} is not a time span: {FORMS}")
+    return found
 
 
 def more_than_0(text: str, option: str) -> float:

@@ -9,6 +9,7 @@ from dynhull_surface.settings import HullSettings
 from . import completion
 from .connected import AsJson, connected
 from .durations import shown
+from .history import KEPT, HistoryBytes, given_history
 from .json_lines import json_line, members
 from .listing import below, confirm_deletion, existing, listed, made, print_list
 from .lon_lat import lon_lat
@@ -53,6 +54,8 @@ def create(
     max_speed: MaxSpeed = None,
     max_growth: MaxGrowth = None,
     confirmations: Confirmations = None,
+    history: Annotated[str | None, typer.Option("--history", help=KEPT, metavar="SPAN")] = None,
+    history_bytes: HistoryBytes = None,
     exist_ok: Annotated[
         bool, typer.Option("--exist-ok", help="Accept a hull that exists already with the same settings.")
     ] = False,
@@ -72,6 +75,9 @@ def create(
     chosen["quarantine"] = given_rules(max_speed, max_growth, confirmations)
     if chosen["quarantine"] is not None and chosen["keyed"] is None:
         raise ValueError(f"{'--max-speed' if max_speed is not None else '--max-growth'} is given with --keyed")
+    chosen["history"], chosen["history_bytes"] = given_history(history, "--history"), history_bytes
+    if history is None and history_bytes is not None:
+        raise ValueError("--history-bytes is given with --history")
     for name in names:
         _, created = made(client.create_hull, HullExistsError, exist_ok=exist_ok, name=name, **chosen)
         typer.echo(

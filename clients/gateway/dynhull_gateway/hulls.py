@@ -98,6 +98,18 @@ async def reshard(
     return schemas.HullInfo.model_validate(await client.reshard(name, to.shards))
 
 
+@router.get("/hulls/{name}/history")
+async def history(client: Caller, name: HullPath) -> schemas.History:
+    """What is there of the past of a hull."""
+    return schemas.History.model_validate(await client.history(name))
+
+
+@router.put("/hulls/{name}/history")
+async def set_history(client: Caller, name: HullPath, kept: schemas.KeptHistory) -> schemas.HullInfo:
+    """Change how much of its past a hull keeps. What is to be kept no longer is gone within a minute."""
+    return schemas.HullInfo.model_validate(await client.set_history(name, kept.history, kept.history_bytes))
+
+
 @router.put("/hulls/{name}/quarantine")
 async def set_quarantine(client: Caller, name: HullPath, rules: schemas.QuarantineRules) -> schemas.HullInfo:
     """Replace the rules that hold bad positions out of a keyed hull. What is held stays so."""

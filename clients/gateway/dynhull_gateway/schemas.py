@@ -28,7 +28,7 @@ from dynhull_surface.counts import COUNTS
 from dynhull_surface.iso_times import LEAP_SECOND, from_iso
 
 from . import examples
-from .answers import Finite, Place, Rows, answering, listed, rows
+from .answers import Finite, Place, Rows, answering, listed, rows, seconds
 from .numbers import LARGEST as LARGEST
 from .numbers import Number as Number
 from .numbers import Point as Point
@@ -171,12 +171,44 @@ class QuarantineRules(Request):
     )
 
 
+KeptFor = Annotated[
+    StrictBool | Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | str | None,
+    Field(
+        description="For how long the past is kept: true for ever, seconds, or text such as 30d; null for not at all."
+    ),
+]
+KeptBytes = Annotated[
+    Annotated[int, Field(strict=True, ge=1, lt=2**63)] | None,
+    Field(description="In how many bytes the past is kept at most, the oldest going first; null for any number."),
+]
+
+
+class KeptHistory(Request):
+    """How much of its past a hull keeps."""
+
+    model_config = example(history="30d")
+
+    history: KeptFor
+    history_bytes: KeptBytes = None
+
+
+@answering(sdk.History)
+class History(Response):
+    """What is there of the past of a hull."""
+
+    history: Annotated[Literal[True] | float | None, BeforeValidator(seconds)] = Field(
+        description="For how long the past is kept, in seconds; true for ever, null for not at all."
+    )
+
+
 @with_settings(surface.HullSettings)
 class NewHull(Request):
     """The settings of a hull, fixed from its creation."""
 
     name: Name
     quarantine: QuarantineRules | None = Field(None, description="Rules that hold bad positions of keys out.")
+    history: KeptFor = None
+    history_bytes: KeptBytes = None
     exist_ok: StrictBool = Field(False, description="Return an existing hull with these settings.")
 
     def arguments(self) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from ._batch import Batch
 from ._client import HullClient
 from ._errors import *  # noqa: F403  # all of them: `_errors.__all__`
 from ._fence_messages import Fence, FenceConsumer, FenceEvent, Inside, SubjectsInside
+from ._history_messages import History
 from ._hull_copies import HullCopies
 from ._hull_copy import HullCopy
 from ._ingest import Ingest
@@ -94,6 +95,7 @@ __all__ = [
     "FenceEvent",
     "FenceWatch",
     "HeldPosition",
+    "History",
     "Hull",
     "HullClient",
     "HullCopies",

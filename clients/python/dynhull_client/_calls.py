@@ -22,6 +22,7 @@ from . import _messages as messages
 from ._arguments import positive, whole
 from ._batch import Batch
 from ._errors import DynhullError, HullExistsError, HullNotFoundError, RestoredError
+from ._history_messages import encode_history
 from ._keys import checked_keys, decode_names, encode_keys
 from ._messages import (
     Applied,
@@ -113,6 +114,8 @@ def create_hull(  # noqa: D417  # the settings have their descriptions
     center: tuple[float, float] | None = None,
     quarantine: Quarantine | None = None,
     shards: int | None = None,
+    history: str | float | timedelta | bool | None = None,
+    history_bytes: int | None = None,
     exist_ok: bool = False,
     timeout: float | None = None,
 ) -> Call[HullInfo]:
@@ -129,6 +132,9 @@ def create_hull(  # noqa: D417  # the settings have their descriptions
         quarantine: the rules that a keyed hull begins with, which hold bad positions out; None for none.
             `set_quarantine` changes them; those of an existing hull are not compared.
         SETTINGS
+        history: for how long its past is kept: True for ever, a timedelta, seconds, or text such as "30d"; None for not
+            at all. `set_history` changes it; that of an existing hull is not compared.
+        history_bytes: in how many bytes at most, the oldest going first; None for any number.
         exist_ok: whether to return an existing hull of that name and kind, with its points. HullExistsError if it has
             other settings, or without `exist_ok`.
         timeout: seconds, instead of the client's.
@@ -138,6 +144,8 @@ def create_hull(  # noqa: D417  # the settings have their descriptions
     encode_settings(HullSettings, given, config)
     if quarantine is not None:
         config.quarantine.CopyFrom(encode_quarantine(quarantine))
+    if (kept := encode_history(history, history_bytes)) is not None:
+        config.history.CopyFrom(kept)
     create: Call[HullInfo] = Call(
         "CreateHull",
         pb.CreateHullRequest(name=name, config=config),

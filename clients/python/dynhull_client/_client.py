@@ -6,6 +6,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 
 from . import _calls as calls
 from . import _fences as fences
+from . import _history as past
 from . import _layers as peeling
 from . import _many as many
 from . import _quarantine as quarantine
@@ -88,6 +89,8 @@ class HullClient(Client[BlockingConnection]):
     create_hull = _answering(calls.create_hull)
     recenter = _answering(calls.recenter)
     reshard = _answering(calls.reshard)
+    set_history = _answering(past.set_history)
+    history = _answering(past.history)
     wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)

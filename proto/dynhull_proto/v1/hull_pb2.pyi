@@ -86,7 +86,7 @@ class Hull(_message.Message):
     def __init__(self, name: _Optional[str] = ..., config: _Optional[_Union[HullConfig, _Mapping]] = ..., revision: _Optional[int] = ..., point_count: _Optional[int] = ..., distinct_point_count: _Optional[int] = ..., create_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., uid: _Optional[str] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ..., quarantine: _Optional[_Union[Quarantine, _Mapping]] = ..., held_count: _Optional[int] = ..., changed_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class HullConfig(_message.Message):
-    __slots__ = ("identity", "max_points", "window", "ordering", "frame", "center", "quarantine", "shards")
+    __slots__ = ("identity", "max_points", "window", "ordering", "frame", "center", "quarantine", "shards", "history")
     IDENTITY_FIELD_NUMBER: _ClassVar[int]
     MAX_POINTS_FIELD_NUMBER: _ClassVar[int]
     WINDOW_FIELD_NUMBER: _ClassVar[int]
@@ -95,6 +95,7 @@ class HullConfig(_message.Message):
     CENTER_FIELD_NUMBER: _ClassVar[int]
     QUARANTINE_FIELD_NUMBER: _ClassVar[int]
     SHARDS_FIELD_NUMBER: _ClassVar[int]
+    HISTORY_FIELD_NUMBER: _ClassVar[int]
     identity: Identity
     max_points: int
     window: Window
@@ -103,7 +104,16 @@ class HullConfig(_message.Message):
     center: LonLat
     quarantine: Quarantine
     shards: int
-    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ..., window: _Optional[_Union[Window, _Mapping]] = ..., ordering: _Optional[_Union[Ordering, str]] = ..., frame: _Optional[_Union[Frame, str]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ..., quarantine: _Optional[_Union[Quarantine, _Mapping]] = ..., shards: _Optional[int] = ...) -> None: ...
+    history: History
+    def __init__(self, identity: _Optional[_Union[Identity, str]] = ..., max_points: _Optional[int] = ..., window: _Optional[_Union[Window, _Mapping]] = ..., ordering: _Optional[_Union[Ordering, str]] = ..., frame: _Optional[_Union[Frame, str]] = ..., center: _Optional[_Union[LonLat, _Mapping]] = ..., quarantine: _Optional[_Union[Quarantine, _Mapping]] = ..., shards: _Optional[int] = ..., history: _Optional[_Union[History, _Mapping]] = ...) -> None: ...
+
+class History(_message.Message):
+    __slots__ = ("max_age", "max_bytes")
+    MAX_AGE_FIELD_NUMBER: _ClassVar[int]
+    MAX_BYTES_FIELD_NUMBER: _ClassVar[int]
+    max_age: _duration_pb2.Duration
+    max_bytes: int
+    def __init__(self, max_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_bytes: _Optional[int] = ...) -> None: ...
 
 class Quarantine(_message.Message):
     __slots__ = ("max_speed", "max_growth", "confirmations")

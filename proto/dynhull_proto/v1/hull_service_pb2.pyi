@@ -111,6 +111,46 @@ class RecenterResponse(_message.Message):
     hull_changed: bool
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., hull_changed: bool = ...) -> None: ...
 
+class SetHistoryRequest(_message.Message):
+    __slots__ = ("name", "history")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    HISTORY_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    history: _hull_pb2.History
+    def __init__(self, name: _Optional[str] = ..., history: _Optional[_Union[_hull_pb2.History, _Mapping]] = ...) -> None: ...
+
+class SetHistoryResponse(_message.Message):
+    __slots__ = ("hull",)
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    hull: _hull_pb2.Hull
+    def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ...) -> None: ...
+
+class GetHistoryRequest(_message.Message):
+    __slots__ = ("name",)
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    def __init__(self, name: _Optional[str] = ...) -> None: ...
+
+class GetHistoryResponse(_message.Message):
+    __slots__ = ("history", "first_revision", "first_time", "last_revision", "last_time", "bytes", "batches", "moves")
+    HISTORY_FIELD_NUMBER: _ClassVar[int]
+    FIRST_REVISION_FIELD_NUMBER: _ClassVar[int]
+    FIRST_TIME_FIELD_NUMBER: _ClassVar[int]
+    LAST_REVISION_FIELD_NUMBER: _ClassVar[int]
+    LAST_TIME_FIELD_NUMBER: _ClassVar[int]
+    BYTES_FIELD_NUMBER: _ClassVar[int]
+    BATCHES_FIELD_NUMBER: _ClassVar[int]
+    MOVES_FIELD_NUMBER: _ClassVar[int]
+    history: _hull_pb2.History
+    first_revision: int
+    first_time: _timestamp_pb2.Timestamp
+    last_revision: int
+    last_time: _timestamp_pb2.Timestamp
+    bytes: int
+    batches: int
+    moves: int
+    def __init__(self, history: _Optional[_Union[_hull_pb2.History, _Mapping]] = ..., first_revision: _Optional[int] = ..., first_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., last_revision: _Optional[int] = ..., last_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., bytes: _Optional[int] = ..., batches: _Optional[int] = ..., moves: _Optional[int] = ...) -> None: ...
+
 class SetQuarantineRequest(_message.Message):
     __slots__ = ("name", "quarantine")
     NAME_FIELD_NUMBER: _ClassVar[int]

@@ -90,6 +90,12 @@ class HullServiceStub:
     server ends in the middle, the hull has either its old shards or the new ones. Nothing changes if it has this number
     already. FAILED_PRECONDITION if the hull is not divided.
     """
+    SetHistory: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.SetHistoryRequest, _hull_service_pb2.SetHistoryResponse]
+    """Changes which of its past a hull keeps. What is to be kept no longer is dropped within a minute, and does not come back.
+    FAILED_PRECONDITION if the server can keep none, or if the hull is over shards.
+    """
+    GetHistory: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHistoryRequest, _hull_service_pb2.GetHistoryResponse]
+    """What is there of the past of a hull."""
     ListHeld: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]
     """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
     Batch.drops let them in and drop them.
@@ -272,6 +278,12 @@ class HullServiceAsyncStub(HullServiceStub):
     server ends in the middle, the hull has either its old shards or the new ones. Nothing changes if it has this number
     already. FAILED_PRECONDITION if the hull is not divided.
     """
+    SetHistory: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.SetHistoryRequest, _hull_service_pb2.SetHistoryResponse]  # type: ignore[assignment]
+    """Changes which of its past a hull keeps. What is to be kept no longer is dropped within a minute, and does not come back.
+    FAILED_PRECONDITION if the server can keep none, or if the hull is over shards.
+    """
+    GetHistory: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHistoryRequest, _hull_service_pb2.GetHistoryResponse]  # type: ignore[assignment]
+    """What is there of the past of a hull."""
     ListHeld: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]  # type: ignore[assignment]
     """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
     Batch.drops let them in and drop them.
@@ -487,6 +499,24 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         server ends in the middle, the hull has either its old shards or the new ones. Nothing changes if it has this number
         already. FAILED_PRECONDITION if the hull is not divided.
         """
+
+    @_abc_1.abstractmethod
+    def SetHistory(
+        self,
+        request: _hull_service_pb2.SetHistoryRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.SetHistoryResponse, _abc.Awaitable[_hull_service_pb2.SetHistoryResponse]]:
+        """Changes which of its past a hull keeps. What is to be kept no longer is dropped within a minute, and does not come back.
+        FAILED_PRECONDITION if the server can keep none, or if the hull is over shards.
+        """
+
+    @_abc_1.abstractmethod
+    def GetHistory(
+        self,
+        request: _hull_service_pb2.GetHistoryRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.GetHistoryResponse, _abc.Awaitable[_hull_service_pb2.GetHistoryResponse]]:
+        """What is there of the past of a hull."""
 
     @_abc_1.abstractmethod
     def ListHeld(

@@ -23,6 +23,7 @@ from prometheus_client.registry import Collector
 from dynhull_server.app import Server, end_process
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
+from dynhull_server.history_folder import archive_of
 from dynhull_server.settings import Settings
 from dynhull_server.state.errors import words
 from dynhull_server.storage.port import LockedError, StorageError, TakenOverError
@@ -299,6 +300,7 @@ class Member:
             partitions=self._cluster.partitions,
             worker=self._worker,
             leases=self._leases,
+            archive=archive_of(self._settings),
         )
         return Served(Server(own_settings(self._settings), storage, entrance, divisions), storage, entrance)
 

@@ -5,6 +5,7 @@ import asyncio
 from dynhull_server.app import Server, end_process
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
+from dynhull_server.history_folder import archive_of
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import Progress
 
@@ -35,7 +36,14 @@ class OnlyMember:
         self._leases = Leases()
         self._supervisor = Supervisor(Clock(), self._turn_health, end_process)
         self._board = Board(database, self._look, self._leases, self._worker)
-        storage = PostgresStorage(database, end_process, settings.durability, worker=self._worker, leases=self._leases)
+        storage = PostgresStorage(
+            database,
+            end_process,
+            settings.durability,
+            worker=self._worker,
+            leases=self._leases,
+            archive=archive_of(settings),
+        )
         self._server = Server(settings, storage, divisions=ServedDivisions(settings))
         self._joined = False
 

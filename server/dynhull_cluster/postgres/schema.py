@@ -39,6 +39,13 @@ MIGRATIONS: dict[int, Sequence[str]] = {
         "ALTER TABLE batches ADD COLUMN commit_number bigint, ADD COLUMN committed bigint",
         "ALTER TABLE totals ADD COLUMN committed bigint NOT NULL DEFAULT 0",
     ),
+    11: (  # what the journal dropped was gone
+        (
+            "CREATE TABLE segments (partition integer NOT NULL, id bigint NOT NULL, hull bigint NOT NULL, "
+            "first bigint NOT NULL, last bigint NOT NULL, file text NOT NULL, facts text NOT NULL, "
+            "checksum bigint NOT NULL, PRIMARY KEY (partition, id))"
+        ),
+    ),
 }
 # The number of an advisory lock, held while tables are created, migrated, or filled from a folder: "dynhull".
 PREPARING = 0x64796E68756C6C
@@ -52,6 +59,8 @@ TYPES = {
     "created": "double precision",
     "settings": "text",
     "config": "text",
+    "file": "text",
+    "facts": "text",
     "payload": "bytea",
     "points": "bytea",
     "state": "bytea",

@@ -27,7 +27,7 @@ from .ownership import follow_owner
 from .schema import put_totals
 
 # The tables whose rows go where their hull or their fence goes, each with the column of its number.
-OF_HULLS = {"batches": "hull", "snapshots": "hull", "hulls": "id"}
+OF_HULLS = {"batches": "hull", "snapshots": "hull", "segments": "hull", "hulls": "id"}
 OF_FENCES = {"insides": "fence", "consumers": "fence", "delays": "fence", "starts": "fence", "fences": "id"}
 CHUNKS = (
     b"UPDATE chunks SET partition = given.target FROM unnest(%s::bigint[], %s::integer[]) AS given (number, target) "

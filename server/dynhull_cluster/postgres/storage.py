@@ -35,6 +35,7 @@ from dynhull_server.storage.rows.examine import Findings
 from dynhull_server.storage.rows.group import Group
 from dynhull_server.storage.rows.storage import RowStorage
 from dynhull_server.storage.rows.totals import COPIES
+from dynhull_server.storage.segments.archive import Archive
 
 from .database import Connection, Database, as_storage_errors, storage_error
 from .examination import examined
@@ -70,6 +71,7 @@ class PostgresStorage(RowStorage):
         partitions: the number of partitions of the database.
         worker: what others call this server.
         leases: what this process has seen of leases.
+        archive: has what the journal drops of hulls with a history; None for a server that reads and writes none of it.
     """
 
     def __init__(
@@ -82,8 +84,9 @@ class PostgresStorage(RowStorage):
         partitions: int = 1,
         worker: str = "",
         leases: Leases | None = None,
+        archive: Archive | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(archive)
         self._database = database
         self._durability = durability
         self._partition = partition

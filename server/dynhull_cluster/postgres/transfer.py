@@ -14,8 +14,11 @@ from pathlib import Path
 from dynhull_server.storage.port import DamagedError, LockedError, Progress, StorageError
 from dynhull_server.storage.rows.divided import DatabaseView, latest_epoch
 from dynhull_server.storage.rows.examine import Findings
+from dynhull_server.storage.rows.filed_check import adopting, history_bytes
+from dynhull_server.storage.rows.ledger import Ledger
 from dynhull_server.storage.rows.tables import COLUMNS, Insert, Reader
 from dynhull_server.storage.rows.totals import STOPPED
+from dynhull_server.storage.segments.archive import HISTORY
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.worker_folders import parts_of, worker_folder, write_manifest
 
@@ -61,13 +64,14 @@ class Moved:
         self.notes += findings.notes
 
 
-def to_database(folder: Path, database: Database, progress: Progress) -> Moved:
+def to_database(folder: Path, database: Database, progress: Progress, history: Path | None = None) -> Moved:
     """Copy a folder into a database, in one transaction.
 
     Args:
         folder: the folder, which no server may use.
         database: the database, without tables of dynhull.
         progress: called with the rows copied so far and the total.
+        history: the folder for the past of the hulls in the database; None if there is none.
 
     Raises:
         StorageError: one of them cannot be used.
@@ -87,6 +91,7 @@ def to_database(folder: Path, database: Database, progress: Progress) -> Moved:
                     for sql, values in queries_of(partition, rows):
                         connection.execute(sql, values)
                 totals = findings.ledger.totals._replace(mode=STOPPED)
+                _move_history(findings.ledger, part / HISTORY, history)
             put_totals(connection, partition, totals)
             copy = examined(connection, partition, lambda *_: None)
             _require_same(findings, copy, str(database))
@@ -97,13 +102,14 @@ def to_database(folder: Path, database: Database, progress: Progress) -> Moved:
     return moved
 
 
-def to_folder(database: Database, folder: Path, progress: Progress) -> Moved:
+def to_folder(database: Database, folder: Path, progress: Progress, history: Path | None = None) -> Moved:
     """Copy a database into a folder, which has a part for each partition if there are several.
 
     Args:
         database: the database, which no server may use.
         folder: the folder, which is made.
         progress: called with the rows copied so far and the total.
+        history: the folder with the past of the hulls in the database; None if there is none.
 
     Raises:
         StorageError: one of them cannot be used.
@@ -129,10 +135,25 @@ def to_folder(database: Database, folder: Path, progress: Progress) -> Moved:
             rows = _while_owned(owner, _rows(PostgresReader(connection, partition), progress))
             copy = copies.write(str(database), target, rows, findings.ledger.totals)
             _require_same(findings, copy, str(target))
+            _move_history(findings.ledger, history, target / HISTORY)
             moved.add(findings)
         if partitions > 1:
             write_manifest(folder, partitions, complete=True)  # at the end: without it, the copy is refused
     return moved
+
+
+def _move_history(ledger: Ledger, source: Path | None, target: Path | None) -> None:
+    """Copy the files of all segments. Raises StorageError if there are some, and no folder, or one is damaged."""
+    size = history_bytes(ledger)
+    if not size:
+        return
+    if source is None or target is None:
+        raise StorageError(
+            f"the hulls have {size:,} bytes of past: say with --history-dir where those of a database are"
+        )
+    notes: list[str] = []
+    if list(adopting(ledger, source, target, notes)):
+        raise DamagedError("; ".join(notes))
 
 
 def _partitions(connection: Connection, database: Database) -> int:

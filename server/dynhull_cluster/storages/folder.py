@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from dynhull_server.app import Server
+from dynhull_server.history_folder import archive_of
 from dynhull_server.process import Alone
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import LockedError
@@ -44,7 +45,7 @@ class FolderKind:
     def alone(self) -> Alone:
         """The server. Raises StorageError if the folder is divided among workers."""
         require_one_process(self._data)
-        storage = SQLiteStorage(self._data, self._settings.durability)
+        storage = SQLiteStorage(self._data, self._settings.durability, archive=archive_of(self._settings, self._data))
         return Server(self._settings, storage, divisions=ServedDivisions(self._settings))
 
     @contextmanager
@@ -70,7 +71,8 @@ class FolderKind:
         """The server of a worker, on its own part of the folder."""
         from ..worker import worker_server
 
-        storage = SQLiteStorage(worker_folder(self._data, number), self._settings.durability)
+        data = worker_folder(self._data, number)
+        storage = SQLiteStorage(data, self._settings.durability, archive=archive_of(self._settings, data))
         return worker_server(self._settings, number, Sockets(Path(begin["sockets"])), storage)
 
     async def gateway(self, begin: Begin) -> Serving:

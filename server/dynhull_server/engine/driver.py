@@ -131,6 +131,7 @@ class Driver:
         threads = self.machine.threads
         self._turns, self._reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
         self._disk = threads.pool("disk", DISK_THREADS)
+        self._history = threads.pool("history", 1)  # a segment may take seconds
 
     def start(self, hulls: HullObserver, fences: FenceObserver, committed: CommitStamp) -> None:
         """Serve the hulls and fences of the core.
@@ -173,7 +174,7 @@ class Driver:
         if self._started:
             self._commits.close()
         if self._begun:
-            for pool in (self._turns, self._reads, self._disk):
+            for pool in (self._turns, self._reads, self._disk, self._history):
                 pool.shutdown()
 
     # Requests
@@ -245,6 +246,10 @@ class Driver:
     async def on_disk(self, function: Callable[[], Any]) -> Any:
         """Call a function that reads or writes the storage."""
         return await self._run(self._disk, function)
+
+    async def in_history(self, function: Callable[[], Any]) -> Any:
+        """Call a function in the thread that writes segments."""
+        return await self._run(self._history, function)
 
     async def in_turn(self, function: Callable[[], Any]) -> Any:
         """Call a function in a thread of the trips."""

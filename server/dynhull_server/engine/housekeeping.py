@@ -1,6 +1,6 @@
 """Background work on the storage: snapshots, which shorten a restart; checkpoints, syncs and sweeps."""
 
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -22,6 +22,7 @@ class Housekeeping:
     CHECKPOINT_SECONDS = 0.25
     SNAPSHOT_SECONDS = 1.0
     SWEEP_SECONDS = 5.0
+    HISTORY_SECONDS = 1.0
 
     def __init__(self, driver: Driver, hulls: Hulls, storage: Storage, divisions: Divisions | None) -> None:
         self._driver = driver
@@ -40,7 +41,11 @@ class Housekeeping:
 
     async def sweep(self) -> None:
         """Remove the data of deleted hulls."""
-        await self._carry_out(self._storage.sweep())
+        await self._carry_out(self._storage.sweep(), self._driver.on_disk)
+
+    async def file_history(self) -> None:
+        """Make segments of what the journal need not have any longer, and remove those that are not to be kept."""
+        await self._carry_out(self._storage.file_history(self._driver.time()), self._driver.in_history)
 
     async def snapshots(self, least_points: int) -> None:
         """Write a snapshot of every hull that needs one, one after another.
@@ -71,20 +76,20 @@ class Housekeeping:
     async def _snapshot(self, hull: LiveHull) -> None:
         unsaved = hull.unsaved
         _, kept = await hull.read(lambda state: state.kept(), rows=hull.counts.points)
-        await self._carry_out(self._storage.snapshot(hull.number, kept))
+        await self._carry_out(self._storage.snapshot(hull.number, kept), self._driver.on_disk)
         hull.saved(unsaved)
 
     async def _snapshot_of_shard(self, shard: StoredShard) -> None:
         taken = shard.take()
         if taken is not None:
             kept, unsaved = taken
-            await self._carry_out(self._storage.snapshot(shard.number, kept))
+            await self._carry_out(self._storage.snapshot(shard.number, kept), self._driver.on_disk)
             shard.saved(unsaved)
 
-    async def _carry_out(self, steps: Iterator[Any]) -> None:
+    async def _carry_out(self, steps: Iterator[Any], run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> None:
         while True:
             begun = self._clock.monotonic()
-            step = await self._driver.on_disk(partial(next, steps, None))
+            step = await run(partial(next, steps, None))
             if step is None:
                 return
             await self._driver.commit([step])

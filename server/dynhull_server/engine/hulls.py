@@ -2,14 +2,24 @@
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 from ..state.batch import Applied, Write
-from ..state.errors import HullNotFoundError, HullUnsuitableError, PartRefusedError
+from ..state.core import not_stored
+from ..state.errors import (
+    HullNotFoundError,
+    HullUnsuitableError,
+    NotStoredError,
+    OutcomeUnknownError,
+    PartRefusedError,
+    words_for_callers,
+)
 from ..state.hull import Hull
 from ..state.records import DEFAULT, HullSettings
 from ..state.registry import page_of
 from ..state.requests import CreateHull, DeleteHull, Expire, WriteBatch, WriteTogether
-from ..storage.port import Storage
+from ..storage.past import StoredHistory
+from ..storage.port import NotCommittedError, Storage
 from .batch_stream import BatchStream
 from .divided_hull import DividedHull
 from .division import Divisions
@@ -18,7 +28,7 @@ from .fences import Fences
 from .layers import COPIES
 from .live_hull import LiveHull
 from .positions import Standing, standing
-from .recalls import Recalls
+from .recalls import UNREADABLE, Recalls
 from .rosters import Rosters
 from .series import KeptSeries
 from .waiter import Waiter
@@ -46,6 +56,9 @@ class Hulls:
         self._divisions = divisions
         self._copies = asyncio.Semaphore(COPIES)
         self._recalls = Recalls(storage, driver.on_disk)
+        self._storage = storage
+        self._changing: set[asyncio.Task[None]] = set()
+        self._turn_of_settings = asyncio.Lock()
         self._live: dict[Hull, LiveHull] = {}
         self._incarnation = driver.machine.token()  # that of hulls in memory; others find theirs in the storage
         self._standing = standing(self._incarnation, driver.published)
@@ -86,12 +99,72 @@ class Hulls:
             if why_not is not None:
                 field, reason = why_not
                 raise HullUnsuitableError(name, reason, field=field)
+        if settings.history:
+            self._require_history(name, settings)
         hull: Hull = await self._driver.ask(CreateHull(Waiter(), name, self._driver.birth(), settings))
         return self._live_hull(hull)
 
     async def delete(self, name: str) -> None:
         """Delete the hull of that name, or raise HullNotFoundError or NotStoredError."""
         await self._driver.ask(DeleteHull(Waiter(), name, self._driver.time()))
+
+    async def set_history(self, name: str, max_age: int, max_bytes: int) -> LiveHull:
+        """Change how much of the past of a hull is kept, as in `HullSettings`.
+
+        It is changed even if its caller goes away.
+
+        Raises:
+            HullNotFoundError: no hull has that name.
+            HullUnsuitableError: the server can keep none of it.
+            NotStoredError: the storage has failed, and it is as before.
+        """
+        hull = self._driver.core.get(name)
+        if max_age:
+            self._require_history(name, hull.row.settings)
+        elif not hull.row.settings.history:
+            return self._live_hull(hull)
+        changing = asyncio.get_running_loop().create_task(self._set_history(hull, max_age, max_bytes))
+        self._changing.add(changing)
+        changing.add_done_callback(self._changing.discard)
+        await asyncio.shield(changing)
+        return self._live_hull(hull)
+
+    async def _set_history(self, hull: Hull, max_age: int, max_bytes: int) -> None:
+        number = hull.row.number
+        async with self._turn_of_settings:
+            try:
+                await self._driver.commit([self._storage.set_history(number, max_age, max_bytes)])
+            except NotCommittedError as error:
+                raise not_stored(error) from error
+            except Exception as error:
+                raise OutcomeUnknownError(words_for_callers(error)) from error
+            row = await self._driver.on_disk(partial(self._storage.row, number))
+        if row is None:
+            raise HullNotFoundError(hull.name)
+        hull.row = row
+
+    def _require_history(self, name: str, settings: HullSettings) -> None:
+        """Raise HullUnsuitableError if a hull with these settings can have no history."""
+        if settings.divided:
+            raise HullUnsuitableError(name, "is divided among shards, and has no history", field="config.history")
+        if why_not := self._storage.why_no_history():
+            raise HullUnsuitableError(name, why_not, field="config.history")
+
+    async def history(self, name: str) -> tuple[LiveHull, StoredHistory]:
+        """What is there of the past of a hull.
+
+        Raises:
+            HullNotFoundError: no hull has that name.
+            NotStoredError: it cannot be read at present.
+        """
+        hull = self._driver.core.get(name)
+        try:
+            found = await self._driver.on_disk(partial(self._storage.history, hull.row.number))
+        except KeyError:  # deleted meanwhile
+            raise HullNotFoundError(name) from None
+        except UNREADABLE as error:
+            raise NotStoredError(words_for_callers(error)) from error
+        return self._live_hull(hull), found
 
     async def apply(self, write: Write, *, create: bool) -> Applied:
         """Apply a batch as the next revision of a hull, or raise the error that refuses it.

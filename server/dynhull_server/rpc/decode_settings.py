@@ -10,7 +10,7 @@ from dynhull_proto.v1 import hull_pb2
 
 from ..state.admission import GREATEST_TIME
 from ..state.frames import off_globe
-from ..state.records import Center, Clock, Frame, HullSettings, Identity, QuarantineRules, Window
+from ..state.records import FOREVER, Center, Clock, Frame, HullSettings, Identity, QuarantineRules, Window
 from .decode import LARGEST_INTEGER, InvalidFieldError
 
 IDENTITIES: dict[int, Identity] = {
@@ -60,7 +60,18 @@ def decode_settings(config: hull_pb2.HullConfig) -> HullSettings:
             raise InvalidFieldError("config.quarantine", "present", "only a keyed hull has a quarantine")
         quarantine = decode_quarantine(config.quarantine, "config.quarantine")
     shards = decode_shards(config.shards, "config.shards") if config.shards else 0
-    return HullSettings(identity, config.max_points, window, by_event_time, frame, center, quarantine, shards=shards)
+    history, most = decode_history(config.history, "config.history") if config.HasField("history") else (0, 0)
+    of_points = identity, config.max_points, window, by_event_time, frame, center, quarantine
+    return HullSettings(*of_points, shards=shards, history=history, history_bytes=most)
+
+
+def decode_history(message: hull_pb2.History, field: str) -> tuple[int, int]:
+    """For how many microseconds, and in how many bytes, what the journal drops is kept."""
+    if message.max_bytes > LARGEST_INTEGER:
+        raise InvalidFieldError(f"{field}.max_bytes", message.max_bytes, f"must be at most {LARGEST_INTEGER}")
+    if not message.HasField("max_age"):
+        return FOREVER, message.max_bytes
+    return decode_duration(message.max_age, f"{field}.max_age", least=1), message.max_bytes
 
 
 def decode_shards(shards: int, field: str) -> int:

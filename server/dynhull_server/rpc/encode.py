@@ -41,6 +41,7 @@ from ..state.records import (
     QuarantineRules,
     Times,
 )
+from ..storage.past import StoredHistory
 
 # Makes the measures of some vertices.
 Measure = Callable[[Points], Awaitable[HullMeasures]]
@@ -114,6 +115,7 @@ def encode_settings(settings: HullSettings, shards: int) -> hull_pb2.HullConfig:
         center=encode_center(settings.center),
         quarantine=encode_quarantine(settings.quarantine),
         shards=shards,
+        history=encode_history(settings),
     )
     if settings.identity != "multiset":
         by_time = settings.by_event_time
@@ -129,6 +131,33 @@ def encode_settings(settings: HullSettings, shards: int) -> hull_pb2.HullConfig:
         config.window.max_skew.FromMicroseconds(window.max_skew)
         config.window.ahead = hull_pb2.AHEAD_POLICY_CLAMP if window.clamps else hull_pb2.AHEAD_POLICY_REFUSE
     return config
+
+
+def encode_history(settings: HullSettings) -> hull_pb2.History | None:
+    """Which of its past a hull keeps; None for nothing."""
+    if not settings.history:
+        return None
+    message = hull_pb2.History(max_bytes=settings.history_bytes)
+    if settings.history != FOREVER:
+        message.max_age.FromMicroseconds(settings.history)
+    return message
+
+
+def encode_found_history(hull: LiveHull, found: StoredHistory) -> hull_service_pb2.GetHistoryResponse:
+    """What is there of the past of a hull."""
+    message = hull_service_pb2.GetHistoryResponse(
+        history=encode_history(hull.settings),
+        first_revision=found.first.revision,
+        last_revision=found.last.revision,
+        bytes=found.bytes,
+        batches=found.batches,
+        moves=found.moves,
+    )
+    if found.first.committed is not None:
+        message.first_time.FromMicroseconds(found.first.committed.time)
+    if found.last.committed is not None:
+        message.last_time.FromMicroseconds(found.last.committed.time)
+    return message
 
 
 def encode_center(center: Center | None) -> hull_pb2.LonLat | None:

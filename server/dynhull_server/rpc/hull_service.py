@@ -28,7 +28,7 @@ from ..state.records import Contents
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
-from .decode_settings import decode_center, decode_quarantine, decode_settings, decode_shards
+from .decode_settings import decode_center, decode_history, decode_quarantine, decode_settings, decode_shards
 from .many import MANY_INTERVAL, HullStates, ManyQuotas, encode_many, require_many
 from .metrics import Metrics
 from .query import METHODS, Answers
@@ -122,6 +122,16 @@ class HullService:
         hull = self._hulls.get(self._written(call, request.name))
         counts = await hull.reshard(decode_shards(request.shards, "shards"))
         return pb.ReshardResponse(hull=encode.encode_hull(hull, counts))
+
+    async def SetHistory(self, request: pb.SetHistoryRequest, call: Call) -> pb.SetHistoryResponse:
+        name = self._written(call, request.name)
+        kept = decode_history(request.history, "history") if request.HasField("history") else (0, 0)
+        hull = await self._hulls.set_history(name, *kept)
+        return pb.SetHistoryResponse(hull=encode.encode_hull(hull, hull.counts))
+
+    async def GetHistory(self, request: pb.GetHistoryRequest, call: Call) -> pb.GetHistoryResponse:
+        hull, found = await self._hulls.history(self._read(call, request.name).name)
+        return encode.encode_found_history(hull, found)
 
     # Writes
 

@@ -38,6 +38,7 @@ FINISHED = {
     "Recenter",
     "SetQuarantine",
     "Reshard",
+    "SetHistory",
     "ListHulls",
     "Apply",
     "ApplyTogether",

@@ -477,7 +477,7 @@ class Core:
     def _fail(self, trip: Trip, error: Exception, effects: list[Effect]) -> None:
         """Handle a trip whose changes were not committed."""
         trip.failure = error
-        self._refuse_changes(trip, _not_stored(error), effects)
+        self._refuse_changes(trip, not_stored(error), effects)
         if trip.fences is None and trip.places:  # the new hull is forgotten
             self._again(trip)
         elif trip.applied or trip.torn:
@@ -552,7 +552,7 @@ class Core:
                 self._fences.give_back(trip, trip.fences, event.restored)
             assert trip.failure is not None  # a trip is examined only after a failure
             if trip.unknown:
-                self._refuse_changes(trip, _not_stored(trip.failure), effects)
+                self._refuse_changes(trip, not_stored(trip.failure), effects)
             self._again(trip)
         self._go_on(trip.queues, effects)
 
@@ -617,7 +617,8 @@ class Core:
             # Requests that wait for a trip are refused after it, so that the answers of a stream keep their order.
 
 
-def _not_stored(error: Exception) -> NotStoredError:
+def not_stored(error: Exception) -> NotStoredError:
+    """The refusal of what was not committed, for this reason."""
     full = getattr(error, "full", False)
     reason = words_for_callers(error)
     return DiskFullError(reason) if full else NotStoredError(reason)

@@ -68,7 +68,7 @@ class QuarantineRules:
 
 @dataclass(frozen=True, slots=True)
 class HullSettings:
-    """The settings of a hull, fixed at its creation.
+    """The settings of a hull, fixed at its creation; but for those of its history.
 
     Attributes:
         identity: what identifies a point: its coordinates ("multiset"), a string or an integer.
@@ -81,6 +81,8 @@ class HullSettings:
         shards: the number of shards that the points are divided among; 0 for a hull that is not divided.
         shard: which of them these points belong to; None for a hull as a whole.
         generation: that of the division that a shard is of.
+        history: for how many microseconds what the journal drops is kept; 0 for not at all, FOREVER for ever.
+        history_bytes: how many bytes of it are kept at most, the newest; 0 for any number.
     """
 
     identity: Identity = "multiset"
@@ -93,6 +95,8 @@ class HullSettings:
     shards: int = 0
     shard: int | None = None
     generation: int = 0
+    history: int = 0
+    history_bytes: int = 0
 
     @property
     def geographic(self) -> bool:

@@ -19,7 +19,7 @@ from ..state.fences.model.records import (
     PutDelays,
 )
 from ..state.records import Append, CommitStamp, Create, Delete, HullRow, Kept, Record
-from .past import Moment, created
+from .past import Moment, StoredHistory, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 
 KEPT_SNAPSHOTS = 2
@@ -165,6 +165,27 @@ class MemoryStorage:
             raise DamagedError(f"revision {after + 1} of hull {self._hulls[number].row.name!r} is no longer kept")
         with self._turn:
             return [each for each in self._hulls[number].records if after < each.revision <= until][:STEP_RECORDS]
+
+    def history(self, number: int) -> StoredHistory:
+        """What is there of a hull."""
+        first = self.oldest_moment(number)
+        with self._turn:
+            hull = self._hulls[number]
+            committed = hull.records[-1].committed if hull.records else first.committed
+            return StoredHistory(first, Moment(hull.last, committed))
+
+    def why_no_history(self) -> str:
+        """It keeps nothing on a disk."""
+        return "has its server in memory, which keeps no history"
+
+    def set_history(self, number: int, max_age: int, max_bytes: int) -> StorageStep:
+        """Never called, since it says why not."""
+        raise NotImplementedError
+
+    def file_history(self, now: int) -> Iterator[StorageStep]:
+        """There are no segments."""
+        del now
+        yield from ()
 
     def snapshot(self, number: int, kept: Kept) -> Iterator[StorageStep]:
         """One step."""

@@ -25,6 +25,22 @@ def created(row: HullRow) -> CommitStamp:
     return CommitStamp(0, round(row.created * 1_000_000))
 
 
+@dataclass(frozen=True, slots=True)
+class StoredHistory:
+    """What is there of the past of a hull.
+
+    Attributes:
+        first, last: the oldest revision that can be read, and the newest one.
+        bytes, batches, moves: of segments: the size of their files, their batches, and the points and keys in these.
+    """
+
+    first: Moment
+    last: Moment
+    bytes: int = 0
+    batches: int = 0
+    moves: int = 0
+
+
 class Past(Protocol):
     """Reads hulls as they were, from a state and the batches after it.
 
@@ -53,3 +69,6 @@ class Past(Protocol):
 
         At least one, if `after` is before `until`; as many as are read and applied in some milliseconds.
         """
+
+    def history(self, number: int) -> StoredHistory:
+        """What is there of a hull."""

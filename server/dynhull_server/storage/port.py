@@ -185,6 +185,29 @@ class Storage(Past, Protocol):
         of it. Snapshots of several hulls may be written at the same time.
         """
 
+    def why_no_history(self) -> str:
+        """Why it cannot keep what the journal drops; empty if it can."""
+
+    def set_history(self, number: int, max_age: int, max_bytes: int) -> "StorageStep":
+        """Change for how many microseconds, and in how many bytes, what the journal drops of a hull is kept.
+
+        As in `HullSettings`. `row` has it after the commit of the step.
+        """
+
+    def file_history(self, now: int) -> Iterator["StorageStep"]:
+        """Write segments of what the journal need not have any longer, and drop those that have become too old.
+
+        Commit each step before the next is taken. A segment counts from its step on: a kill leaves its batches in the
+        journal, or in it. Run only one at a time, on a thread that may take its time.
+
+        Args:
+            now: the time in microseconds since 1970.
+
+        Raises:
+            OSError: the disk is full, or fails: the journal keeps what is not in segments.
+            DamagedError: a row of the journal is damaged.
+        """
+
     def cut(self, number: int, last: int) -> "StorageStep | None":
         """Drop the revisions of a shard after `last`, which is not before its last snapshot; None for none.
 

@@ -17,7 +17,8 @@ from .fence_examine import FenceExamination, FoundFences
 from .group import AnyStep, Cut, DropSnapshot
 from .hull_rows import found_hulls, values
 from .ledger import HullRows, Ledger, StoredSnapshot
-from .tables import COLUMNS, FENCES_SINCE, Reader
+from .segment_rows import segment_checksum, segment_from, segment_weight
+from .tables import COLUMNS, FENCES_SINCE, SEGMENTS_SINCE, Reader
 from .totals import Totals, totals_from
 
 PROGRESS_ROWS = 1000
@@ -112,6 +113,8 @@ class _Examination:
         self._snapshots()
         self._chunks()
         self._batches()
+        if self._version >= SEGMENTS_SINCE:
+            self._segments()
         if self._version >= FENCES_SINCE:
             examination = FenceExamination(self._reader, self._ledger, self._version, contents=self._contents)
             self._fences = examination.run()
@@ -121,6 +124,7 @@ class _Examination:
         self._compare(totals)
         for scanned in self._hulls.values():
             self._judge(scanned)
+            scanned.rows.segments.sort(key=lambda segment: segment.first)
         self._judge_fenced()
 
     def _totals(self) -> Totals | None:
@@ -207,6 +211,25 @@ class _Examination:
             if not whole:
                 scanned.damaged[first] = each
         self._ledger.batch_ids = count(newest + 1)
+
+    def _segments(self) -> None:
+        newest = MISSING
+        for row in self._reader.every("segments", ", ".join(COLUMNS["segments"])):
+            place, number, first, last, file, facts, stored = row
+            newest = place
+            scanned = self._hulls.get(number)
+            if scanned is None:
+                self._ledger.dead["segments"].append(place)
+                continue
+            try:
+                if segment_checksum(*row[:-1]) != stored:
+                    raise ValueError("its checksum differs")
+                scanned.rows.segments.append(segment_from(place, first, last, file, facts))
+                scanned.rows.weigh(segment_weight(row))
+            except (ValueError, TypeError, struct.error) as error:
+                text = f"the row of a segment with revisions {first} to {last} is damaged ({error})"
+                self._findings.blame(scanned.rows, text, fatal=True)
+        self._ledger.segment_ids = count(newest + 1)
 
     def _counted(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
         for row in self._reader.every(table, columns):

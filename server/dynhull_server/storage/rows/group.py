@@ -2,7 +2,7 @@
 
 from bisect import insort
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ...state.changes import Change
@@ -13,6 +13,7 @@ from .encoding import checksum, encode, weight
 from .fence_ledger import FenceChanges, FenceStep
 from .hull_rows import values
 from .ledger import HullRows, Ledger, StoredSnapshot
+from .segment_rows import StoredSegment, Values, segment_values, segment_weight, unused_values
 from .tables import Insert, Remove, Statement
 
 if TYPE_CHECKING:
@@ -56,6 +57,39 @@ class DropBatches:
 
 
 @dataclass(frozen=True, slots=True)
+class SetHistory:
+    """Step: how much of the past of a hull is kept from now on. Only one in a group."""
+
+    number: int
+    max_age: int
+    max_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class NameFile:
+    """Step: names a file of a segment that is about to be written, so that a start after a kill removes it."""
+
+    place: int
+    file: str
+
+
+@dataclass(frozen=True, slots=True)
+class CloseSegment:
+    """Step: from now on a segment, whose files are complete, has its batches, and the journal need not."""
+
+    number: int
+    segment: StoredSegment
+
+
+@dataclass(frozen=True, slots=True)
+class RetireSegment:
+    """Step: nobody reads a segment from now on; its files are to be removed."""
+
+    number: int
+    segment: StoredSegment
+
+
+@dataclass(frozen=True, slots=True)
 class Cut:
     """Step: deletes the newest row of batches of a hull, which is damaged; the hull ends at revision `last`."""
 
@@ -89,7 +123,17 @@ class ChangeHull:
     row: HullRow
 
 
-AnyStep = Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull | FenceStep
+@dataclass(frozen=True, slots=True)
+class DropDeadSegment:
+    """Step: deletes the row of files that are removed."""
+
+    place: int
+
+
+SegmentStep = SetHistory | NameFile | CloseSegment | RetireSegment | DropDeadSegment
+AnyStep = (
+    Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull | SegmentStep | FenceStep
+)
 
 
 class Group:
@@ -159,6 +203,16 @@ class Group:
                 self._drop_dead(change)
             case ChangeHull():
                 self._change(change.row)
+            case SetHistory():
+                self._set_history(change)
+            case NameFile():
+                self.statements.append(Insert("segments", unused_values(change.place, change.file)))
+            case CloseSegment():
+                self._close_segment(change)
+            case RetireSegment():
+                self._retire_segment(change)
+            case DropDeadSegment():
+                self._drop_dead_segment(change.place)
             case _:
                 self._fences.take(change)  # any other kind is an error of types
 
@@ -223,6 +277,7 @@ class Group:
             rows, dead = self._ledger.hulls.pop(number), self._ledger.dead
             dead["batches"] += rows.ids
             dead["snapshots"].extend(snapshot.id for snapshot in rows.snapshots)
+            dead["segments"].extend(segment.id for segment in rows.segments)
             for snapshot in rows.snapshots:
                 dead["chunks"].extend(snapshot.chunks)
 
@@ -249,6 +304,47 @@ class Group:
 
         self.statements.append(Remove("snapshots", (step.snapshot.id,)))
         self._effects.append(drop)
+
+    def _set_history(self, step: SetHistory) -> None:
+        now = self._hull(step.number)
+        if now is None:  # deleted meanwhile
+            return
+        row = now.rows.row
+        self._change(replace(row, settings=replace(row.settings, history=step.max_age, history_bytes=step.max_bytes)))
+
+    def _close_segment(self, step: CloseSegment) -> None:
+        now, segment = self._hull(step.number), step.segment
+        if now is None or now.rows.filed + 1 != segment.first:  # deleted meanwhile
+            self._effects.append(lambda: self._ledger.dead["segments"].append(segment.id))
+            return
+        values = segment_values(segment, step.number)
+        self._replace_segment(values)
+        self._weigh(now, segment_weight(values))
+        self._effects.append(lambda: now.rows.segments.append(segment))
+
+    def _retire_segment(self, step: RetireSegment) -> None:
+        now, segment = self._hull(step.number), step.segment
+        if now is None or segment not in now.rows.segments:
+            return
+        self._replace_segment(unused_values(segment.id, segment.file))
+        self._weigh(now, -segment_weight(segment_values(segment, step.number)))
+        self._effects.append(lambda: now.rows.segments.remove(segment))
+        self._effects.append(lambda: self._ledger.dead["segments"].append(segment.id))
+
+    def _drop_dead_segment(self, place: int) -> None:
+        dead = self._ledger.dead["segments"]
+        if place in dead:
+            self.statements.append(Remove("segments", (place,)))
+            self._effects.append(lambda: dead.remove(place))
+
+    def _replace_segment(self, values: Values) -> None:
+        self.statements += [Remove("segments", (values[0],)), Insert("segments", values)]
+
+    def _weigh(self, now: "_Now", more: int) -> None:
+        """Add to the sum of the rows of a hull."""
+        now.sum += more
+        self.totals = self.totals.plus(0, 0, more)
+        self._effects.append(lambda: now.rows.weigh(more))
 
     def _drop_batches(self, step: DropBatches) -> None:
         now = self._hull(step.number)

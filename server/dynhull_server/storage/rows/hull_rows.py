@@ -100,6 +100,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     9: ("id, name, uid, created, settings, checksum", _of_format_3),
     10: ("id, name, uid, created, settings, checksum", _of_format_3),
     11: ("id, name, uid, created, settings, checksum", _of_format_3),
+    12: ("id, name, uid, created, settings, checksum", _of_format_3),
 }
 
 

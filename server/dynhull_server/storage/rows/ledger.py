@@ -10,6 +10,7 @@ from typing import Self
 from ...state.records import HullRow
 from .event_directory import EventDirectory
 from .fence_runs import FenceRows, FenceRuns, Staged
+from .segment_rows import StoredSegment
 from .totals import Totals
 
 KEPT = 2  # snapshots per hull; the older one serves if the newer is damaged
@@ -24,9 +25,20 @@ DROPPED = {
     "consumers": "length(name)",
     "delays": "length(payload)",
     "starts": "8",
+    "segments": "length(file)",
 }
 
-IDS = ("batch_ids", "chunk_ids", "snapshot_ids", "event_ids", "inside_ids", "consumer_ids", "delay_ids", "start_ids")
+IDS = (
+    "batch_ids",
+    "chunk_ids",
+    "snapshot_ids",
+    "segment_ids",
+    "event_ids",
+    "inside_ids",
+    "consumer_ids",
+    "delay_ids",
+    "start_ids",
+)
 
 
 @dataclass(slots=True)
@@ -44,11 +56,12 @@ class HullRows:
 
     Attributes:
         row: the row of the hull itself.
-        sum: the sum of its checksum and of the weights of its rows of batches.
+        sum: the sum of its checksum and of the weights of its rows of batches and of segments.
         firsts: the first revision in each row of batches, ascending.
         ids: the numbers of these rows.
         last: the newest revision.
         snapshots: the snapshots, ordered by revision.
+        segments: what the journal has dropped, ordered by revision.
     """
 
     row: HullRow
@@ -57,18 +70,42 @@ class HullRows:
     ids: "array[int]" = field(default_factory=lambda: array("q"))
     last: int = 0
     snapshots: list[StoredSnapshot] = field(default_factory=list)
+    segments: list[StoredSegment] = field(default_factory=list)
 
     @property
     def oldest(self) -> int:
-        """The oldest revision that can be read."""
-        if len(self.snapshots) >= KEPT:
-            return self.snapshots[-KEPT].revision
-        complete = not self.snapshots or (len(self.firsts) > 0 and self.firsts[0] == 1)
-        return 0 if complete else self.snapshots[0].revision
+        """The oldest revision that the journal can read: what is before it is dropped, once segments have it."""
+        if len(self.snapshots) < KEPT:
+            return self.beginning
+        base = self.snapshots[-KEPT].revision
+        return min(base, self.filed) if self.row.settings.history else base
+
+    @property
+    def beginning(self) -> int:
+        """The oldest revision that the rows of the journal lead to."""
+        if not self.snapshots or (len(self.firsts) > 0 and self.firsts[0] == 1):
+            return 0
+        first = self.firsts[0] if self.firsts else self.last + 1
+        return next(
+            (each.revision for each in self.snapshots if each.revision + 1 >= first), self.snapshots[-1].revision
+        )
+
+    @property
+    def filed(self) -> int:
+        """The revision up to which segments have all batches that they are to have."""
+        return self.segments[-1].last if self.segments else self.beginning
+
+    @property
+    def due(self) -> int:
+        """The revision up to which batches are to go into a segment at present; `filed` if there are none."""
+        filed = self.filed
+        ends = [each.revision for each in self.snapshots[: 1 - KEPT] if each.revision > filed]
+        return ends[0] if self.row.settings.history and ends else filed
 
     def copy(self) -> Self:
         """A copy of the present state."""
-        return type(self)(self.row, self.sum, self.firsts[:], self.ids[:], self.last, self.snapshots[:])
+        columns = self.firsts[:], self.ids[:], self.last, self.snapshots[:], self.segments[:]
+        return type(self)(self.row, self.sum, *columns)
 
     def between(self, after: int, until: int) -> "array[int]":
         """The rows with the revisions `after` + 1 to `until`."""
@@ -79,12 +116,23 @@ class HullRows:
         """The rows that no readable revision needs."""
         if len(self.snapshots) < KEPT:
             return array("q")
-        oldest = self.snapshots[-KEPT].revision
+        oldest = self.oldest
         return self.ids[:] if self.last <= oldest else self.ids[: max(0, bisect_right(self.firsts, oldest + 1) - 1)]
+
+    def outlived(self) -> StoredSnapshot | None:
+        """A snapshot that neither a read nor a segment needs any more; None for none."""
+        if len(self.snapshots) <= KEPT:
+            return None
+        first, second, *_ = self.snapshots
+        return first if first.revision < self.oldest or first.revision == second.revision else None
 
     def change(self, row: HullRow, more: int) -> None:
         """Change the row of the hull itself, whose checksum is `more` by that much."""
         self.row = row
+        self.sum += more
+
+    def weigh(self, more: int) -> None:
+        """Add the weight of a row to the sum, or subtract it."""
         self.sum += more
 
     def append(self, first: int, last: int, place: int, weight: int) -> None:
@@ -119,8 +167,8 @@ class Ledger:
         hulls: the hulls by number.
         fences: the fences by number.
         dead: by table, the rows to drop because no hull, fence or snapshot needs them.
-        batch_ids, chunk_ids, snapshot_ids: the next numbers. No number is used twice while the storage is open, so a
-            row found dead cannot belong to anything else when it is dropped.
+        batch_ids, chunk_ids, snapshot_ids, segment_ids: the next numbers. No number is used twice while the storage is
+            open, so a row found dead cannot belong to anything else when it is dropped.
         event_ids, inside_ids, consumer_ids, delay_ids, start_ids: the same for fences.
         events: the rows of events.
         staged: by fence, the rows of events that are not valid yet, in order.
@@ -133,6 +181,7 @@ class Ledger:
     batch_ids: "count[int]" = field(default_factory=lambda: count(1))
     chunk_ids: "count[int]" = field(default_factory=lambda: count(1))
     snapshot_ids: "count[int]" = field(default_factory=lambda: count(1))
+    segment_ids: "count[int]" = field(default_factory=lambda: count(1))
     event_ids: "count[int]" = field(default_factory=lambda: count(1))
     inside_ids: "count[int]" = field(default_factory=lambda: count(1))
     consumer_ids: "count[int]" = field(default_factory=lambda: count(1))

@@ -12,16 +12,31 @@ from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
 from ...state.records import CommitStamp, HullRow, Kept, Record
-from ..past import Moment
+from ..past import Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
+from ..segments.archive import NEEDS, Archive, is_installed
 from . import chunks
 from .divided import newest_rows
 from .encoding import weight
 from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
-from .group import Chunk, DropBatches, DropDead, DropSnapshot, Finish, Group
-from .ledger import DROPPED, KEPT, HullRows, Ledger, StoredSnapshot
+from .filed import Filed
+from .filing import oldest_of_all, outdated, read_due
+from .group import (
+    Chunk,
+    CloseSegment,
+    DropBatches,
+    DropDead,
+    DropDeadSegment,
+    DropSnapshot,
+    Finish,
+    Group,
+    NameFile,
+    RetireSegment,
+    SetHistory,
+)
+from .ledger import DROPPED, HullRows, Ledger, StoredSnapshot
 from .past_rows import batches_after, moment_at, oldest_moment, state_until
 from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
@@ -49,11 +64,14 @@ class RowStorage(ABC):
     keeps = True
     epoch = 0
 
-    def __init__(self) -> None:
+    def __init__(self, archive: Archive | None = None) -> None:
+        self._archive = archive
+        self._filed = None if archive is None else Filed(archive)
         self._ledger = Ledger()
         self._visible = Lock()  # held while the ledger may differ from the committed rows
         self._unsettled = False
         self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
+        self._filing: set[int] = set()  # rows of segments that are being written
 
     @property
     @abstractmethod
@@ -133,21 +151,27 @@ class RowStorage(ABC):
     def oldest_moment(self, number: int, *, timed: bool = False) -> Moment:
         """The oldest revision that can be read."""
         with self._of_hull(number) as (reader, hull):
-            return oldest_moment(reader, hull, timed=timed)
+            found = None if self._filed is None else self._filed.oldest_moment(hull, timed=timed)
+            return found or oldest_moment(reader, hull, timed=timed)
 
     def moment(self, number: int, time: int) -> Moment | None:
         """The last revision committed at or before a time."""
         with self._of_hull(number) as (reader, hull):
-            return moment_at(reader, hull, time)
+            found = moment_at(reader, hull, time)
+            return self._filed.moment(hull, time) if found is None and self._filed is not None else found
 
     def state(self, number: int, until: int) -> Kept:
         """The newest snapshot of a revision not after `until`, without the batches after it."""
         with self._of_hull(number) as (reader, hull):
+            if self._filed is not None and until < hull.oldest:
+                return self._filed.state(hull, until)
             return state_until(reader, hull, until)
 
     def batches(self, number: int, after: int, until: int) -> list[Record]:
         """The batches that follow a revision."""
         with self._of_hull(number) as (reader, hull):
+            if self._filed is not None and after < hull.oldest:
+                return self._filed.batches(hull, after, until)
             return batches_after(reader, hull, after, until)
 
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
@@ -223,8 +247,8 @@ class RowStorage(ABC):
             return next((commit_of(reader, hull, revision) for hull in found), None)
 
     def _trim(self, number: int) -> Iterator[StorageStep]:
-        while (hull := self._ledger.hulls.get(number)) and len(hull.snapshots) > KEPT:
-            yield DropSnapshot(number, hull.snapshots[0])
+        while (hull := self._ledger.hulls.get(number)) and (snapshot := hull.outlived()):
+            yield DropSnapshot(number, snapshot)
         yield from self._drop_dead("chunks")
         while (hull := self._ledger.hulls.get(number)) and (ids := hull.superfluous()):
             rows = self._few("batches", ids, "batches.rowid, first, last, checksum, ")
@@ -232,6 +256,77 @@ class RowStorage(ABC):
                 raise DamagedError(f"{self._place}: a row of batches of hull {number} is missing")
             weights = sum(weight(stored, number, first, last) for _, first, last, stored in rows)
             yield DropBatches(number, ids[: len(rows)], weights)
+
+    # The past
+
+    def history(self, number: int) -> StoredHistory:
+        """What is there of a hull."""
+        first = self.oldest_moment(number)
+        with self._of_hull(number) as (reader, hull):
+            last = Moment(hull.last, commit_of(reader, hull, hull.last) if hull.last else created(hull.row))
+            facts = [segment.facts for segment in hull.segments]
+            size = sum(segment.size for segment in hull.segments)
+            return StoredHistory(
+                first, last, size, sum(each.batches for each in facts), sum(each.moves for each in facts)
+            )
+
+    def why_no_history(self) -> str:
+        """Why it cannot keep what the journal drops."""
+        if self._archive is None:
+            return "has a server without --history-dir, which keeps no history"
+        return "" if is_installed() else f"has a server that keeps no history: that {NEEDS}"
+
+    def set_history(self, number: int, max_age: int, max_bytes: int) -> StorageStep:
+        """The step that changes how much of the past is kept."""
+        return SetHistory(number, max_age, max_bytes)
+
+    def file_history(self, now: int) -> Iterator[StorageStep]:
+        """Write segments of what is due, and remove those that are not to be kept any longer."""
+        archive = self._archive
+        if archive is None:
+            return
+        yield from self._remove_files(archive)
+        for number in self._with_past():
+            while (hull := self._ledger.hulls.get(number)) and hull.due > hull.filed:
+                yield from self._close_segment(number, archive)
+            yield from self._trim(number)
+            for segment in outdated(hull, now, archive) if hull else ():
+                yield RetireSegment(number, segment)
+        if archive.most_bytes:
+            with self._visible:
+                gone = list(oldest_of_all(self._settled().hulls, archive.most_bytes))
+            yield from (RetireSegment(number, segment) for number, segment in gone)
+        yield from self._remove_files(archive)
+
+    def _with_past(self) -> list[int]:
+        """The hulls that have a past, or are to have one."""
+        with self._visible:
+            hulls = self._settled().hulls.values()
+            return [hull.row.number for hull in hulls if hull.segments or hull.row.settings.history]
+
+    def _close_segment(self, number: int, archive: Archive) -> Iterator[StorageStep]:
+        with self._reading(lambda ledger: ledger.hulls[number].copy()) as (reader, hull):
+            due = read_due(reader, hull)
+        place, file = next(self._ledger.segment_ids), archive.name(hull.row.uid, due.first, due.last)
+        self._filing.add(place)
+        try:
+            yield NameFile(place, file)
+            yield CloseSegment(number, due.write(archive, place, file))
+        except BaseException:
+            self._ledger.dead["segments"].append(place)  # if it is nobody's
+            raise
+        finally:
+            self._filing.remove(place)
+
+    def _remove_files(self, archive: Archive) -> Iterator[StorageStep]:
+        """Remove the files that no segment has, and then the rows that name them."""
+        while ids := [each for each in self._ledger.dead["segments"] if each not in self._filing]:
+            with self._reading(lambda ledger: ledger.hulls.copy()) as (reader, hulls):
+                rows = list(reader.some("segments", "hull, file", array("q", ids[:1])))
+            for number, file in rows:
+                if number not in hulls:
+                    archive.remove(file)
+            yield DropDeadSegment(ids[0])
 
     def cut(self, number: int, last: int) -> StorageStep | None:
         """The step that drops the revisions after `last`."""
@@ -242,7 +337,8 @@ class RowStorage(ABC):
         """Drop the rows of deleted hulls and unfinished snapshots."""
         self._look_for_dead_chunks()
         for table in DROPPED:
-            yield from self._drop_dead(table)
+            if table != "segments":  # they go with their files
+                yield from self._drop_dead(table)
         for place in self._sparse():
             step = self._shrunk(place)
             if step is not None:

@@ -8,10 +8,10 @@ from ..port import StorageError
 if TYPE_CHECKING:
     from array import array
 
-# The present format of rows, and the first ones with fences, delayed events, events of many fences in a row, and the
-# commits of batches.
-FORMAT = 11
-FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE, COMMITS_SINCE = 4, 6, 7, 11
+# The present format of rows, and the first ones with fences, delayed events, events of many fences in a row, the
+# commits of batches, and segments of the past.
+FORMAT = 12
+FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE, COMMITS_SINCE, SEGMENTS_SINCE = 4, 6, 7, 11, 12
 
 # The columns of each table in the present format; the first is the number of the row.
 COLUMNS = {
@@ -19,6 +19,7 @@ COLUMNS = {
     "batches": ("rowid", "hull", "first", "last", "checksum", "payload", "commit_number", "committed"),
     "snapshots": ("id", "hull", "revision", "chunks", "state", "checksum"),
     "chunks": ("rowid", "snapshot", "number", "checksum", "points"),
+    "segments": ("id", "hull", "first", "last", "file", "facts", "checksum"),
     "fences": ("id", "name", "uid", "created", "config", "checksum"),
     "events": ("rowid", "fence", "first", "last", "checksum", "payload"),
     "insides": ("rowid", "fence", "sequence", "part", "parts", "checksum", "payload"),

@@ -1,5 +1,6 @@
 """Copying and checking a data folder, also while a server uses it."""
 
+import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -12,12 +13,14 @@ from ..rows import divided
 from ..rows.divided import DatabaseView, NoLongerKeptError, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
+from ..rows.filed_check import adopting, damaged_segments, history_bytes, leaving_out
 from ..rows.group import AnyStep
 from ..rows.incarnation import new_incarnation, renewing
 from ..rows.ledger import Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
+from ..segments.archive import HISTORY, Archive
 from .disk import Disk, OpenMode, make_durable
 from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
@@ -81,12 +84,13 @@ class HullInFolder:
     notes: list[str]
 
 
-def check(path: Path, progress: Progress) -> Report:
+def check(path: Path, progress: Progress, history: Path | None = None) -> Report:
     """Examine all data of a folder without changing anything. A server may be writing to it.
 
     Args:
         path: a data folder or a backup.
         progress: called with the rows examined so far and the total.
+        history: the folder of its past, by default the one in it.
 
     Raises:
         StorageError: the folder has no database, or cannot be read at all.
@@ -97,7 +101,27 @@ def check(path: Path, progress: Progress) -> Report:
         if report.fatal:
             return report
         fences = check_fences(opened.reader, findings.ledger)
-        return replace(report, fences=fences)
+    holes = list(damaged_segments(findings.ledger.hulls.values(), Archive(history or path / HISTORY)))
+    if holes:
+        with _opened(path) as opened:  # what has become too old meanwhile is no hole
+            there = load(opened.connection, opened.version).hulls
+        holes = [
+            each for each in holes if each[0].row.number in there and each[1] in there[each[0].row.number].segments
+        ]
+    return replace(report, fences=fences, notes=[*report.notes, *(text for _, _, text in holes)])
+
+
+def history_size(paths: Sequence[Path]) -> int:
+    """The bytes of the past of the hulls in the folders of a server.
+
+    Raises:
+        StorageError: they cannot be read.
+    """
+    total = 0
+    for path in paths:
+        with _opened(path) as opened:
+            total += history_bytes(load(opened.connection, opened.version))
+    return total
 
 
 def check_together(paths: Sequence[Path]) -> None:
@@ -118,7 +142,13 @@ def copy(source: Path, target: Path, progress: Progress, *, accept_loss: bool = 
 
 
 def copy_all(
-    folders: Sequence[tuple[Path, Path]], progress: Progress, *, accept_loss: bool = False, restores: bool = False
+    folders: Sequence[tuple[Path, Path]],
+    progress: Progress,
+    *,
+    accept_loss: bool = False,
+    restores: bool = False,
+    history: Path | None = None,
+    without_history: bool = False,
 ) -> Iterator[tuple[Path, Report]]:
     """Copy folders of one server, including their logs, each as of one moment. Yields each copy, and a report on it.
 
@@ -136,6 +166,8 @@ def copy_all(
         progress: called with the pages copied so far and the total.
         accept_loss: whether to copy without the damaged or missing part of the log.
         restores: whether the copies are to be served in place of what was lost: their fences begin anew.
+        history: the folder of the past of the sources, by default the one in each.
+        without_history: whether to leave the past out, but for what is in the journal.
 
     Raises:
         StorageError: a source has no database, a target is not empty, or hulls change faster than they are copied.
@@ -148,7 +180,8 @@ def copy_all(
                 opened.connection.backup(
                     connection, pages=PAGES_A_STEP, progress=lambda _, left, pages: progress(pages - left, pages)
                 )
-                report = _finish(connection, opened, together.lasts(place), incarnation, restores=restores)
+                past = None if without_history else (history or source / HISTORY, target / HISTORY)
+                report = _finish(connection, opened, together.lasts(place), incarnation, past, restores=restores)
             yield target, report
 
 
@@ -299,6 +332,7 @@ def _new(source: object, target: Path) -> Iterator[sqlite3.Connection]:
     except BaseException as error:
         for file in target.glob(f"{UNFINISHED}*"):
             file.unlink()
+        shutil.rmtree(target / HISTORY, ignore_errors=True)
         if made:
             target.rmdir()
         if isinstance(error, sqlite3.Error):
@@ -359,11 +393,18 @@ def _opened(
 
 
 def _finish(
-    connection: sqlite3.Connection, opened: _Opened, lasts: Mapping[int, int], incarnation: str, *, restores: bool
+    connection: sqlite3.Connection,
+    opened: _Opened,
+    lasts: Mapping[int, int],
+    incarnation: str,
+    past: tuple[Path, Path] | None,
+    *,
+    restores: bool,
 ) -> Report:
     """Examine copied pages, and turn them into a database of the present format that is marked as not in use.
 
-    `lasts` are the last revisions of the hulls that may have later ones.
+    `lasts` are the last revisions of the hulls that may have later ones, and `past` is from where to where files of
+    segments are copied; None for a copy without them.
     """
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("BEGIN IMMEDIATE")
@@ -374,6 +415,8 @@ def _finish(
     change(connection, ledger, _leading_back(SQLiteReader(connection, opened.version), ledger, lasts))
     if opened.version < FORMAT:
         migrate(connection, opened.version, ledger, findings.starts)
+    retired = leaving_out(ledger) if past is None else adopting(ledger, *past, findings.notes)
+    change(connection, ledger, list(retired))
     if restores:
         begin_anew(connection, ledger, incarnation)
     else:
@@ -395,6 +438,9 @@ def _report(findings: Findings, notes: list[str]) -> Report:
     for hull in hulls:
         rows = "1 row" if len(hull.ids) == 1 else f"{len(hull.ids)} rows"
         summary = f"revision {hull.last}, {rows} of batches"
+        if hull.segments:
+            size = sum(segment.size for segment in hull.segments)
+            summary += f", {size:,} bytes of past from revision {hull.segments[0].first} on"
         if hull.snapshots:
             summary += f", snapshots at {', '.join(str(snapshot.revision) for snapshot in hull.snapshots)}"
         is_shard = hull.row.settings.shard is not None

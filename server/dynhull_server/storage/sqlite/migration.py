@@ -9,6 +9,7 @@ from ..rows.group import AnyStep, Group
 from ..rows.hull_rows import values
 from ..rows.incarnation import anew
 from ..rows.ledger import Ledger
+from ..rows.tables import COMMITS_SINCE
 from ..rows.totals import Totals
 from .readers import SQLiteReader
 from .schema import ADD_COMMITS, FENCE_TABLES, INSERT, SCHEMAS, TABLES, carry_out, renew_totals, stamp
@@ -36,9 +37,9 @@ def migrate(connection: sqlite3.Connection, version: int, ledger: Ledger, starts
             connection.execute(f"DROP INDEX {index}")
     else:
         connection.execute("DROP TABLE totals")
-    for table in ("totals", *(table for table in FENCE_TABLES if table not in SCHEMAS[version])):
+    for table in ("totals", *(table for table in (*FENCE_TABLES, "segments") if table not in SCHEMAS[version])):
         connection.execute(TABLES[table])
-    for sql in ADD_COMMITS:
+    for sql in ADD_COMMITS if version < COMMITS_SINCE else ():
         connection.execute(sql)
     connection.execute("DROP TABLE hulls")
     connection.execute(TABLES["hulls"])

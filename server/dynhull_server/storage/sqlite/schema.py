@@ -32,6 +32,15 @@ TABLES = {
     checksum INTEGER NOT NULL,
     points BLOB NOT NULL
 )""",
+    "segments": """CREATE TABLE segments (
+    id INTEGER PRIMARY KEY,
+    hull INTEGER NOT NULL,
+    first INTEGER NOT NULL,
+    last INTEGER NOT NULL,
+    file TEXT NOT NULL,
+    facts TEXT NOT NULL,
+    checksum INTEGER NOT NULL
+)""",
     "hulls": """CREATE TABLE hulls (
     id INTEGER PRIMARY KEY,
     name TEXT NOT NULL,
@@ -101,8 +110,10 @@ ADD_COMMITS = (
     "ALTER TABLE batches ADD COLUMN committed INTEGER",
 )
 
+# Up to format 11 what the journal dropped was gone.
+FORMAT_11 = {table: sql for table, sql in TABLES.items() if table != "segments"}
 # Up to format 10 it was not stored when batches were committed.
-FORMAT_10 = TABLES | {
+FORMAT_10 = FORMAT_11 | {
     "batches": """CREATE TABLE batches (
     hull INTEGER NOT NULL,
     first INTEGER NOT NULL,
@@ -157,6 +168,7 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     8: FORMAT_10,  # it had no hulls over shards
     9: FORMAT_10,  # the number of their shards did not change
     10: FORMAT_10,
+    11: FORMAT_11,
     FORMAT: TABLES,
 }
 

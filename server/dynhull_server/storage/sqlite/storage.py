@@ -28,6 +28,7 @@ from ..rows.ledger import Ledger
 from ..rows.storage import RowStorage
 from ..rows.tables import FORMAT
 from ..rows.totals import MODES, STOPPED, Totals, totals_from
+from ..segments.archive import Archive
 from .disk import LOCK_SECONDS, Disk, OpenMode
 from .examination import examine, format_of, load
 from .folder import Folder
@@ -70,6 +71,7 @@ class SQLiteStorage(RowStorage):
         durability: the durability of a commit.
         disk: the disk it is on.
         incarnation: makes it another incarnation, whether it is a copy or not; None only if it is one.
+        archive: has what the journal drops of hulls with a history; None for a server that reads and writes none of it.
     """
 
     def __init__(
@@ -78,8 +80,9 @@ class SQLiteStorage(RowStorage):
         durability: Durability = Durability.SYNC,
         disk: Disk | None = None,
         incarnation: str | None = None,
+        archive: Archive | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(archive)
         self._folder = Folder(path, disk or Disk())
         self._durability = durability
         self._incarnation = incarnation

@@ -1,0 +1,95 @@
+"""`dynhull history`: what there is of the past of a hull, and how much of it is kept."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .connected import AsJson, HullName, connected
+from .durations import duration, shown
+from .groups import beside
+from .json_lines import json_line
+from .plural import plural
+
+if TYPE_CHECKING:
+    from datetime import timedelta
+
+    from dynhull_client import History, HullClient
+
+FOREVER, NOTHING = "forever", "none"
+KEPT = "How long to keep the past: a time span such as 30d, or forever."
+
+HistoryBytes = Annotated[
+    int | None,
+    typer.Option("--history-bytes", help="Bytes in which the past is kept at most; the oldest goes first.", min=1),
+]
+
+
+@connected
+def set_history(
+    client: "HullClient",
+    name: HullName,
+    history: Annotated[str, typer.Argument(metavar="HISTORY", help=f"{KEPT} Or none.")],
+    history_bytes: HistoryBytes = None,
+    as_json: AsJson = False,
+) -> None:
+    """Change how much of its past a hull keeps. What is to be kept no longer is gone within a minute.
+
+    dynhull history set fleet 30d
+    """
+    kept = given_history(history, "HISTORY")
+    if kept is None and history_bytes is not None:
+        raise ValueError("--history-bytes is given with a time span, or with forever")
+    client.set_history(name, kept, history_bytes)
+    _report(client, name, as_json)
+
+
+@beside({"set": set_history})
+@connected
+def history(client: "HullClient", name: HullName, as_json: AsJson = False) -> None:
+    """Show from when on the past of a hull can be read, and how many bytes it takes.
+
+        dynhull create fleet --keyed str --history 30d
+        dynhull history fleet --json | jq .bytes
+
+    What the journal of the server drops becomes segments: files in Parquet, which other programs read, too. `dynhull
+    history set` changes how much is kept.
+    """
+    _report(client, name, as_json)
+
+
+def given_history(text: str | None, option: str) -> "timedelta | bool | None":
+    """How long the past is kept, as the SDK takes it. ValueError names the option."""
+    if text == FOREVER:
+        return True
+    return None if text == NOTHING else duration(text, option)
+
+
+def _report(client: "HullClient", name: str, as_json: bool) -> None:
+    found = client.history(name)
+    if as_json:
+        age = found.history
+        typer.echo(
+            json_line(
+                name=name,
+                first_revision=found.first_revision,
+                first_time=None if found.first_time is None else found.first_time.isoformat(),
+                last_revision=found.last_revision,
+                last_time=None if found.last_time is None else found.last_time.isoformat(),
+                bytes=found.bytes,
+                batches=found.batches,
+                moves=found.moves,
+                history=age if age is None or isinstance(age, bool) else age.total_seconds(),
+                history_bytes=found.history_bytes,
+            )
+        )
+        return
+    since = "" if found.first_time is None else f" of {found.first_time.isoformat(timespec='seconds')}"
+    in_segments = f"{plural(found.moves, 'move')} in {plural(found.bytes, 'byte')} of segments"
+    typer.echo(f"{name}: from revision {found.first_revision}{since} on, {in_segments}, {_kept(found)}")
+
+
+def _kept(found: "History") -> str:
+    if found.history is None:
+        return "no past is kept"
+    age = "for ever" if isinstance(found.history, bool) else f"for {shown(found.history)}"
+    return f"kept {age}" + ("" if found.history_bytes is None else f", {plural(found.history_bytes, 'byte')} at most")

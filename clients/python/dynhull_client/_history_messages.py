@@ -1,0 +1,96 @@
+"""The past of a hull, and its messages."""
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+from dynhull_proto.v1 import hull_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_surface.spans import FORMS, span_of
+
+from ._times import decode_time
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """What is there of the past of a hull.
+
+    Attributes:
+        first_revision: the oldest revision that can be read.
+        first_time: the time of its commit; None where an early version of the server did not store it.
+        last_revision: the newest revision.
+        last_time: the time of its commit; None as before.
+        bytes: the size of the files of its segments. What is newer than these is in the journal of the server.
+        batches: the number of batches in them.
+        moves: the number of points and keys that these batches write.
+        history: for how long the past is kept; True for ever, None for not at all.
+        history_bytes: in how many bytes it is kept at most; None for any number.
+    """
+
+    first_revision: int
+    first_time: datetime | None
+    last_revision: int
+    last_time: datetime | None
+    bytes: int
+    batches: int
+    moves: int
+    history: timedelta | bool | None = None
+    history_bytes: int | None = None
+
+
+def encode_history(history: Any, history_bytes: int | None) -> hull_pb2.History | None:
+    """How much is kept in the form of a message; None for nothing.
+
+    Raises:
+        ValueError, TypeError: it is no time span, or no number of bytes.
+    """
+    if history is None or history is False:
+        if history_bytes is not None:
+            raise ValueError("history_bytes is given with history")
+        return None
+    if history_bytes is not None and (isinstance(history_bytes, bool) or not isinstance(history_bytes, int)):
+        raise TypeError(f"history_bytes is {history_bytes!r}, not a whole number")
+    if history_bytes is not None and not 1 <= history_bytes < 2**63:
+        raise ValueError(f"history_bytes is {history_bytes}, but must be from 1 to 2**63 - 1")
+    message = hull_pb2.History(max_bytes=history_bytes or 0)
+    if history is not True:
+        message.max_age.FromTimedelta(_span(history))
+    return message
+
+
+def _span(history: Any) -> timedelta:
+    if isinstance(history, str):
+        span = span_of(history)
+        if span is None:
+            raise ValueError(f"history {history!r} is not a time span: {FORMS}")
+    else:
+        try:
+            span = history if isinstance(history, timedelta) else timedelta(seconds=history)
+        except OverflowError:
+            raise ValueError(f"history is {history!r} seconds, which is too long: True is for ever") from None
+        except ValueError:
+            raise ValueError(f"history is {history!r}, not a time span") from None
+        except TypeError:
+            raise TypeError(f"history is {history!r}, not True, a timedelta, seconds or text such as '30d'") from None
+    if span <= timedelta():
+        raise ValueError(f"history is {history!r}, but must be more than 0")
+    return span
+
+
+def decode_history(response: pb.GetHistoryResponse) -> History:
+    """What there is as received."""
+    kept = response.history
+    age: timedelta | bool | None = None
+    if response.HasField("history"):
+        age = kept.max_age.ToTimedelta() if kept.HasField("max_age") else True
+    return History(
+        response.first_revision,
+        decode_time(response.first_time) if response.HasField("first_time") else None,
+        response.last_revision,
+        decode_time(response.last_time) if response.HasField("last_time") else None,
+        response.bytes,
+        response.batches,
+        response.moves,
+        age,
+        kept.max_bytes or None,
+    )

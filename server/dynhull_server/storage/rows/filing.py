@@ -1,0 +1,149 @@
+"""Filing: batches that the journal need not keep become segments; and which segments are to go."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from ...state.records import FOREVER, HullRow, Kept, Record
+from ..port import DamagedError
+from ..segments.archive import BATCHES, STATE, Archive
+from ..segments.columns import SegmentColumns, columns_of, columns_of_state
+from ..segments.parquet import to_parquet
+from .chunks import state
+from .ledger import HullRows
+from .reading import batch_rows, newest_snapshot, whole_records
+from .segment_rows import SegmentFacts, StoredSegment
+from .tables import Reader
+
+# Points and keys after which a segment ends, even if what is due does not.
+MOST_ROWS = 2**19
+
+
+@dataclass(frozen=True, slots=True)
+class Due:
+    """What a segment is made of.
+
+    Attributes:
+        row: the hull.
+        records: its batches, at least one.
+        before: the state before them, if it is to lie beside them.
+    """
+
+    row: HullRow
+    records: list[Record]
+    before: Kept | None
+
+    @property
+    def first(self) -> int:
+        """The first revision."""
+        return self.records[0].revision
+
+    @property
+    def last(self) -> int:
+        """The last revision."""
+        return self.records[-1].revision
+
+    def write(self, archive: Archive, place: int, file: str) -> StoredSegment:
+        """Write the files.
+
+        Raises:
+            OSError: the disk is full, or fails.
+        """
+        columns = columns_of(self.records, self.row.settings.identity)
+        state, commit = (0, ""), None
+        if self.before is not None:
+            state, commit = archive.write(file + STATE, state_file(self.row, self.before)), self.before.committed
+        wrote = archive.write(file + BATCHES, to_parquet(columns, _about(self.row, columns)))
+        ends = [each.committed.time for each in (self.records[0], self.records[-1]) if each.committed is not None]
+        times = ends if len(ends) == 2 else (0, 0)
+        facts = SegmentFacts(*wrote, *state, commit, len(self.records), columns.moves, *times)
+        return StoredSegment(place, self.first, self.last, file, facts)
+
+
+def read_due(reader: Reader, hull: HullRows) -> Due:
+    """What the next segment of a hull is made of. Something is due.
+
+    Raises:
+        DamagedError: a row of the journal is damaged.
+    """
+    after = hull.filed
+    records = _some(reader, hull, after, hull.due)
+    if not records or records[0].revision != after + 1:
+        raise DamagedError(f"hull {hull.row.name!r}: revision {after + 1} is missing: restore a backup")
+    kept = None
+    if any(each.revision == after for each in hull.snapshots):
+        kept = newest_snapshot(reader, hull, after)
+    return Due(hull.row, records, kept if kept is not None and kept.revision == after else None)
+
+
+def state_file(row: HullRow, kept: Kept) -> bytes:
+    """The state of a hull as a file."""
+    columns = columns_of_state(kept.contents, kept.revision, kept.committed, row.settings.identity)
+    about = _about(row, columns) | {
+        "times": str(kept.contents.times is not None),
+        "deadlines": str(kept.contents.deadlines is not None),
+    }
+    return to_parquet(columns, about, state(replace(kept, records=[])))
+
+
+def _some(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:
+    found: list[Record] = []
+    rows = 0
+    for record in whole_records(hull, batch_rows(reader, hull.between(after, until))):
+        if after < record.revision <= until and rows < MOST_ROWS:
+            found.append(record)
+            rows += len(record.rows)
+        elif record.revision > after:
+            break
+    return found
+
+
+def _about(row: HullRow, columns: SegmentColumns) -> dict[str, str]:
+    return {
+        "hull": row.name,
+        "uid": row.uid,
+        "frame": row.settings.frame,
+        "first": str(columns.revision[0]) if len(columns) else "",
+        "last": str(columns.revision[-1]) if len(columns) else "",
+    }
+
+
+def outdated(hull: HullRows, now: int, archive: Archive) -> list[StoredSegment]:
+    """The segments of a hull that are kept for too long, or are too many bytes.
+
+    Those that are kept begin with a state, so what follows one goes with it.
+    """
+    settings = hull.row.settings
+    if not settings.history:
+        return hull.segments[:]
+    age = min(settings.history, archive.most_age or FOREVER)
+    oldest = 0 if age == FOREVER else now - age
+    room = settings.history_bytes or FOREVER
+    for place in range(len(hull.segments) - 1, -1, -1):
+        segment = hull.segments[place]
+        room -= segment.size
+        if room < 0 or segment.facts.last_time < oldest:
+            return hull.segments[: run_from_start(hull, place + 1)]
+    return []
+
+
+def oldest_of_all(hulls: Mapping[int, HullRows], most_bytes: int) -> Iterator[tuple[int, StoredSegment]]:
+    """The oldest segments of all hulls, so many that the others have at most so many bytes."""
+    excess = sum(segment.size for hull in hulls.values() for segment in hull.segments) - most_bytes
+    left = {number: hull.copy() for number, hull in hulls.items() if hull.segments} if excess > 0 else {}
+    while excess > 0 and left:
+        number = min(left, key=lambda each: left[each].segments[0].facts.last_time)
+        hull = left[number]
+        for segment in hull.segments[: run_from_start(hull, 1)]:
+            yield number, segment
+            excess -= segment.size
+            hull.segments.remove(segment)
+        if not hull.segments:
+            del left[number]
+
+
+def run_from_start(hull: HullRows, count: int) -> int:
+    """The number of segments, at least so many, after which the others begin with a state, or there are none."""
+    if not count:
+        return 0
+    rest = range(count, len(hull.segments))
+    return next((place for place in rest if hull.segments[place].begins), len(hull.segments))

@@ -1,0 +1,142 @@
+"""The folder of the past: two files for each segment, written once, and read with the hash of all their bytes."""
+
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from hashlib import blake2b
+from importlib.util import find_spec
+from pathlib import Path
+from secrets import token_hex
+from typing import NamedTuple
+
+from ..port import DamagedError, StorageError
+
+BATCHES, STATE = ".batches.parquet", ".state.parquet"
+TEMPORARY = ".part"
+HISTORY = "history"  # the folder within a data folder, unless another one is named
+DIGEST_BYTES = 16
+NEEDS = "needs pyarrow: pip install 'dynhull[history]'"
+
+
+class Written(NamedTuple):
+    """What a file was written with: its size, and the hash of its bytes."""
+
+    bytes: int
+    digest: str
+
+
+def is_installed() -> bool:
+    """Whether segments can be written and read here."""
+    return find_spec("pyarrow") is not None
+
+
+class Archive:
+    """A folder with the files of segments. Each name is used once, and its file never changed.
+
+    Args:
+        path: the folder; it is made with its first file.
+        most_bytes: how many bytes of the past of all hulls are kept at most; 0 for any number.
+        most_age: for how many microseconds at most any of it is kept; 0 for any time.
+
+    Attributes:
+        path, most_bytes, most_age: the same.
+    """
+
+    def __init__(self, path: Path, most_bytes: int = 0, most_age: int = 0) -> None:
+        self.path = path
+        self.most_bytes = most_bytes
+        self.most_age = most_age
+
+    def name(self, uid: str, first: int, last: int) -> str:
+        """A name for the files of a segment that no other one has."""
+        return f"{uid.partition('.')[0]}/{first:019}-{last:019}-{token_hex(4)}"
+
+    def write(self, file: str, content: bytes) -> Written:
+        """Write a file so that it is whole and on the disk under its name, or not there.
+
+        Raises:
+            OSError: the disk is full, or fails.
+        """
+        path = self.path / file
+        for folder in (self.path, path.parent):
+            if not folder.is_dir():
+                folder.mkdir(parents=True, exist_ok=True)
+                _sync(folder.parent)
+        part = path.with_name(path.name + TEMPORARY)
+        with part.open("wb") as opened:
+            opened.write(content)
+            opened.flush()
+            os.fsync(opened.fileno())
+        part.rename(path)
+        _sync(path.parent)
+        return Written(len(content), _digest(content))
+
+    def read(self, file: str, size: int, digest: str) -> bytes:
+        """All bytes of a file.
+
+        Raises:
+            DamagedError: they are not those that were written.
+            StorageError: the file cannot be read at present.
+        """
+        path = self.path / file
+        try:
+            content = path.read_bytes()
+        except FileNotFoundError:
+            raise DamagedError(f"{path} is missing: restore a backup") from None
+        except OSError as error:
+            raise StorageError(f"{path} cannot be read: {error}") from error
+        if len(content) != size or _digest(content) != digest:
+            raise DamagedError(f"{path} is not as it was written: it was cut, changed or exchanged: restore a backup")
+        return content
+
+    def remove(self, file: str) -> None:
+        """Remove the files of a segment; those that are not there are passed over.
+
+        Raises:
+            OSError: one cannot be removed.
+        """
+        path = self.path / file
+        for end in (BATCHES, STATE):
+            for name in (path.name + end, path.name + end + TEMPORARY):
+                path.with_name(name).unlink(missing_ok=True)
+        with suppress(OSError):  # others are in it, or it is gone
+            path.parent.rmdir()
+
+    def adopt(self, other: "Archive", file: str) -> None:
+        """Have the files of a segment of another archive, as links where that is possible.
+
+        Raises:
+            OSError: they are not there, or cannot be copied.
+        """
+        for each in other.files(file):
+            target = self.path / each
+            target.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                os.link(other.path / each, target)
+            except FileNotFoundError:
+                raise
+            except OSError:  # another file system, or one without links
+                self.write(each, (other.path / each).read_bytes())
+
+    def files(self, file: str) -> Iterator[str]:
+        """The names of the files of a segment that are there."""
+        yield file + BATCHES
+        if (self.path / (file + STATE)).exists():
+            yield file + STATE
+
+    def sync(self) -> None:
+        """Make the names of all files durable."""
+        for folder in [self.path.parent, self.path, *(each for each in self.path.iterdir() if each.is_dir())]:
+            _sync(folder)
+
+
+def _digest(content: bytes) -> str:
+    return blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
+
+
+def _sync(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,243 @@
+"""SegmentColumns as Parquet, and back: bit for bit the same.
+
+Positions are whole numbers with a scale, in the metadata of their column, where every one of them is a decimal number
+of few places: these take a third of the bytes. Otherwise they are doubles. Rows lie by key, then revision, so that the
+way of one key is one read, and so that numbers differ little from those before them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dynhull.keys import PackedKeys
+
+from ...state.records import FOREVER, NO_TIME, Identity
+from ..port import DamagedError
+from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import pyarrow as pa
+
+    from dynhull.keys import Keys
+
+VERSION = 1
+FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
+MOST_PLACES = 12
+EXACT = 2**53  # below that every whole number is a double
+SAMPLE = 1000
+LEVEL = 9
+GROUP_ROWS = 2**17
+WORDS = ("cause", "kind", "op", "key")
+# Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
+SPLIT = ("revision", "commit", "row", "x", "y")
+SHARED = 4  # rows of a batch, on average, from which on the times of commits are among the others
+
+
+def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"") -> bytes:
+    """SegmentColumns as a file.
+
+    Args:
+        columns: the rows.
+        about: what the file says of itself.
+        state: of a state, what is not in its rows.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns_of_table = {
+        "revision": pa.array(columns.revision),
+        "commit": _optional(columns.commit, NO_TIME),
+        "committed": _time(columns.committed, NO_TIME),
+        "cause": _words(columns.cause, CAUSES),
+        "kind": _words(columns.kind, KINDS),
+        "op": _words(columns.op, OPS),
+        "key": _key_column(columns),
+        "event_time": _time(columns.event_time, NO_TIME),
+        "expire_time": _time(columns.expire_time, FOREVER),
+        "detail": pa.array(columns.detail, pa.string()),
+        "clock": _time(columns.clock, NO_TIME),
+        "row": pa.array(columns.place.astype(np.int32)),
+    }
+    fields = [pa.field(name, column.type) for name, column in columns_of_table.items()]
+    there = ~np.isnan(columns.points[:, 0])
+    alone = len(np.unique(columns.revision)) * SHARED > len(columns)
+    for place, name in enumerate("xy"):
+        values, scale = _scaled(np.ascontiguousarray(columns.points[:, place]), there)
+        metadata = None if scale is None else {SCALE: str(scale).encode()}
+        columns_of_table[name] = values
+        fields.insert(7 + place, pa.field(name, values.type, metadata=metadata))
+    told = {f"dynhull.{name}": value for name, value in about.items()}
+    head = {FORMAT: str(VERSION).encode(), b"dynhull.identity": columns.identity.encode()} | told
+    schema = pa.schema(fields, {**head, STATE: state} if state else head)
+    table = pa.table([columns_of_table[field.name] for field in fields], schema=schema)
+    table = table.sort_by([("key", "ascending"), ("revision", "ascending"), ("row", "ascending")])
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table,
+        sink,
+        compression="zstd",
+        compression_level=LEVEL,
+        use_dictionary=list(WORDS),
+        column_encoding=dict.fromkeys((*SPLIT, *(["committed"] if alone else [])), "BYTE_STREAM_SPLIT"),
+        row_group_size=GROUP_ROWS,
+        write_page_checksum=True,
+        write_page_index=True,
+    )
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str], bytes]:
+    """The inverse of `to_parquet`.
+
+    Raises:
+        DamagedError: it is no file of ours, or of a newer version.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(pa.BufferReader(data), memory_map=False, page_checksum_verification=True)
+        found = table.schema.metadata or {}
+        if FORMAT not in found:
+            raise DamagedError(f"{name} is a Parquet file of another program")
+        if int(found[FORMAT]) > VERSION:
+            raise DamagedError(f"{name} has format {int(found[FORMAT])}, this version reads {VERSION}")
+        table = table.sort_by([("revision", "ascending"), ("row", "ascending")]).combine_chunks()
+        return _columns(table, found), _about(found), found.get(STATE, b"")
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def _about(found: dict[bytes, bytes]) -> dict[str, str]:
+    return {
+        key.decode().removeprefix("dynhull."): value.decode()
+        for key, value in found.items()
+        if key.startswith(b"dynhull.") and key != STATE
+    }
+
+
+def _columns(table: pa.Table, found: dict[bytes, bytes]) -> SegmentColumns:
+    identity: Any = found[b"dynhull.identity"].decode()
+    points = np.column_stack([_coordinates(table, name) for name in "xy"])
+    keyed, keys = _keys(table.column("key"), identity)
+    return SegmentColumns(
+        identity,
+        _integers(table, "revision", NO_TIME),
+        _integers(table, "commit", NO_TIME),
+        _integers(table, "committed", NO_TIME),
+        _codes(table, "cause", CAUSES),
+        _integers(table, "clock", NO_TIME),
+        _integers(table, "row", NO_TIME),
+        _codes(table, "kind", KINDS),
+        _codes(table, "op", OPS),
+        keyed,
+        keys,
+        points,
+        _integers(table, "event_time", NO_TIME),
+        _integers(table, "expire_time", FOREVER),
+        table.column("detail").to_pylist(),
+    )
+
+
+def _optional(values: Integers, none: int) -> pa.Array:
+    import pyarrow as pa
+
+    return pa.array(values, mask=values == none)
+
+
+def _time(values: Integers, none: int) -> pa.Array:
+    import pyarrow as pa
+
+    return pa.array(values, pa.timestamp("us", "UTC"), mask=values == none)
+
+
+def _words(codes: Codes, words: tuple[str, ...]) -> pa.Array:
+    import pyarrow as pa
+
+    return pa.DictionaryArray.from_arrays(pa.array(codes, mask=codes == NONE), pa.array(words)).cast(pa.string())
+
+
+def _codes(table: pa.Table, name: str, words: tuple[str, ...]) -> Codes:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    column = table.column(name)
+    codes = pc.index_in(column, value_set=pa.array(words))
+    if codes.null_count != column.null_count:
+        raise ValueError(f"column {name} has an unknown word")
+    found: Codes = codes.fill_null(NONE).to_numpy().astype(np.int8)
+    return found
+
+
+def _integers(table: pa.Table, name: str, none: int) -> Integers:
+    import pyarrow as pa
+
+    found: Integers = table.column(name).cast(pa.int64()).fill_null(none).to_numpy().astype(np.int64)
+    return found
+
+
+def _key_column(columns: SegmentColumns) -> pa.Array:
+    import pyarrow as pa
+
+    keys, keyed = columns.keys, columns.keyed
+    if isinstance(keys, PackedKeys):
+        lengths = np.zeros(len(columns), np.int64)
+        lengths[keyed] = np.frombuffer(keys.lengths, np.uint8)
+        offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
+        bits = pa.py_buffer(np.packbits(keyed, bitorder="little"))
+        buffers = [bits, pa.py_buffer(offsets), pa.py_buffer(keys.data)]
+        return pa.Array.from_buffers(pa.string(), len(columns), buffers)
+    integers = np.zeros(len(columns), np.uint64)
+    integers[keyed] = keys
+    return pa.array(integers, mask=~keyed)
+
+
+def _keys(column: pa.ChunkedArray, identity: Identity) -> tuple[npt.NDArray[np.bool_], Keys]:
+    import pyarrow as pa
+
+    keyed = column.is_valid().to_numpy().astype(np.bool_)
+    there = column.drop_null().combine_chunks()
+    if identity == "int":
+        return keyed, there.cast(pa.uint64()).to_numpy()
+    _, offsets, data = there.cast(pa.string()).buffers()
+    ends = np.frombuffer(offsets, np.int32, len(there) + 1, 4 * there.offset) if offsets else np.zeros(1, np.int32)
+    lengths = np.diff(ends).astype(np.uint8)
+    return keyed, PackedKeys(lengths, b"" if data is None else data.to_pybytes()[ends[0] : ends[-1]])
+
+
+def _scaled(values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_]) -> tuple[pa.Array, int | None]:
+    """Coordinates as whole numbers, and what to divide them by; as doubles, and None, if some would differ."""
+    import pyarrow as pa
+
+    some = values[there]
+    for scale in (10**places for places in range(MOST_PLACES + 1)):
+        if _as_whole(some[:SAMPLE], scale) is not None and (whole := _as_whole(some, scale)) is not None:
+            column = np.zeros(len(values), np.int64)
+            column[there] = whole
+            return pa.array(column, mask=~there), scale
+    return pa.array(values, mask=~there), None
+
+
+def _as_whole(values: npt.NDArray[np.float64], scale: int) -> Integers | None:
+    """Numbers times a scale, if dividing these gives the same numbers bit for bit; otherwise None."""
+    with np.errstate(over="ignore"):
+        whole = np.rint(values * scale)
+    if not bool((np.abs(whole) < EXACT).all()):
+        return None
+    back = whole.astype(np.int64) / scale
+    return whole.astype(np.int64) if np.array_equal(back.view(np.int64), values.view(np.int64)) else None
+
+
+def _coordinates(table: pa.Table, name: str) -> npt.NDArray[np.float64]:
+    import pyarrow as pa
+
+    column = table.column(name)
+    scale = (table.schema.field(name).metadata or {}).get(SCALE)
+    if scale is None:
+        found: npt.NDArray[np.float64] = column.cast(pa.float64()).fill_null(np.nan).to_numpy().astype(np.float64)
+        return found
+    whole = column.cast(pa.int64()).fill_null(0).to_numpy() / int(scale)
+    return np.where(column.is_valid().to_numpy().astype(np.bool_), whole, np.nan)

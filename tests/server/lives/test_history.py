@@ -1,0 +1,127 @@
+"""The past of hulls that keep theirs, as clients of real processes see it: how much is there, and that it survives."""
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from cases import with_all_cases
+from command_line import dynhull
+from patience import PATIENCE, wait_until
+from server_process import server_process, shape_options
+
+from dynhull_client import HullClient, HullUnsuitableError, InvalidRequestError
+from dynhull_server.state.records import KeyRows
+from dynhull_server.storage.segments.archive import Archive
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+KEYS = [f"vehicle {i}" for i in range(40)]
+BATCHES = 12  # between two looks
+KILLS = 40
+SNAPSHOTS = ("--snapshot-points", "200")
+
+
+def positions(revision):
+    return np.round(np.random.default_rng(revision).random((len(KEYS), 2)), 7)
+
+
+def write_until_filed(client, name, batches):
+    """Write until segments have so many batches; returns the last revision."""
+    revision = client.get_hull(name).info.revision
+
+    def filed():
+        nonlocal revision
+        for _ in range(BATCHES):
+            revision += 1
+            assert client.put(name, KEYS, positions(revision)).revision == revision
+        return client.history(name).batches >= batches
+
+    wait_until(filed)
+    return revision
+
+
+def test_how_much_is_kept_is_told_changed_and_lost_with_the_hull(tmp_path):
+    with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
+        begun = datetime.now(UTC)
+        client.create_hull("fleet", keyed="str", history="30d")
+        assert client.history("fleet").history == timedelta(days=30)
+        revision = write_until_filed(client, "fleet", 1)
+        found = client.history("fleet")
+        assert (found.first_revision, found.last_revision) == (0, revision)
+        assert begun - timedelta(seconds=1) < found.first_time < found.last_time < datetime.now(UTC)
+        assert found.moves == found.batches * len(KEYS)
+        kept = {each.name: each.stat().st_size for each in tmp_path.rglob("*.parquet")}
+        assert sum(kept.values()) >= found.bytes > 0
+        said = dynhull("history", "fleet", "--address", server.address).output
+        assert said.startswith("fleet: from revision 0 of 20")
+        assert said.endswith("of segments, kept for 30d\n")
+
+        client.set_history("fleet", True, found.bytes // 2)
+        assert (client.history("fleet").history, client.history("fleet").history_bytes) == (True, found.bytes // 2)
+        wait_until(lambda: client.history("fleet").bytes <= found.bytes // 2)
+        assert client.history("fleet").first_revision > 0
+        assert dynhull("history", "set", "fleet", "none", "--address", server.address).exit_code == 0
+        wait_until(lambda: client.history("fleet").bytes == 0)
+        assert client.history("fleet").history is None
+        wait_until(lambda: not list(tmp_path.rglob("*.parquet")))
+
+
+@with_all_cases
+def test_the_past_is_whole_after_kills(tmp_path):
+    """Every acknowledged batch is in a segment or in the journal, in its place, whatever is being written."""
+    revision = 0
+    for life in range(KILLS + 1):
+        with server_process("--data", str(tmp_path), *SNAPSHOTS, killed=life < KILLS) as server:
+            with HullClient(server.address) as client:
+                if not life:
+                    client.create_hull("fleet", keyed="str", history=True)
+                assert client.history("fleet").first_revision == 0
+                before = client.history("fleet").batches
+                revision = write_until_filed(client, "fleet", before + 1 + life % 3 * BATCHES)
+            if life < KILLS:
+                server.process.kill()
+                server.process.wait(PATIENCE)
+    data = tmp_path if not shape_options() else next(tmp_path.rglob("history")).parent
+    storage = SQLiteStorage(data, archive=Archive(data / "history"))
+    notes = storage.open(lambda *_: None).notes
+    (number,) = [hull.row.number for hull in storage._ledger.hulls.values() if hull.row.name == "fleet"]
+    found = []
+    while len(found) < revision:
+        found += storage.batches(number, len(found), revision)
+    storage.close()
+    assert notes == []
+    assert [each.revision for each in found] == list(range(1, revision + 1))
+    times = [each.committed for each in found]
+    assert times == sorted(times)
+    for each in found:
+        assert isinstance(each.rows, KeyRows)
+        assert list(each.rows.keys) == KEYS
+        np.testing.assert_array_equal(each.rows.points, positions(each.revision))
+
+
+def test_what_cannot_be_is_refused(client, name, tmp_path):
+    for history, problem in (
+        ("30 years", "not a time span"),
+        (0, "more than 0"),
+        (-5, "more than 0"),
+        ([], "not True"),
+    ):
+        with pytest.raises((ValueError, TypeError), match=problem):
+            client.create_hull(name, history=history)
+    for size in (0, 1.5, True, 2**63):
+        with pytest.raises((ValueError, TypeError), match="history_bytes"):
+            client.create_hull(name, history=True, history_bytes=size)
+    with pytest.raises(ValueError, match="history_bytes is given with history"):
+        client.create_hull(name, history_bytes=5)
+    with pytest.raises(InvalidRequestError, match="at most"):
+        client.create_hull(name, history=timedelta.max)
+    with server_process("--in-memory") as server, HullClient(server.address) as other:
+        with pytest.raises(HullUnsuitableError, match="in memory, which keeps no history"):
+            other.create_hull("fleet", history=True)
+        other.create_hull("fleet")
+        with pytest.raises(HullUnsuitableError, match="in memory"):
+            other.set_history("fleet", "1h")
+        other.set_history("fleet", None)
+        assert other.history("fleet").bytes == 0
+    refused = dynhull("serve", "--in-memory", "--history-dir", str(tmp_path))
+    assert refused.exit_code
+    assert "--history-dir keeps what --in-memory does not store" in refused.stderr

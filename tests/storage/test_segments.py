@@ -1,0 +1,418 @@
+"""What the journal drops of hulls with a history becomes segments: whole, once, checked, and no longer than wanted."""
+
+import errno
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from folders import no_progress, same
+
+from dynhull.keys import PackedKeys
+from dynhull_cluster.postgres.database import Database
+from dynhull_cluster.postgres.storage import PostgresStorage
+from dynhull_server.state.contents import replayed
+from dynhull_server.state.records import (
+    FOREVER,
+    NO_TIME,
+    Append,
+    CommitStamp,
+    Contents,
+    Create,
+    Delete,
+    Expiry,
+    HeldChange,
+    HeldRows,
+    HullRow,
+    HullSettings,
+    Kept,
+    KeyRows,
+    PointRows,
+    QuarantineRules,
+    Record,
+)
+from dynhull_server.storage.port import NEWEST, DamagedError
+from dynhull_server.storage.rows.filed import Filed
+from dynhull_server.storage.segments.archive import BATCHES, Archive
+from dynhull_server.storage.segments.columns import columns_of, records_of
+from dynhull_server.storage.segments.parquet import from_parquet, to_parquet
+from dynhull_server.storage.sqlite import copies
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+SECOND = 1_000_000
+BEGIN = 2_000 * SECOND
+SETTINGS = HullSettings("str", history=FOREVER)
+KEYS = [f"vehicle {i}" for i in range(7)]
+FLIPS = 200
+
+
+class Fleet:
+    """A hull with a history, and what its batches were."""
+
+    def __init__(self, folder, settings=SETTINGS, archive=None, make=None):
+        self.folder, self.settings = folder, settings
+        self.archive = archive or Archive(folder / "history")
+        self.make = make or (lambda: SQLiteStorage(folder / "data", archive=self.archive))
+        self.records, self.time = [], BEGIN
+        self.storage = self.make()
+        self.storage.open(no_progress)
+        self.storage.commit([Create(HullRow(1, "fleet", "0123", 12.5, settings))], BEGIN)
+
+    def put(self, commits):
+        """Commits of two batches each, a second apart."""
+        for _ in range(commits):
+            self.time += SECOND
+            first = len(self.records) + 1
+            batches = [move(revision) for revision in (first, first + 1)]
+            stamp = self.storage.commit([Append(1, batches)], self.time)
+            self.records += [replace(each, committed=stamp) for each in batches]
+
+    def snapshot(self):
+        """A snapshot of the last revision but one, in the middle of a row of the journal."""
+        revision = len(self.records) - 1
+        contents = replayed(Kept(records=self.records[:revision]), self.settings).stored()
+        self.carry_out(self.storage.snapshot(1, Kept(revision, contents)))
+
+    def file(self):
+        self.carry_out(self.storage.file_history(self.time))
+
+    def carry_out(self, steps):
+        for step in steps:
+            self.storage.commit([step], self.time)
+
+    def fill(self, times=5):
+        for _ in range(times):
+            self.put(4)
+            self.snapshot()
+            self.file()
+        return self
+
+    @property
+    def files(self):
+        return sorted(str(each.relative_to(self.archive.path)) for each in self.archive.path.rglob("*.parquet*"))
+
+
+def move(revision):
+    some = np.arange(revision % 3, 7, 2)
+    points = np.round(np.random.default_rng(revision).random((len(some), 2)) * 100, 5)
+    return Record(
+        revision, KeyRows(PackedKeys.pack([KEYS[i] for i in some]), points, PackedKeys.pack([])), cause="batch"
+    )
+
+
+def read_back(storage, until):
+    found, after = [], storage.oldest_moment(1).revision
+    while after < until:
+        found += storage.batches(1, after, until)
+        after = found[-1].revision
+    return found
+
+
+def require_all(storage, records):
+    """Every revision of the past is there once, with its commit, and so is each state."""
+    assert storage.oldest_moment(1).revision == 0
+    found = read_back(storage, len(records))
+    same(found, records)
+    assert [each.committed for each in found] == [each.committed for each in records]
+    for until in range(0, len(records) + 1, 3):
+        kept = storage.state(1, until)
+        expected = replayed(Kept(records=records[: kept.revision]), SETTINGS).stored()
+        same(kept.contents.points, expected.points if kept.revision else np.empty((0, 2)))
+        assert kept.revision <= until
+    for record in records[1::2]:
+        assert storage.moment(1, record.committed.time).revision == record.revision
+        assert storage.moment(1, record.committed.time - 1).revision == record.revision - 2
+
+
+@pytest.fixture(params=["folder", "postgresql"])
+def fleet(request, tmp_path):
+    make = None
+    archive = Archive(tmp_path / "history")
+    if request.param == "postgresql":
+        database = Database(request.getfixturevalue("postgres").new_database())
+        make = lambda: PostgresStorage(database, pytest.fail, archive=archive)  # noqa: E731
+    fleet = Fleet(tmp_path, archive=archive, make=make)
+    yield fleet
+    fleet.storage.close()
+
+
+def test_the_past_is_read_from_segments_and_the_journal(fleet):
+    fleet.fill()
+    assert fleet.storage.oldest(1) > 20  # the journal has forgotten it
+    for _ in range(2):
+        require_all(fleet.storage, fleet.records)
+        fleet.storage.close()
+        fleet.storage = fleet.make()
+        assert fleet.storage.open(no_progress).notes == []
+    history = fleet.storage.history(1)
+    assert history.batches == fleet.storage.oldest(1)
+    assert history.bytes == sum((fleet.archive.path / each).stat().st_size for each in fleet.files)
+    assert history.moves == sum(len(each.rows) for each in fleet.records[: history.batches])
+
+
+def test_a_deleted_hull_has_no_past_and_a_new_one_of_its_name_none_of_it(fleet):
+    fleet.fill()
+    fleet.storage.commit([Delete(1), Create(HullRow(2, "fleet", "4567", 12.5, SETTINGS))])
+    fleet.file()
+    assert fleet.files == []
+    assert fleet.storage.history(2).bytes == 0
+    assert fleet.storage.oldest_moment(2).revision == 0
+
+
+@pytest.mark.parametrize("limit", ["history", "history_bytes", "server"])
+def test_what_is_too_old_or_too_much_goes_as_a_whole(tmp_path, limit):
+    fleet = Fleet(tmp_path).fill()
+    size = fleet.storage.history(1).bytes
+    if limit == "server":
+        fleet.archive.most_bytes = size // 2
+    else:
+        kept = (10 * SECOND, 0) if limit == "history" else (FOREVER, size // 2)
+        fleet.storage.commit([fleet.storage.set_history(1, *kept)])
+    fleet.file()
+    oldest = fleet.storage.oldest_moment(1)
+    assert 0 < oldest.revision < fleet.storage.oldest(1)
+    assert oldest.committed == fleet.records[oldest.revision - 1].committed
+    if limit != "history":
+        assert 0 < fleet.storage.history(1).bytes <= size // 2
+    same(read_back(fleet.storage, len(fleet.records)), fleet.records[oldest.revision :])
+    with pytest.raises(DamagedError, match="no longer kept"):
+        fleet.storage.state(1, oldest.revision - 1)
+    fleet.storage.commit([fleet.storage.set_history(1, 0, 0)])
+    fleet.file()
+    assert fleet.files == []
+    fleet.storage.close()
+
+
+class Watched(Archive):
+    """An archive that calls a function before and after each thing that it does."""
+
+    look = staticmethod(lambda: None)
+
+    def write(self, file, content):
+        self.look()
+        self.path.joinpath(file).parent.mkdir(parents=True, exist_ok=True)
+        part = self.path / (file + ".part")
+        part.write_bytes(content[: len(content) // 2])  # as a kill in the middle leaves it
+        self.look()
+        part.unlink()
+        written = super().write(file, content)
+        self.look()
+        return written
+
+    def remove(self, file):
+        self.look()
+        super().remove(file)
+        self.look()
+
+
+def test_a_kill_at_any_point_leaves_each_batch_in_one_of_the_two(tmp_path):
+    """The folder as it is before and after each commit and each file is what a killed server leaves."""
+    archive = Watched(tmp_path / "history")
+    fleet = Fleet(tmp_path, archive=archive)
+    taken = []
+
+    def look():
+        copy = tmp_path / f"copy {len(taken)}"
+        for part in ("data", "history"):
+            if (tmp_path / part).exists():
+                shutil.copytree(tmp_path / part, copy / part)
+        taken.append((copy, list(fleet.records)))
+
+    def carry_out(steps):
+        for step in steps:
+            look()
+            fleet.storage.commit([step], fleet.time)
+            look()
+
+    fleet.fill(2)
+    fleet.put(4)
+    fleet.snapshot()
+    archive.look, fleet.carry_out = look, carry_out
+    fleet.file()
+    fleet.storage.commit([fleet.storage.set_history(1, 2 * SECOND, 0)])
+    fleet.file()
+    fleet.storage.close()
+    assert len(taken) > 20
+    for copy, records in taken:
+        left = Archive(copy / "history")
+        storage = SQLiteStorage(copy / "data", archive=left)
+        storage.open(no_progress)
+        oldest = storage.oldest_moment(1).revision
+        same(read_back(storage, len(records)), records[oldest:])
+        for step in storage.file_history(fleet.time):
+            storage.commit([step], fleet.time)
+        oldest = storage.oldest_moment(1).revision
+        same(read_back(storage, len(records)), records[oldest:])
+        facts = [segment.facts for segment in storage._ledger.hulls[1].segments]
+        names = len(facts) + sum(each.state_bytes > 0 for each in facts)
+        assert len(list(left.path.rglob("*.parquet*"))) == names  # nothing is left of what was begun
+        storage.close()
+        assert copies.check(copy / "data", no_progress, left.path).notes == []
+
+
+def test_while_the_disk_is_full_the_journal_keeps_what_is_due(tmp_path, monkeypatch):
+    fleet = Fleet(tmp_path).fill(3)
+    before = fleet.files
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.fsync", full)
+        for _ in range(3):
+            fleet.put(4)
+            fleet.snapshot()
+            with pytest.raises(OSError, match="No space left"):
+                fleet.file()
+        require_all(fleet.storage, fleet.records)
+    fleet.file()
+    assert len(fleet.files) > len(before)
+    assert not [each for each in fleet.files if each.endswith(".part")]
+    require_all(fleet.storage, fleet.records)
+    fleet.storage.close()
+
+
+def test_no_flipped_bit_cut_or_exchange_of_a_file_goes_unnoticed(tmp_path):
+    fleet = Fleet(tmp_path).fill()
+    fleet.storage.close()
+    rng = np.random.default_rng(0)
+    paths = [fleet.archive.path / each for each in fleet.files]
+    whole = [path.read_bytes() for path in paths]
+
+    def read_all(storage):
+        for until in range(0, len(fleet.records), 4):
+            storage.state(1, until)
+        read_back(storage, len(fleet.records))
+
+    def refused(path):
+        storage._filed = Filed(fleet.archive)  # nothing is in memory
+        with pytest.raises(DamagedError, match=path.name):
+            read_all(storage)
+
+    storage = fleet.make()
+    storage.open(no_progress)
+    read_all(storage)
+    for path, content in zip(paths, whole, strict=True):
+        path.write_bytes(content[:-1])
+        refused(path)
+        path.write_bytes(whole[(paths.index(path) + 2) % len(paths)])
+        refused(path)
+        path.unlink()
+        refused(path)
+        path.write_bytes(content)
+    segments = storage._ledger.hulls[1].segments
+    storage.close()
+    for place in rng.integers(0, 8 * len(whole[0]), FLIPS).tolist():
+        segment = next(each for each in segments if paths[0].name.startswith(each.file.rpartition("/")[2]))
+        changed = bytearray(whole[0])
+        changed[place // 8] ^= 1 << place % 8
+        paths[0].write_bytes(changed)
+        with pytest.raises(DamagedError, match="is not as it was written"):
+            fleet.archive.read(segment.file + BATCHES, segment.facts.bytes, segment.facts.digest)
+    report = copies.check(fleet.folder / "data", no_progress, fleet.archive.path)
+    assert ["revisions 1 to" in each and paths[0].name in each for each in report.notes] == [True]
+
+
+def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():
+    rng = np.random.default_rng(1)
+    hard = np.array([[-0.0, 5e-324], [1.1, 1e308], [0.1 + 0.2, -1 / 3], [2.0**60, 179.9999999]])
+    none, some = PackedKeys.pack([]), PackedKeys.pack(["a", "é", "b"])
+    held = HeldRows(
+        some,
+        rng.random((3, 2)),
+        np.array([1, NO_TIME, 3]),
+        np.array([FOREVER, 2, 3]),
+        np.array([1.5, np.nan, 0.1]),
+        np.array([np.nan, 1e300, 2.0]),
+        np.array([1, 2, 3]),
+        np.array([0, 1, 2]),
+    )
+    times, deadlines = np.array([5, NO_TIME, 7]), np.array([FOREVER, 9, 10])
+    keyed = [
+        KeyRows(some, hard[:3], none, times, deadlines, "absent"),
+        KeyRows(some, hard[1:], none, np.full(3, NO_TIME), np.full(3, FOREVER)),
+        KeyRows(none, hard[:0], some, held=HeldChange(held, some, QuarantineRules(max_growth=2.0))),
+        KeyRows(none, hard[:0], none, held=HeldChange(held, none)),
+        Expiry(None, 3),
+        Expiry(17, 0),
+        KeyRows(none, hard[:0], none),
+    ]
+    multiset = [
+        PointRows(hard, hard[:1], lenient=True, times=np.array([1, 2, 3, NO_TIME])),
+        PointRows(hard[:0], hard),
+        PointRows(hard[:0], hard[:0]),
+    ]
+    numbers = np.array([0, 2**64 - 1, 5], np.uint64)
+    integers = [KeyRows(numbers, np.round(rng.random((3, 2)), 7), numbers[:1]), KeyRows(numbers[:0], hard[:0], numbers)]
+    for identity, rows in (("str", keyed), ("multiset", multiset), ("int", integers)):
+        records = [
+            Record(
+                revision,
+                each,
+                clock=None if revision % 2 else revision,
+                center=None if revision % 3 else (-0.0, 1.5),
+                cause=[None, "batch", "expiry", "recenter"][revision % 4],
+                committed=None if revision < 3 else CommitStamp(revision, 10 * revision),
+            )
+            for revision, each in enumerate(rows, 1)
+        ]
+        columns, about, _ = from_parquet(to_parquet(columns_of(records, identity), {"hull": "é"}), "a file")
+        found = list(records_of(columns))
+        same(found, records)
+        assert [each.committed for each in found] == [each.committed for each in records]
+        assert about["hull"] == "é"
+        for one, other in zip(found, records, strict=True):
+            for name in ("points", "inserts", "deletes"):
+                if isinstance(getattr(other.rows, name, None), np.ndarray):
+                    assert getattr(one.rows, name).tobytes() == getattr(other.rows, name).tobytes()
+
+
+def test_positions_of_few_decimals_take_few_bytes():
+    rng = np.random.default_rng(0)
+    keys = PackedKeys.pack([f"vehicle {i:05}" for i in range(500)])
+    points = rng.uniform([-10, 40], [10, 60], (500, 2))
+    for decimals, most in ((7, 10), (None, 16)):
+        records = []
+        for revision in range(1, 101):
+            points = points + rng.normal(0, 1e-4, (500, 2))
+            rows = KeyRows(keys, points if decimals is None else np.round(points, decimals), PackedKeys.pack([]))
+            records.append(
+                Record(revision, rows, cause="batch", committed=CommitStamp(revision, BEGIN + revision * 7919))
+            )
+        assert len(to_parquet(columns_of(records, "str"), {})) / 50_000 < most
+
+
+def test_a_copy_has_the_past_or_says_that_it_has_not(tmp_path):
+    fleet = Fleet(tmp_path, archive=Archive(tmp_path / "data" / "history")).fill()
+    records = fleet.records
+    for name, options in (("copy", {}), ("without", {"without_history": True})):
+        for _, report in copies.copy_all([(tmp_path / "data", tmp_path / name)], no_progress, **options):
+            assert report.notes == []
+        assert copies.check(tmp_path / name, no_progress).notes == []
+    fleet.storage.close()
+    copy = SQLiteStorage(tmp_path / "copy", archive=Archive(tmp_path / "copy" / "history"))
+    copy.open(no_progress)
+    require_all(copy, records)
+    assert copy.row(1).uid.startswith("0123.")
+    copy.close()
+    without = SQLiteStorage(tmp_path / "without", archive=Archive(tmp_path / "without" / "history"))
+    without.open(no_progress)
+    oldest = without.oldest_moment(1).revision
+    assert 0 < oldest == without.oldest(1)
+    same(read_back(without, len(records)), records[oldest:])
+    without.close()
+
+
+def test_history_begins_where_the_journal_does_when_it_is_set(tmp_path):
+    fleet = Fleet(tmp_path, replace(SETTINGS, history=0)).fill(3)
+    assert fleet.files == []
+    begin = fleet.storage.oldest(1)
+    assert begin > 0
+    fleet.storage.commit([fleet.storage.set_history(1, FOREVER, 0)])
+    fleet.fill(3)
+    assert fleet.storage.oldest_moment(1).revision == begin < fleet.storage.oldest(1)
+    assert fleet.storage.moment(1, BEGIN) is None
+    same(read_back(fleet.storage, len(fleet.records)), fleet.records[begin:])
+    same(fleet.storage.read(1, NEWEST).records, fleet.records[fleet.storage.read(1).revision :])
+    assert isinstance(fleet.storage.state(1, begin).contents, Contents)
+    fleet.storage.close()
