@@ -265,9 +265,9 @@ def test_what_is_wrong_with_all_messages_passes_over_none(
 def test_whatever_is_killed_each_message_is_applied_once(name: str, tmp_path: Path) -> None:
     """Points without keys: one that came twice would be counted twice."""
     port = free_port()
-    folder = ("--data", str(tmp_path / "data"))
+    kept = ("--data", str(tmp_path / "data"), "--port", str(free_port()))
     rng = random.Random(5)
-    with server_process(*folder, killed=True) as server:
+    with server_process(*kept, killed=True) as server:
         address = server.address
         options = (f"nats://127.0.0.1:{port}/{name}", "--hull", name, "--x", "$[0]", "--y", "$[1]", "--plane")
         with broker(nats_server(tmp_path, port), port):
@@ -282,8 +282,7 @@ def test_whatever_is_killed_each_message_is_applied_once(name: str, tmp_path: Pa
                 server.process.wait()
                 publish(port, name, [("p", [i, i * i]) for i in range(2000, 2500)])
                 ingest.process.kill()
-    listening = ("--port", address.rpartition(":")[2])
-    with server_process(*folder, *listening) as server, HullClient(server.address) as client:
+    with server_process(*kept) as server, HullClient(server.address) as client:
         with ingest_process(server.address, *options) as first, ingest_process(server.address, *options) as second:
             first.wait_for("no messages from the broker, trying again")
             with broker(nats_server(tmp_path, port), port):

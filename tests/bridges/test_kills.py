@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from patience import wait_until
+from ports import free_port
 from receiver import Received, receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
 from server_process import run, server_process
@@ -17,10 +18,10 @@ PLAIN = ("--unsigned", "--allow-private", *FAST)
 
 
 def test_every_event_arrives_in_order(tmp_path: Path) -> None:
-    data = ("--data", str(tmp_path / "data"))
+    kept = ("--data", str(tmp_path / "data"), "--port", str(free_port()))
     with receiver() as endpoint:
         to = ("--to", endpoint.url, *PLAIN)
-        with server_process(*data, killed=True) as server, HullClient(server.address) as client:
+        with server_process(*kept, killed=True) as server, HullClient(server.address) as client:
             for name in FENCES:
                 fence(client, name)
             with relay_process(server.address, tmp_path, *FENCES, *to, killed=True) as relay:
@@ -38,11 +39,10 @@ def test_every_event_arrives_in_order(tmp_path: Path) -> None:
                 server.process.wait()
                 relay.wait_for("not delivered, trying again")
                 relay.process.kill()
-        port = server.address.rpartition(":")[2]
         with relay_process(server.address, tmp_path, *FENCES, *to) as relay:
             assert relay.wait_for("waiting for the server")["server"] == server.address
             endpoint.start()
-            with server_process(*data, "--port", port) as again, HullClient(again.address) as client:
+            with server_process(*kept) as again, HullClient(again.address) as client:
                 for name in FENCES:
                     pass_through(client, name, map(str, range(10, 15)))
                 for name in FENCES:

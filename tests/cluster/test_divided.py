@@ -328,8 +328,10 @@ def test_a_shard_that_is_away_is_named_and_all_goes_on_when_it_is_back(tmp_path:
         before = client.get_hull("north/a")
         client.create_hull("fleet/a")  # of worker 1
         with (tmp_path / "worker-1" / "dynhull.lock").open("a") as lock:
+            os.kill(server.process.pid, signal.SIGSTOP)  # it starts no other worker before the lock is taken
             os.kill(processes(server.process.pid)["worker-1"], signal.SIGKILL)
             fcntl.flock(lock, fcntl.LOCK_EX)
+            os.kill(server.process.pid, signal.SIGCONT)
             reading = pool.submit(patient.get_hull, "fleet/a")
             asked = [
                 pool.submit(client.apply, "north/a", insert=[[7, 7]]),

@@ -12,6 +12,7 @@ from dashboard_process import dashboard_process, let_go, opened, wait_for_vertic
 from metrics import measured, scrape
 from patience import PATIENCE, until, wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
+from ports import free_port
 from proxy import proxy
 from server_process import Server, run, server_process
 
@@ -294,7 +295,7 @@ def test_events_that_were_dropped_while_the_server_was_away(
 @pytest.mark.long
 @pytest.mark.one_process("the fence and its hulls have no first part of their names in common")
 def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
-    kept = "--data", str(tmp_path)
+    kept = "--data", str(tmp_path), "--port", str(free_port())
     with server_process(*kept, killed=True) as first, HullClient(first.address) as client:
         client.create_hull("zone")
         client.apply("zone", insert=SQUARE)
@@ -315,7 +316,7 @@ def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Bro
             first.process.kill()
             expect(page.get_by_role("alert")).to_contain_text(f"No connection to {first.address}")
             expect(table_row(page, "NAME")).to_contain_text("Connection lost")
-            with server_process(*kept, "--port", first.address.split(":")[1]):
+            with server_process(*kept):
                 expect(page.get_by_role("alert")).to_be_hidden()
                 client.put("fleet", ["b"], [[2, 2]], timeout=PATIENCE)
                 expect(events(page).locator(".subject")).to_have_text(["b", "1 key inside: a"])

@@ -13,6 +13,7 @@ from dashboard_process import dashboard_process, let_go, opened, wait_for_vertic
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
+from ports import free_port
 from server_process import Server, run, server_process
 
 from dynhull import GeoHull
@@ -744,7 +745,7 @@ def test_series_of_the_server_have_no_hulls_colour(browser: Browser, url: str, h
 
 
 def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
-    kept = "--data", str(tmp_path)
+    kept = "--data", str(tmp_path), "--port", str(free_port())
     with server_process(*kept, killed=True) as first, HullClient(first.address) as client:
         client.create_hull("empty")
         client.create_hull("fleet")
@@ -755,7 +756,7 @@ def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path
             first.process.kill()
             expect(banner(page)).to_contain_text(f"No connection to {first.address}")
             wait_for_vertices(page, "fleet", SQUARE)
-            with server_process(*kept, "--port", first.address.split(":")[1]):
+            with server_process(*kept):
                 expect(banner(page)).to_be_hidden()
                 client.apply("fleet", insert=[[9, 9]], timeout=PATIENCE)
                 wait_for_vertices(page, "fleet", [[0, 0], [4, 0], [9, 9], [0, 4]])
@@ -763,13 +764,13 @@ def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path
 
 def test_a_dashboard_that_goes_and_comes_back(browser: Browser, server: tuple[Server, str], hull: str) -> None:
     address, silence = server[0].address, "The dashboard does not answer."
-    page = browser.new_page()
-    with dashboard_process(address) as url:
+    page, port = browser.new_page(), str(free_port())
+    with dashboard_process(address, "--port", port) as url:
         page.goto(f"{url}/?hull={hull}")
         wait_for_vertices(page, hull, SQUARE)
     expect(page.get_by_text(silence)).to_be_visible()
     wait_for_vertices(page, hull, SQUARE)
-    with dashboard_process(address, "--port", url.rsplit(":", 1)[1]):
+    with dashboard_process(address, "--port", port):
         expect(page.get_by_text(silence)).to_be_hidden()
         wait_for_vertices(page, hull, SQUARE)
         page.close()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import wall_clock
 from forked import COMMAND, Process
+from ports import free_port
 
 
 class MortalServer:
@@ -20,7 +21,7 @@ class MortalServer:
         self._data = folder / "data"
         self._options = options
         self._log = folder / "server.log"
-        self._port = 0
+        self._port = free_port()
         self.lives = 0
         self.up = threading.Event()
         self.start()
@@ -35,7 +36,6 @@ class MortalServer:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         assert "serving on" in line, f"the server did not start: {self._log.read_text()[-2000:]}"
-        self._port = int(line.rsplit(":", 1)[1])
         self.lives += 1
         self.up.set()
 

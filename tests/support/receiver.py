@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
+from ports import free_port
+
 
 @dataclass(frozen=True)
 class Received:
@@ -32,7 +34,7 @@ class Receiver:
         self.received: list[Received] = []
         self.accepted: list[Received] = []
         self.answer: Callable[[Received], tuple[int, dict[str, str]]] = accept
-        self._port = 0
+        self._port = free_port()
         self.start()
         self.url = f"http://127.0.0.1:{self._port}/hook"
 
@@ -62,7 +64,6 @@ class Receiver:
                 """The relay was killed: nobody reads the answer."""
 
         self._server = Server(("127.0.0.1", self._port), Page)
-        self._port = self._server.server_port
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
         self._thread.start()
 

@@ -30,6 +30,7 @@ sys.path.append(str(Path(__file__).parents[2] / "support"))
 from forked import COMMAND, Process
 from pacing import pause_async
 from patience import PATIENCE
+from ports import free_port
 from promises import BrokenPromiseError, require
 
 from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
@@ -69,7 +70,7 @@ def creation_of(name: str) -> pb.CreateHullRequest:
 class Server:
     def __init__(self, data: Path) -> None:
         self.data = data
-        self.port = 0
+        self.port = free_port()
         self.log = data.with_name("server.log")
 
     def start(self) -> None:
@@ -79,7 +80,6 @@ class Server:
             self.process = Process(command, stdout=subprocess.PIPE, stderr=log, text=True)
         line = self.process.stdout.readline()
         require("serving on" in line, f"the server did not start: {self.log.read_text()}")
-        self.port = int(line.rsplit(":", 1)[1])
 
     def kill(self) -> None:
         with self.process:  # which waits for its end

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from forked import COMMAND, Process
+from ports import free_port
 from promises import require
 
 
@@ -15,7 +16,7 @@ class Server:
     def __init__(self, folder: Path, options: Sequence[str] = (), journal: str = "") -> None:
         self.data = folder / "data"
         self._options = [*options, *(["--journal", journal] if journal else ["--data", str(self.data)])]
-        self._port = 0
+        self._port = free_port()
         self._log = folder / "server.log"
 
     def start(self, wrap: Sequence[str] = ()) -> None:
@@ -31,7 +32,6 @@ class Server:
         if "serving on" not in line:
             self.process.wait()
             return False
-        self._port = int(line.rsplit(":", 1)[1])
         return True
 
     @property
