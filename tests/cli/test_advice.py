@@ -107,6 +107,8 @@ FOLLOWED_ELSEWHERE = {
     "--client-key": "test_commands.py: test_tls",
     "dynhull serve": "every test with a server",
     "--config": "ogrinfo of GDAL",
+    "--history": "test_history.py: the past that a hull keeps",
+    "--history-bytes": "test_history.py: the past that a hull keeps",
     "--help": "test_main.py: test_help_lists_the_commands",
     "--prefix": "test_commands.py: test_watch_of_many",
     "--speed": "test_demo.py: test_the_flights_live_until_ctrl_c",

@@ -51,6 +51,7 @@ EXPORTED = [
     "FenceReplacedError",
     "FenceWatch",
     "HeldPosition",
+    "History",
     "Hull",
     "HullClient",
     "HullCopies",

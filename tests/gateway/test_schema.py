@@ -15,6 +15,7 @@ from urllib.parse import quote
 import pytest
 from gateway_process import Events, Gateway, gateway_process
 from peers import missing
+from server_process import server_process
 
 EXAMPLES = os.environ.get("FUZZ_EXAMPLES", "1")
 NOT_CHECKED = "positive_data_acceptance,ignored_auth,missing_required_header"
@@ -22,9 +23,12 @@ HOOKS = Path(__file__).parents[1] / "support"
 
 
 @pytest.fixture
-def gateway(address: str) -> Iterator[Gateway]:
-    """A gateway that soon gives up waiting: random least revisions are never reached."""
-    with gateway_process(address, "--timeout", "3s", "--max-body", "1") as running:
+def gateway(tmp_path: Path) -> Iterator[Gateway]:
+    """A gateway that soon gives up waiting: random least revisions are never reached. Its server can keep a past."""
+    with (
+        server_process("--data", str(tmp_path / "data")) as server,
+        gateway_process(server.address, "--timeout", "3s", "--max-body", "1") as running,
+    ):
         yield running
 
 

@@ -73,6 +73,8 @@ EVERY_CALL = {
     "Distance": lambda stub, name: stub.Distance(pb.DistanceRequest(name=name)),
     "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
+    "GetHistory": lambda stub, name: stub.GetHistory(pb.GetHistoryRequest(name=name)),
+    "SetHistory": lambda stub, name: stub.SetHistory(pb.SetHistoryRequest(name=name)),
     "GetSeries": lambda stub, name: stub.GetSeries(pb.GetSeriesRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
     "WatchMany": lambda stub, name: next(stub.WatchMany(pb.WatchManyRequest(names=[name]))),
@@ -96,6 +98,7 @@ WRITES = {
     "SetQuarantine",
     "Reshard",
     "GetProducer",
+    "SetHistory",
 }
 
 

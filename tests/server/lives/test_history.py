@@ -1,5 +1,6 @@
 """The past of hulls that keep theirs, as clients of real processes see it: how much is there, and that it survives."""
 
+import json
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -59,7 +60,17 @@ def test_how_much_is_kept_is_told_changed_and_lost_with_the_hull(tmp_path):
         assert (client.history("fleet").history, client.history("fleet").history_bytes) == (True, found.bytes // 2)
         wait_until(lambda: client.history("fleet").bytes <= found.bytes // 2)
         assert client.history("fleet").first_revision > 0
-        assert dynhull("history", "set", "fleet", "none", "--address", server.address).exit_code == 0
+        place = "--address", server.address
+        for options in ("--history", "30d"), ("--history", "forever", "--history-bytes", "1000"):
+            assert dynhull("create", options[1], *options, *place).exit_code == 0
+            shown = json.loads(dynhull("history", options[1], "--json", *place).stdout)
+            assert (shown["history"], shown["history_bytes"]) in ((30 * 86400, None), (True, 1000))
+        for refused in (
+            ("create", "x", "--history-bytes", "9"),
+            ("history", "set", "fleet", "none", "--history-bytes", "9"),
+        ):
+            assert "--history-bytes is given with" in dynhull(*refused, *place).stderr
+        assert dynhull("history", "set", "fleet", "none", *place).exit_code == 0
         wait_until(lambda: client.history("fleet").bytes == 0)
         assert client.history("fleet").history is None
         wait_until(lambda: not list(tmp_path.rglob("*.parquet")))
