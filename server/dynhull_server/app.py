@@ -104,6 +104,7 @@ class Server:
             max_producers=settings.max_producers,
             max_producers_per_caller=settings.max_producers_per_caller,
             history_bytes=settings.history_bytes,
+            max_past_rows=settings.max_past_rows,
             fences=FenceLimits(
                 max_fences=settings.max_fences,
                 max_fence_consumers=settings.max_fence_consumers,
@@ -191,6 +192,7 @@ class Server:
             self._engine.hulls,
             self._metrics,
             ManyQuotas(self._settings),
+            Places("max_past_reads", self._settings.max_past_reads, self._settings.max_past_reads_per_caller),
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )

@@ -169,6 +169,15 @@ class Settings(BaseModel):
         320 * 2**20, ge=0, description="Memory for these measures of all hulls; the oldest ones go when it is full."
     )
 
+    max_past_reads: int = Field(16, ge=1, description="Largest number of simultaneous reads of the past of hulls.")
+    max_past_reads_per_caller: int = Field(8, ge=1, description="The same per token, or without tokens per address.")
+    max_past_rows: int = Field(
+        20_000_000,
+        ge=1,
+        description="Largest number of points and of rows of batches that a read of the past may rebuild; and of those "
+        "that are kept for the next ones.",
+    )
+
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
     max_fence_corners: int = Field(100_000, ge=3, description="Largest number of corners of the area of a fence.")
     max_fence_consumers: int = Field(1_000, ge=1, description="Largest number of durable consumers of a fence.")

@@ -180,18 +180,22 @@ class ReshardResponse(_message.Message):
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ...) -> None: ...
 
 class ListHeldRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "page_size", "page_token")
+    __slots__ = ("name", "min_revision", "encoding", "page_size", "page_token", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     PAGE_SIZE_FIELD_NUMBER: _ClassVar[int]
     PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     page_size: int
     page_token: str
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class ListHeldResponse(_message.Message):
     __slots__ = ("revision", "keys", "positions", "times", "speeds", "growths", "revisions", "confirmations", "held_count", "next_page_token")
@@ -396,7 +400,7 @@ class GetProducerResponse(_message.Message):
     def __init__(self, last_sequence: _Optional[int] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class LocateRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
@@ -404,6 +408,8 @@ class LocateRequest(_message.Message):
     KEYS_OF_FIELD_NUMBER: _ClassVar[int]
     KEYS_MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
@@ -411,7 +417,9 @@ class LocateRequest(_message.Message):
     keys_of: str
     keys_min_revision: int
     layer: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class LocateResponse(_message.Message):
     __slots__ = ("revision", "sides", "keys_revision")
@@ -424,14 +432,18 @@ class LocateResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., sides: _Optional[bytes] = ..., keys_revision: _Optional[int] = ...) -> None: ...
 
 class CountRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points")
+    __slots__ = ("name", "min_revision", "points", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class CountResponse(_message.Message):
     __slots__ = ("revision", "counts")
@@ -442,16 +454,20 @@ class CountResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ...) -> None: ...
 
 class GetPositionsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "keys", "encoding")
+    __slots__ = ("name", "min_revision", "keys", "encoding", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     keys: _points_pb2.Keys
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class GetPositionsResponse(_message.Message):
     __slots__ = ("revision", "positions", "present", "times")
@@ -466,14 +482,18 @@ class GetPositionsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., present: _Optional[bytes] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
 
 class ReadEntitiesRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding")
+    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class ReadEntitiesResponse(_message.Message):
     __slots__ = ("revision", "keys", "positions", "times")
@@ -488,14 +508,18 @@ class ReadEntitiesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
 
 class ReadPointsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding")
+    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class ReadPointsResponse(_message.Message):
     __slots__ = ("revision", "hull", "points", "keys", "times", "timed", "expire_times", "expires")
@@ -518,20 +542,24 @@ class ReadPointsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., timed: _Optional[bytes] = ..., expire_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., expires: _Optional[bytes] = ...) -> None: ...
 
 class SupportRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys", "layer")
+    __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys", "layer", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     directions: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
     include_keys: bool
     layer: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class SupportResponse(_message.Message):
     __slots__ = ("revision", "vertices", "keys")
@@ -544,18 +572,22 @@ class SupportResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class TangentsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "encoding", "layer")
+    __slots__ = ("name", "min_revision", "points", "encoding", "layer", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
     layer: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class TangentsResponse(_message.Message):
     __slots__ = ("revision", "left", "right")
@@ -568,7 +600,7 @@ class TangentsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class DistanceRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
@@ -576,6 +608,8 @@ class DistanceRequest(_message.Message):
     KEYS_OF_FIELD_NUMBER: _ClassVar[int]
     KEYS_MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
@@ -583,7 +617,9 @@ class DistanceRequest(_message.Message):
     keys_of: str
     keys_min_revision: int
     layer: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class DistanceResponse(_message.Message):
     __slots__ = ("revision", "distances", "keys_revision")
@@ -596,20 +632,24 @@ class DistanceResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., distances: _Optional[_Iterable[float]] = ..., keys_revision: _Optional[int] = ...) -> None: ...
 
 class IntersectLinesRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "origins", "targets", "encoding", "layer")
+    __slots__ = ("name", "min_revision", "origins", "targets", "encoding", "layer", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ORIGINS_FIELD_NUMBER: _ClassVar[int]
     TARGETS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     origins: _points_pb2.Points
     targets: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
     layer: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class IntersectLinesResponse(_message.Message):
     __slots__ = ("revision", "entries", "exits")
@@ -622,7 +662,7 @@ class IntersectLinesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., exits: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class GetHullRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys", "layer", "vertex_page_size", "vertex_page_token")
+    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys", "layer", "vertex_page_size", "vertex_page_token", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
@@ -631,6 +671,8 @@ class GetHullRequest(_message.Message):
     LAYER_FIELD_NUMBER: _ClassVar[int]
     VERTEX_PAGE_SIZE_FIELD_NUMBER: _ClassVar[int]
     VERTEX_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
@@ -639,7 +681,9 @@ class GetHullRequest(_message.Message):
     layer: int
     vertex_page_size: int
     vertex_page_token: str
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., vertex_page_size: _Optional[int] = ..., vertex_page_token: _Optional[str] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., vertex_page_size: _Optional[int] = ..., vertex_page_token: _Optional[str] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class GetHullResponse(_message.Message):
     __slots__ = ("hull", "vertices", "measures", "vertex_keys", "next_vertex_page_token")
@@ -656,18 +700,22 @@ class GetHullResponse(_message.Message):
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., next_vertex_page_token: _Optional[str] = ...) -> None: ...
 
 class SamplePointsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "sample_size", "encoding", "include_keys")
+    __slots__ = ("name", "min_revision", "sample_size", "encoding", "include_keys", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     SAMPLE_SIZE_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     sample_size: int
     encoding: _points_pb2.PointEncoding
     include_keys: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., sample_size: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., sample_size: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class SamplePointsResponse(_message.Message):
     __slots__ = ("revision", "points", "keys")
@@ -680,18 +728,22 @@ class SamplePointsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class GetLayersRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "layer_count", "encoding", "include_keys")
+    __slots__ = ("name", "min_revision", "layer_count", "encoding", "include_keys", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     LAYER_COUNT_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     layer_count: int
     encoding: _points_pb2.PointEncoding
     include_keys: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., layer_count: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., layer_count: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class GetLayersResponse(_message.Message):
     __slots__ = ("revision", "vertex_counts", "vertices", "vertex_keys")
@@ -706,16 +758,20 @@ class GetLayersResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., vertex_counts: _Optional[_Iterable[int]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class GetInfluenceRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "include_keys")
+    __slots__ = ("name", "min_revision", "encoding", "include_keys", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     include_keys: bool
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class GetInfluenceResponse(_message.Message):
     __slots__ = ("revision", "vertices", "areas", "vertex_keys")
@@ -730,16 +786,20 @@ class GetInfluenceResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., areas: _Optional[_Iterable[float]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class GetMeasuresRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "layer")
+    __slots__ = ("name", "min_revision", "encoding", "layer", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     layer: int
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class GetMeasuresResponse(_message.Message):
     __slots__ = ("revision", "measures", "diameter", "width", "min_box", "min_perimeter_box", "min_circle_x", "min_circle_y", "min_circle_radius", "label_x", "label_y", "geographic")
@@ -846,16 +906,20 @@ class SeparateResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., other_revision: _Optional[int] = ..., intersect: bool = ..., distance: _Optional[float] = ..., depth: _Optional[float] = ..., normal_x: _Optional[float] = ..., normal_y: _Optional[float] = ..., offset: _Optional[float] = ..., closest: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class PhaseDiagramRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "entries", "encoding")
+    __slots__ = ("name", "min_revision", "entries", "encoding", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENTRIES_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     entries: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class PhaseDiagramResponse(_message.Message):
     __slots__ = ("revision", "stable", "energies_above_hull", "left", "right", "left_shares", "right_shares")
@@ -876,18 +940,22 @@ class PhaseDiagramResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., stable: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., energies_above_hull: _Optional[_Iterable[float]] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., left_shares: _Optional[_Iterable[float]] = ..., right_shares: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class FrontierRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "rates", "encoding")
+    __slots__ = ("name", "min_revision", "points", "rates", "encoding", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     RATES_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
     rates: _containers.RepeatedScalarFieldContainer[float]
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., rates: _Optional[_Iterable[float]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., rates: _Optional[_Iterable[float]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class FrontierResponse(_message.Message):
     __slots__ = ("revision", "efficient", "turning_rates", "dominated", "tangencies", "sharpe_ratios")
@@ -1178,14 +1246,18 @@ class HullProgress(_message.Message):
     def __init__(self) -> None: ...
 
 class VerifyRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding")
+    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
+    AT_REVISION_FIELD_NUMBER: _ClassVar[int]
+    AT_TIME_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+    at_revision: int
+    at_time: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class VerifyResponse(_message.Message):
     __slots__ = ("revision", "equal", "point_count", "vertex_count", "rounds", "first_difference", "keys_equal", "fence_count", "fence_differences")

@@ -62,7 +62,8 @@ class HullServiceStub:
     answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
 
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
-    is of one revision.
+    is of one revision. With at_revision or at_time it is answered as of then: exactly as it was, or would have been, while
+    that revision was the newest. Separate, watches and series are about the present only.
     """
 
     @_typing.overload
@@ -253,7 +254,8 @@ class HullServiceAsyncStub(HullServiceStub):
     answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
 
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
-    is of one revision.
+    is of one revision. With at_revision or at_time it is answered as of then: exactly as it was, or would have been, while
+    that revision was the newest. Separate, watches and series are about the present only.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -440,7 +442,8 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
     answer differs from that of a plane, the method says so. PhaseDiagram and Frontier are refused with HULL_UNSUITABLE.
 
     A read with a min_revision waits until the hull has reached it, within the deadline of the call. All data in a response
-    is of one revision.
+    is of one revision. With at_revision or at_time it is answered as of then: exactly as it was, or would have been, while
+    that revision was the newest. Separate, watches and series are about the present only.
     """
 
     @_abc_1.abstractmethod

@@ -46,6 +46,8 @@ from .waiter import Waiter
 
 # The number of threads for trips, for large reads outside of trips, and for the disk.
 TURN_THREADS, READ_THREADS, DISK_THREADS = 4, 4, 3
+# The number of threads that rebuild hulls as they were.
+PAST_THREADS = 2
 # Seconds between updates of the core's clock, which makes points leave that have become too old.
 TICK = 0.1
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
@@ -132,6 +134,7 @@ class Driver:
         self._turns, self._reads = threads.pool("turn", TURN_THREADS), threads.pool("read", READ_THREADS)
         self._disk = threads.pool("disk", DISK_THREADS)
         self._history = threads.pool("history", 1)  # a segment may take seconds
+        self._past = threads.pool("past", PAST_THREADS)
 
     def start(self, hulls: HullObserver, fences: FenceObserver, committed: CommitStamp) -> None:
         """Serve the hulls and fences of the core.
@@ -174,7 +177,7 @@ class Driver:
         if self._started:
             self._commits.close()
         if self._begun:
-            for pool in (self._turns, self._reads, self._disk, self._history):
+            for pool in (self._turns, self._reads, self._disk, self._history, self._past):
                 pool.shutdown()
 
     # Requests
@@ -251,6 +254,10 @@ class Driver:
         """Call a function in the thread that writes segments."""
         return await self._run(self._history, function)
 
+    async def rebuild(self, function: Callable[[], Any]) -> Any:
+        """Call a step of what rebuilds a hull as it was."""
+        return await self._run(self._past, function)
+
     async def in_turn(self, function: Callable[[], Any]) -> Any:
         """Call a function in a thread of the trips."""
         return await self._run(self._turns, function)
@@ -265,6 +272,16 @@ class Driver:
         done: asyncio.Future[None] = self._loop.create_future()
         self._commits.submit(changes, lambda error, _: self._from_thread(partial(_settle, done, error)))
         return done
+
+    def commit_time(self) -> int:
+        """The time that a commit of now would have, in microseconds since 1970."""
+        return self._commit_time.now()
+
+    async def settled(self) -> None:
+        """Wait for the commits that have begun; raises the error if their outcome cannot be decided."""
+        done: asyncio.Future[None] = self._loop.create_future()
+        self._commits.settle(lambda error, _: self._from_thread(partial(_settle, done, error)))
+        await done
 
     def commit_from_thread(self, changes: list[Any]) -> None:
         """Commit, from another thread, changes of shards; raises the error of a failure."""

@@ -27,6 +27,7 @@ from .driver import Driver
 from .fences import Fences
 from .layers import COPIES
 from .live_hull import LiveHull
+from .past import PastHull, PastHulls, Place
 from .positions import Standing, standing
 from .recalls import UNREADABLE, Recalls
 from .rosters import Rosters
@@ -59,6 +60,7 @@ class Hulls:
         self._storage = storage
         self._changing: set[asyncio.Task[None]] = set()
         self._turn_of_settings = asyncio.Lock()
+        self._pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
         self._live: dict[Hull, LiveHull] = {}
         self._incarnation = driver.machine.token()  # that of hulls in memory; others find theirs in the storage
         self._standing = standing(self._incarnation, driver.published)
@@ -78,6 +80,24 @@ class Hulls:
         if hull.ended:
             raise HullNotFoundError(hull.name)
         return self._live_hull(hull)
+
+    async def past(self, live: LiveHull, revision: int | None, time: int, place: Place) -> PastHull:
+        """A hull as it was.
+
+        Args:
+            live: the hull.
+            revision: the revision; None for the last one committed at or before the time.
+            time: the time, in microseconds since 1970.
+            place: holds a place of those who may rebuild at the same time.
+        """
+        with place():
+            moment = await self._pasts.moment(live, revision, time)
+        hull = self._driver.core.get(live.name)
+        if hull.row.number != live.number:  # another hull of that name
+            raise HullNotFoundError(live.name)
+        past = PastHull(self._driver, hull, self._recalls, self._fences, self._copies, self._pasts, place, moment)
+        await past.begin()
+        return past
 
     def has(self, name: str) -> bool:
         """Whether a hull of that name exists."""

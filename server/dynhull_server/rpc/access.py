@@ -39,7 +39,7 @@ class PermissionDeniedError(RefusedError):
     """The caller's token does not allow the request. This does not reveal whether the hull exists.
 
     Attributes:
-        scope: "read" or "write".
+        scope: "read", "write" or "read the past of".
         name: the name requested.
     """
 
@@ -51,10 +51,11 @@ class PermissionDeniedError(RefusedError):
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """The prefixes of the names that a caller may read, and that it may write."""
+    """The prefixes of the names that a caller may read, that it may write, and whose past it may read, too."""
 
     read: tuple[str, ...]
     write: tuple[str, ...]
+    past: tuple[str, ...] = ()
 
     def may_read(self, name: str) -> bool:
         """Whether what has this name may be read."""
@@ -64,6 +65,12 @@ class Access:
         """Raise PermissionDeniedError if the hull may not be read."""
         if not self.may_read(name):
             raise PermissionDeniedError("read", name)
+
+    def require_past(self, name: str) -> None:
+        """Raise PermissionDeniedError if the past of the hull may not be read."""
+        self.require_read(name)
+        if not name.startswith(self.past):
+            raise PermissionDeniedError("read the past of", name)
 
     def require_write(self, name: str) -> None:
         """Raise PermissionDeniedError if the hull may not be written."""
@@ -76,7 +83,7 @@ class Access:
         return [each for i, each in enumerate(within) if not each.startswith(tuple(within[:i]))]
 
 
-EVERYTHING = Access(("",), ("",))
+EVERYTHING = Access(("",), ("",), ("",))
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +126,11 @@ class Rights:
         self._access.require_write(name)
         self._granted.append((Access.require_write, name))
 
+    def require_past(self, name: str) -> None:
+        """Raise PermissionDeniedError if the past of the hull may not be read."""
+        self._access.require_past(name)
+        self._granted.append((Access.require_past, name))
+
     def may_read(self, name: str) -> bool:
         """Whether the name may be told."""
         return self._access.may_read(name)
@@ -151,6 +163,7 @@ class TokenEntry(BaseModel):
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
     read: list[str] = []
     write: list[str] = []
+    past: list[str] = []
 
 
 class TokenTable(BaseModel):
@@ -169,6 +182,7 @@ class TokenFile:
     sha256 = "9f86d0..." # the hash of the token, in hexadecimal digits
     read = ["fleet/"]    # prefixes of names; "" matches every name
     write = ["fleet/truck-"]
+    past = ["fleet/"]    # whose past may be read, too; by default of none
 
     If the file becomes unreadable or invalid, the log reports it, and the tokens do not change.
 
@@ -248,7 +262,9 @@ class TokenFile:
             log.warning("the file of tokens has none: every call is refused", extra={"file": str(self._path)})
         return {
             each.sha256: Caller(
-                each.name or each.sha256[:SHORT_HASH], Access(tuple(each.read), tuple(each.write)), each.sha256
+                each.name or each.sha256[:SHORT_HASH],
+                Access(tuple(each.read), tuple(each.write), tuple(each.past)),
+                each.sha256,
             )
             for each in table.token
         }

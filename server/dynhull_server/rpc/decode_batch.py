@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from google.protobuf.timestamp_pb2 import Timestamp
 
 from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import batch_pb2, points_pb2
@@ -198,15 +199,20 @@ def decode_times(times: points_pb2.Times, field: str) -> Times | None:
 def _decode_timestamps(times: points_pb2.Times, field: str) -> Times:
     microseconds = []
     for row, each in enumerate(times.timestamps):
-        if not 0 <= each.nanos < NANOSECONDS_PER_SECOND:
-            raise InvalidFieldError(field, f"{each.nanos} ns", "nanoseconds are from 0 to 999999999", row)
-        time = each.seconds * MICROSECONDS + each.nanos // NANOSECONDS
-        if abs(time) > GREATEST_TIME:
-            raise _far_time(field, f"{each.seconds} seconds", row)
-        microseconds.append(time)
+        microseconds.append(decode_timestamp(each, field, row))
     return np.array(microseconds, np.int64)
 
 
-def _far_time(field: str, value: str, row: int) -> InvalidFieldError:
+def decode_timestamp(time: Timestamp, field: str, row: int | None = None) -> int:
+    """A time in microseconds since 1970, rounded down."""
+    if not 0 <= time.nanos < NANOSECONDS_PER_SECOND:
+        raise InvalidFieldError(field, f"{time.nanos} ns", "nanoseconds are from 0 to 999999999", row)
+    microseconds: int = time.seconds * MICROSECONDS + time.nanos // NANOSECONDS
+    if abs(microseconds) > GREATEST_TIME:
+        raise _far_time(field, f"{time.seconds} seconds", row)
+    return microseconds
+
+
+def _far_time(field: str, value: str, row: int | None) -> InvalidFieldError:
     problem = f"a time is from {shown(-GREATEST_TIME)} to {shown(GREATEST_TIME)}"
     return InvalidFieldError(field, value, problem, row)

@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import aclosing, contextmanager
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +29,11 @@ from ..state.records import Contents
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
+from .decode_moment import decode_moment
 from .decode_settings import decode_center, decode_history, decode_quarantine, decode_settings, decode_shards
 from .many import MANY_INTERVAL, HullStates, ManyQuotas, encode_many, require_many
 from .metrics import Metrics
+from .places import Places
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .status import ANSWERED
@@ -59,6 +62,7 @@ class HullService:
         hulls: the hulls.
         metrics: counts the work.
         quotas: how much a caller may watch of many hulls.
+        pasts: limits the reads of the past at a time.
         create_on_write: whether a write to a missing hull creates it.
         max_watch_lag: the seconds that a watcher may take to receive an event.
     """
@@ -69,11 +73,13 @@ class HullService:
         hulls: Hulls,
         metrics: Metrics,
         quotas: ManyQuotas,
+        pasts: Places,
         *,
         create_on_write: bool,
         max_watch_lag: float,
     ) -> None:
         self._hulls = hulls
+        self._pasts = pasts
         self._driver = driver
         self._aside = driver.aside
         self._metrics = metrics
@@ -229,7 +235,7 @@ class HullService:
     # Reads
 
     async def Locate(self, request: pb.LocateRequest, call: Call) -> pb.LocateResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         if decode.decode_subjects(request):
             found = await self._ask_of_keys(request, call, hull, lambda live, xy: live.locate(xy))
             found.rows[found.missing] = MISSING_SIDE
@@ -243,13 +249,13 @@ class HullService:
         return pb.LocateResponse(revision=counts.revision, sides=sides.tobytes())
 
     async def Count(self, request: pb.CountRequest, call: Call) -> pb.CountResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         xy = _places(hull, request.points)
         counts, times = await hull.count(xy, request.min_revision)
         return pb.CountResponse(revision=counts.revision, counts=times)
 
     async def GetPositions(self, request: pb.GetPositionsRequest, call: Call) -> pb.GetPositionsResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         keys = hull.keys(decode_keys(request.keys, "keys"))
         counts, found = await entities.positions(hull, keys, request.min_revision)
@@ -258,7 +264,7 @@ class HullService:
         return response
 
     async def ReadEntities(self, request: pb.ReadEntitiesRequest, call: Call) -> None:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         hull.require_keys("name")
         with call.cutoff():
@@ -269,7 +275,7 @@ class HullService:
             await call.write_within(self._max_watch_lag, part)
 
     async def ReadPoints(self, request: pb.ReadPointsRequest, call: Call) -> None:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         with call.cutoff():
             counts, contents = await entities.contents(hull, request.min_revision)
@@ -281,7 +287,7 @@ class HullService:
             await call.write_within(self._max_watch_lag, part)
 
     async def ListHeld(self, request: pb.ListHeldRequest, call: Call) -> pb.ListHeldResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         hull.require_keys("name")
         after, size = decode.decode_held_page(request, strings=hull.settings.identity == "str")
@@ -290,7 +296,7 @@ class HullService:
         return encode.encode_held(counts, held, token, encoding)
 
     async def Support(self, request: pb.SupportRequest, call: Call) -> pb.SupportResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         directions, layer = Checked(decode.decode_directions(request.directions)), decode.decode_layer(request)
         if not request.include_keys:
@@ -305,7 +311,7 @@ class HullService:
         )
 
     async def Tangents(self, request: pb.TangentsRequest, call: Call) -> pb.TangentsResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         xy = _places(hull, request.points)
         counts, tangents = await hull.ask_rows(
@@ -322,7 +328,7 @@ class HullService:
         )
 
     async def Distance(self, request: pb.DistanceRequest, call: Call) -> pb.DistanceResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         if decode.decode_subjects(request):
             found = await self._ask_of_keys(request, call, hull, lambda live, xy: live.distance(xy))
             found.rows[found.missing] = np.nan
@@ -339,7 +345,7 @@ class HullService:
         return pb.DistanceResponse(revision=counts.revision, distances=distances)
 
     async def IntersectLines(self, request: pb.IntersectLinesRequest, call: Call) -> pb.IntersectLinesResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         p, q = map(Checked, decode.decode_lines(request))
         if hull.geographic:
@@ -359,7 +365,7 @@ class HullService:
         )
 
     async def GetHull(self, request: pb.GetHullRequest, call: Call) -> pb.GetHullResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         if not decode.decode_view(request.view):
             await hull.reached(request.min_revision)
@@ -378,7 +384,7 @@ class HullService:
         return response
 
     async def GetLayers(self, request: pb.GetLayersRequest, call: Call) -> pb.GetLayersResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         count = decode.decode_layer_count(request.layer_count)
         peeled = await hull.peeling.layers(count, request.min_revision)
@@ -389,7 +395,7 @@ class HullService:
         return response
 
     async def GetInfluence(self, request: pb.GetInfluenceRequest, call: Call) -> pb.GetInfluenceResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         counts, vertices, areas, keys = await hull.peeling.influence(request.min_revision)
         named = keys is not None and request.include_keys
@@ -401,7 +407,7 @@ class HullService:
         )
 
     async def GetMeasures(self, request: pb.GetMeasuresRequest, call: Call) -> pb.GetMeasuresResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         counts, vertices = await hull.vertices(request.min_revision, decode.decode_layer(request))
         found = await hull.measures(vertices)
@@ -436,7 +442,7 @@ class HullService:
         return response
 
     async def PhaseDiagram(self, request: pb.PhaseDiagramRequest, call: Call) -> pb.PhaseDiagramResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         hull.require_plane()
         encoding = decode.decode_encoding(request.encoding)
         entries = decode.decode_read(request.entries, "entries", ENTRIES)
@@ -446,7 +452,7 @@ class HullService:
         return await answers.phase_diagram(counts, vertices, entries, encoding, self._run(rows))
 
     async def Frontier(self, request: pb.FrontierRequest, call: Call) -> pb.FrontierResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         hull.require_plane()
         encoding = decode.decode_encoding(request.encoding)
         points = decode.decode_read(request.points, "points", RISKS)
@@ -459,14 +465,14 @@ class HullService:
         return await answers.frontier(counts, vertices, points, rates, encoding, self._run(rows))
 
     async def Verify(self, request: pb.VerifyRequest, call: Call) -> pb.VerifyResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         counts, verification = await hull.verify(request.min_revision, tuple(call.access.readable("")))
         self._metrics.verified("call", verification.equal)
         return encode.encode_verification(counts, verification, encoding)
 
     async def SamplePoints(self, request: pb.SamplePointsRequest, call: Call) -> pb.SamplePointsResponse:
-        hull = self._read(call, request.name)
+        hull = await self._read_at(call, request)
         encoding = decode.decode_encoding(request.encoding)
         size = decode.decode_sample_size(request.sample_size)
         if request.include_keys:
@@ -557,7 +563,12 @@ class HullService:
         self, request: pb.LocateRequest | pb.DistanceRequest, call: Call, hull: LiveHull, question: Question
     ) -> KeyAnswers:
         """The answers about the positions of the keys of a request."""
-        owner = self._read(call, request.keys_of, "keys_of") if request.keys_of else hull
+        owner = hull
+        if request.keys_of and request.keys_of != hull.name:
+            if decode_moment(request) is not None:
+                problem = "is another hull, and a read as of the past is about one"
+                raise decode.InvalidFieldError("keys_of", request.keys_of, problem)
+            owner = self._read(call, request.keys_of, "keys_of")
         keys = owner.keys(decode_keys(request.keys, "keys"))
         layer = decode.decode_layer(request)
         return await entities.ask_of_keys(
@@ -570,6 +581,15 @@ class HullService:
         name = decode.decode_name(name, field)
         call.access.require_read(name)
         return self._hulls.get(name)
+
+    async def _read_at(self, call: Call, request: Any) -> LiveHull:
+        """The hull of a read: as it was, if the read is about the past."""
+        hull = self._read(call, request.name)
+        moment = decode_moment(request)
+        if moment is None:
+            return hull
+        call.access.require_past(hull.name)
+        return await self._hulls.past(hull, *moment, partial(self._pasts.take, call.owner))
 
     def _written(self, call: Call, name: str) -> str:
         name = decode.decode_name(name)

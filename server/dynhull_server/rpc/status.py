@@ -29,6 +29,7 @@ from ..state.errors import (
     KeyMissingError,
     KeyRepeatedError,
     LimitExceededError,
+    MomentForgottenError,
     NotStoredError,
     OutcomeUnknownError,
     PagesForgottenError,
@@ -181,6 +182,10 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     PermissionDeniedError: Refusal("PERMISSION_DENIED", lambda e: {"scope": e.scope, "value": e.name}),
     RestoredError: Refusal(
         "RESTORED", lambda e: {"value": e.name, "uid": e.uid, "last": e.last, "expected": e.last + 1}
+    ),
+    MomentForgottenError: Refusal(
+        "REVISION_FORGOTTEN",
+        lambda e: {"field": "at_time", "value": str(e.time), "oldest": e.oldest, "newest": e.newest},
     ),
     RevisionForgottenError: Refusal(
         "REVISION_FORGOTTEN",

@@ -1,5 +1,7 @@
 """The reasons why the engine refuses requests. A refused request has changed nothing."""
 
+from datetime import datetime, timedelta
+
 
 def words(error: BaseException) -> str:
     """The message of an error, or its class name where it has none, as a MemoryError."""
@@ -9,6 +11,14 @@ def words(error: BaseException) -> str:
 def words_for_callers(error: BaseException) -> str:
     """The message of an error, without what only the operator of the server should read."""
     return getattr(error, "for_callers", "") or words(error)
+
+
+def _iso(micros: int) -> str:
+    """A time in microseconds since 1970, for people."""
+    try:
+        return (datetime(1970, 1, 1) + timedelta(microseconds=micros)).isoformat() + "Z"
+    except OverflowError:
+        return f"{micros} microseconds after 1970"
 
 
 class RefusedError(Exception):
@@ -222,9 +232,34 @@ class RevisionForgottenError(RefusedError):
         newest: the newest.
     """
 
-    def __init__(self, revision: int, oldest: int, newest: int) -> None:
-        super().__init__(f"revision {revision} is not in the history: the oldest is {oldest}, the newest {newest}")
+    def __init__(self, revision: int, oldest: int, newest: int, oldest_time: int | None = None) -> None:
+        since = "" if oldest_time is None else f" of {_iso(oldest_time)}"
+        super().__init__(
+            f"revision {revision} is not in the history: the oldest is {oldest}{since}, the newest {newest}"
+        )
         self.revision = revision
+        self.oldest = oldest
+        self.newest = newest
+
+
+class MomentForgottenError(RefusedError):
+    """The state at that time is not kept any more, or the time has not come.
+
+    Attributes:
+        time: the time, in microseconds since 1970.
+        oldest: the oldest revision whose commit is known; None for a time that has not come.
+        newest: the newest.
+    """
+
+    def __init__(self, time: int, oldest: int | None, oldest_time: int | None, newest: int | None) -> None:
+        if oldest is None:
+            problem = "is not over by the server's clock"
+        elif oldest_time is None:
+            problem = "cannot be answered: an earlier version wrote this hull, without times"
+        else:
+            problem = f"is before the oldest revision with a time, {oldest} of {_iso(oldest_time)}"
+        super().__init__(f"{_iso(time)} {problem}")
+        self.time = time
         self.oldest = oldest
         self.newest = newest
 

@@ -33,6 +33,7 @@ class Limits:
         max_producers_per_caller: the number of producers per hull that belong to one caller.
         history_bytes: the memory per hull for the history that watchers resume from.
         fences: the limits on fences.
+        max_past_rows: the number of points and rows of batches that a read of the past may rebuild.
     """
 
     max_hulls: int
@@ -41,3 +42,4 @@ class Limits:
     max_producers_per_caller: int
     history_bytes: int
     fences: FenceLimits = FenceLimits()
+    max_past_rows: int = 20_000_000

@@ -1,0 +1,248 @@
+"""Hulls as they were: rebuilt from a stored state and the batches after it, in short steps beside the writes."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractContextManager, asynccontextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+from ..state.core import SMALL
+from ..state.errors import (
+    HullNotFoundError,
+    HullUnsuitableError,
+    LimitExceededError,
+    MomentForgottenError,
+    NotStoredError,
+    RefusedError,
+    RevisionForgottenError,
+    words_for_callers,
+)
+from ..state.fences.model.fence import Fence
+from ..state.hull import Hull
+from ..state.hull_state import Counts, HullState
+from ..state.root_state import state_of
+from ..storage.past import Moment, Past, created
+from .divided_hull import DividedHull
+from .driver import Driver
+from .fences import Fences
+from .live_hull import LiveHull
+from .recalls import UNREADABLE, Recalls
+
+T = TypeVar("T")
+# Holds a place of those who may rebuild at the same time.
+Place = Callable[[], AbstractContextManager[None]]
+
+# Rebuilt hulls that are kept for further reads, and the batches that are always applied to one rather than begin anew.
+MOST_KEPT, NEAR = 4, 1024
+
+
+@dataclass(slots=True, eq=False)
+class _Rebuilt:
+    """A rebuilt hull that nobody reads at present, and about the number of rows that it takes."""
+
+    hull: Hull
+    state: HullState
+    rows: int
+
+
+class PastHulls:
+    """Rebuilds hulls as they were.
+
+    The hulls rebuilt last are kept: a later moment of one of them takes the batches in between alone.
+
+    Args:
+        driver: has the threads.
+        past: keeps the past.
+        keeps: whether anything is kept.
+        max_rows: the number of points and of rows of batches that one read may rebuild, and that are kept.
+    """
+
+    def __init__(self, driver: Driver, past: Past, *, keeps: bool, max_rows: int) -> None:
+        self._driver = driver
+        self._past = past
+        self._keeps = keeps
+        self._max_rows = max_rows
+        self._kept: list[_Rebuilt] = []  # the last used at the end
+
+    async def moment(self, live: LiveHull, revision: int | None, time: int) -> Moment:
+        """The revision that is asked for: a number, or None for the last one committed at or before a time.
+
+        Raises:
+            HullUnsuitableError: nothing is kept of the past of this hull.
+            RevisionForgottenError: that revision is not kept any more, or not reached.
+            MomentForgottenError: that time is before the oldest that is kept, or later than now.
+        """
+        if not self._keeps:
+            raise HullUnsuitableError(live.name, "has no past: this server keeps no batches")
+        if isinstance(live, DividedHull):
+            raise HullUnsuitableError(live.name, "is divided among shards, and only its present can be read")
+        number, newest = live.number, live.counts.revision
+        if revision is None:
+            await self._settled(time)
+            found: Moment | None = await self._ask(live.name, partial(self._past.moment, number, time))
+            if found is None:
+                oldest = await self._ask(live.name, partial(self._past.oldest_moment, number, timed=True))
+                at = None if oldest.committed is None else oldest.committed.time
+                raise MomentForgottenError(time, oldest.revision, at, live.counts.revision)
+            return found
+        oldest = await self._ask(live.name, partial(self._past.oldest_moment, number))
+        if not oldest.revision <= revision <= newest:
+            at = None if oldest.committed is None else oldest.committed.time
+            raise RevisionForgottenError(revision, oldest.revision, newest, at)
+        return Moment(revision, None)
+
+    @asynccontextmanager
+    async def state(self, hull: Hull, revision: int) -> AsyncIterator[HullState]:
+        """The state of a hull at a revision, for one reader at a time.
+
+        Raises:
+            LimitExceededError: it would take too many rows.
+            RevisionForgottenError: what it takes is not kept any more.
+        """
+        rebuilt = self._take(hull, revision)
+        if rebuilt is None:
+            rebuilt = await self._begin(hull, revision)
+        while rebuilt.state.counts.revision < revision:
+            await self._ask(hull.name, partial(self._step, rebuilt, revision))
+        try:
+            yield rebuilt.state
+        except RefusedError:
+            self._keep(rebuilt)
+            raise
+        # After any other end a thread may still read it.
+        self._keep(rebuilt)
+
+    async def _begin(self, hull: Hull, revision: int) -> _Rebuilt:
+        """The newest stored state at or before a revision."""
+
+        def begin() -> _Rebuilt:
+            kept = self._past.state(hull.row.number, revision)
+            rows = len(kept.contents)
+            self._require_room(rows)
+            if not kept.revision:
+                kept.committed = created(hull.row)
+            state = state_of(self._driver.limits, hull.row.settings, kept, self._driver.machine.clock.monotonic())
+            return _Rebuilt(hull, state, rows)
+
+        rebuilt: _Rebuilt = await self._ask(hull.name, begin)
+        return rebuilt
+
+    def _step(self, rebuilt: _Rebuilt, revision: int) -> None:
+        """Apply the next batches."""
+        state = rebuilt.state
+        records = self._past.batches(rebuilt.hull.row.number, state.counts.revision, revision)
+        rebuilt.rows += sum(1 + len(each.rows) for each in records)
+        self._require_room(rebuilt.rows)
+        state.catch_up(records, self._driver.machine.clock.monotonic())
+
+    def _require_room(self, rows: int) -> None:
+        if rows > self._max_rows:
+            raise LimitExceededError("max_past_rows", self._max_rows)
+
+    def _take(self, hull: Hull, revision: int) -> _Rebuilt | None:
+        """The rebuilt hull from which the revision is nearest, which nobody else has from now on."""
+        self._kept = [each for each in self._kept if not each.hull.ended]
+        near = [
+            each
+            for each in self._kept
+            if each.hull is hull and 0 <= revision - each.state.counts.revision <= max(NEAR, each.state.counts.points)
+        ]
+        if not near:
+            return None
+        found = max(near, key=lambda each: each.state.counts.revision)
+        self._kept.remove(found)
+        found.rows = found.state.counts.points
+        return found
+
+    def _keep(self, rebuilt: _Rebuilt) -> None:
+        if rebuilt.state.torn:
+            return
+        rebuilt.rows = rebuilt.state.counts.points
+        self._kept.append(rebuilt)
+        while len(self._kept) > MOST_KEPT or sum(each.rows for each in self._kept) > self._max_rows:
+            del self._kept[0]
+
+    async def _settled(self, time: int) -> None:
+        """Wait until no commit can come any more that has this time or an earlier one."""
+        if time >= self._driver.commit_time():
+            raise MomentForgottenError(time, None, None, None)
+        if time >= self._driver.published.time:
+            await self._driver.settled()
+
+    async def _ask(self, name: str, function: Callable[[], Any]) -> Any:
+        try:
+            return await self._driver.rebuild(function)
+        except KeyError:
+            raise HullNotFoundError(name) from None
+        except UNREADABLE as error:
+            raise NotStoredError(words_for_callers(error)) from error
+
+
+class PastHull(LiveHull):
+    """A hull at one revision of the past, for readers: it never changes.
+
+    Args:
+        live: the hull.
+        pasts: rebuilds it.
+        place: holds a place of those who may rebuild at the same time.
+        moment: the revision.
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        hull: Hull,
+        recalls: Recalls,
+        fences: Fences,
+        copies: asyncio.Semaphore,
+        pasts: PastHulls,
+        place: Place,
+        moment: Moment,
+    ) -> None:
+        super().__init__(driver, hull, recalls, fences, copies)
+        self._pasts = pasts
+        self._place = place
+        self._revision = moment.revision
+        self._counts: Counts | None = None
+        self._stamp = moment.committed
+        self._size = 0
+
+    async def begin(self) -> None:
+        """Rebuild it once, so that its counts are known."""
+
+        def look(state: HullState) -> None:
+            self._counts, self._stamp, self._size = state.counts, state.committed, state.vertex_count
+
+        with self._place():
+            async with self._pasts.state(self._hull, self._revision) as state:
+                look(state)
+
+    @property
+    def counts(self) -> Counts:
+        """The counts at its revision."""
+        assert self._counts is not None  # it has begun
+        return self._counts
+
+    @property
+    def committed(self) -> Any:
+        """The commit of its revision; None where it is not known."""
+        return self._stamp
+
+    @property
+    def vertex_count(self) -> int:
+        """The number of its vertices."""
+        return self._size
+
+    async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
+        """Call `function` with the state at its revision."""
+        await self.reached(min_revision)
+        with self._place():
+            async with self._pasts.state(self._hull, self._revision) as state:
+                work = partial(function, state)
+                return state.counts, work() if rows <= SMALL else await self._driver.aside(work)
+
+    def fences(self, prefixes: tuple[str, ...] = ("",)) -> list[Fence]:
+        """None: fences compare the present."""
+        del prefixes
+        return []
