@@ -60,6 +60,8 @@ def reads(client: sdk.HullClient) -> None:
     assert_type(client.layers("a", 2), sdk.Layers)
     assert_type(client.influence("a"), sdk.Influence)
     assert_type(client.separate("a", "b"), sdk.Separation)
+    past = client.at("fleet", "2026-11-24T16:00Z")
+    print(past.revision, past.time, past.get_measures().area)
     assert_type(client.phase_diagram("a"), sdk.Phases)
     assert_type(client.frontier("a", rates=[0.01]), sdk.Efficient)
     assert_type(client.verify("a"), sdk.Verification)

@@ -10,6 +10,7 @@ import typer
 if TYPE_CHECKING:
     from dynhull_client import HullClient, Series
 
+from .as_of import At, as_of
 from .completion import hulls
 from .connected import AsJson, HullName, connected
 from .durations import more_than_0
@@ -33,6 +34,7 @@ def measure(
             "hour: a line about every ten seconds in which it changed, the oldest first, and the last one of now.",
         ),
     ] = None,
+    at: At = None,
     as_json: AsJson = False,
 ) -> None:
     """Measure a hull: one line per measure, its name, its numbers and its unit between tabs; a table on a terminal.
@@ -49,10 +51,12 @@ def measure(
     With --last, a heading and lines of time, revision, points, vertices, area, perimeter, diameter, width and rate:
     revisions a second. What there is not is nan.
     """
+    if last is not None and at is not None:
+        raise ValueError("give --last or --at, not both")
     if last is not None:
         _print_series(client.series(name, more_than_0(last, "--last")), as_json=as_json)
         return
-    found = client.get_measures(name)
+    found = as_of(client, name, at).get_measures()
     members = asdict(found)
     if found.geographic:
         members = {member: value for member, value in members.items() if member not in OF_A_PLANE}

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .as_of import At, as_of
 from .connected import AsJson, HullName, connected
 from .json_lines import json_line
 from .listing import listed
@@ -33,17 +34,13 @@ class Question(StrEnum):
     INFLUENCE = "influence"
 
 
-ANSWERS: "dict[Question, Callable[[HullClient, str, Points, int], list[Any]]]" = {
-    Question.LOCATE: lambda client, name, xy, layer: [
-        SIDES[each] for each in client.locate(name, xy, layer=layer).sides.tolist()
-    ],
-    Question.COUNT: lambda client, name, xy, _: client.count(name, xy).counts.tolist(),
-    Question.DISTANCE: lambda client, name, xy, layer: client.distance(name, xy, layer=layer).distances.tolist(),
-    Question.SUPPORT: lambda client, name, xy, layer: client.support(name, xy, layer=layer).vertices.tolist(),
-    Question.TANGENTS: lambda client, name, xy, layer: client.tangents(name, xy, layer=layer).tangents.tolist(),
-    Question.LINES: lambda client, name, pq, layer: client.intersect_lines(
-        name, pq[:, :2], pq[:, 2:], layer=layer
-    ).crossings.tolist(),
+ANSWERS: "dict[Question, Callable[[Any, Points, int], list[Any]]]" = {
+    Question.LOCATE: lambda hull, xy, layer: [SIDES[each] for each in hull.locate(xy, layer=layer).sides.tolist()],
+    Question.COUNT: lambda hull, xy, _: hull.count(xy).counts.tolist(),
+    Question.DISTANCE: lambda hull, xy, layer: hull.distance(xy, layer=layer).distances.tolist(),
+    Question.SUPPORT: lambda hull, xy, layer: hull.support(xy, layer=layer).vertices.tolist(),
+    Question.TANGENTS: lambda hull, xy, layer: hull.tangents(xy, layer=layer).tangents.tolist(),
+    Question.LINES: lambda hull, pq, layer: hull.intersect_lines(pq[:, :2], pq[:, 2:], layer=layer).crossings.tolist(),
 }
 
 
@@ -87,6 +84,7 @@ def query(
             help="Ask the hull of this convex layer; 1, the default, is the hull. layers: how many; 10 by default.",
         ),
     ] = None,
+    at: At = None,
     as_json: AsJson = False,
 ) -> None:
     """Ask a hull about points: one line per point, with its coordinates and the exact answer between tabs.
@@ -95,6 +93,7 @@ def query(
         dynhull query vehicles vertices --keys
         dynhull query depot locate --keys LH400 --keys-of vehicles
         dynhull query vehicles locate --layer 2 --keys LH400
+        dynhull query vehicles vertices --at 2026-11-24T16:00Z
 
     * locate: inside, boundary or outside
     * count: how many copies of the point the hull holds
@@ -107,33 +106,34 @@ def query(
     * layers (without points): the number and a vertex of each convex layer, from the outermost
     * influence (without points): each vertex, and the area that the hull would lose without it; the greatest first
     """
+    if keys_of and at is not None:
+        raise ValueError("--at is about one hull: leave out --keys-of")
     if keys_of and not (keys and question in ABOUT_KEYS):
         raise ValueError("--keys-of is given with --keys, to locate or distance")
     if layer is not None and question in WITHOUT_LAYER and question is not Question.LAYERS:
         raise ValueError(f"{question} is not about a layer, but --layer was given")
+    hull = as_of(client, name, at)
     if question in WITHOUT_POINTS:
         if points:
             raise ValueError(f"{question} takes no points, but {points[0]!r} was given")
         what = f"layer {layer} of {name}" if layer and question is Question.VERTICES else name
-        for row in listed(_shape(client, name, question, keys, layer), f"{what} has no vertices"):
+        for row in listed(_shape(hull, name, question, keys, layer), f"{what} has no vertices"):
             typer.echo(json_line(**row) if as_json else tab_line(*row.values()))
     elif question is Question.POSITIONS or (keys and question in ABOUT_KEYS):
-        _ask_about_keys(client, name, question, points, keys_of, layer or 1, as_json)
+        _ask_about_keys(client, hull, name, question, points, keys_of, layer or 1, as_json)
     elif keys and question not in NAMING:
         names = "locate, distance, positions, support, vertices, layers and influence"
         raise ValueError(f"{question} is about points: --keys is for {names}")
     else:
-        _ask_about_points(client, name, question, points, keys, layer or 1, as_json)
+        _ask_about_points(hull, question, points, keys, layer or 1, as_json)
 
 
-def _shape(
-    client: "HullClient", name: str, question: Question, named: bool, layer: int | None
-) -> "Iterator[dict[str, Any]]":
+def _shape(hull: Any, name: str, question: Question, named: bool, layer: int | None) -> "Iterator[dict[str, Any]]":
     """The rows of an answer about the hull as a whole."""
     rows: list[dict[str, Any]]
     keys: Sequence[str | int] | None
     if question is Question.LAYERS:
-        peeled = client.layers(name, layer or DEFAULT_LAYERS, keys=named)
+        peeled = hull.layers(layer or DEFAULT_LAYERS, keys=named)
         rows = [
             {"layer": number, "vertex": vertex}
             for number, vertices in enumerate(peeled.layers, start=1)
@@ -141,15 +141,15 @@ def _shape(
         ]
         keys = None if peeled.keys is None else [key for of_layer in peeled.keys for key in of_layer]
     elif question is Question.INFLUENCE:
-        found = client.influence(name, keys=named)
+        found = hull.influence(keys=named)
         vertices, areas = found.vertices.tolist(), found.areas.tolist()
         order = sorted(range(len(areas)), key=lambda row: -areas[row])
         rows = [{"vertex": vertices[row], "area": areas[row]} for row in order]
         keys = None if found.keys is None else [found.keys[row] for row in order]
     else:
-        hull = client.get_hull(name, layer=layer or 1)
-        rows = [{"vertex": vertex} for vertex in hull.vertices.tolist()]
-        keys = hull.vertex_keys
+        found = hull.get_hull(layer=layer or 1)
+        rows = [{"vertex": vertex} for vertex in found.vertices.tolist()]
+        keys = found.vertex_keys
     if not named:
         yield from rows
         return
@@ -161,6 +161,7 @@ def _shape(
 
 def _ask_about_keys(
     client: "HullClient",
+    hull: Any,
     name: str,
     question: Question,
     arguments: list[str] | None,
@@ -172,19 +173,18 @@ def _ask_about_keys(
 
     keys = keys_for(client, keys_of or name, given_keys(arguments))
     if question is Question.POSITIONS:
-        answers = client.positions(name, keys).positions.tolist()
+        answers = hull.positions(keys).positions.tolist()
     elif question is Question.DISTANCE:
-        answers = client.distance(name, keys=keys, keys_of=keys_of, layer=layer).distances.tolist()
+        answers = hull.distance(keys=keys, keys_of=keys_of, layer=layer).distances.tolist()
     else:
-        located = client.locate(name, keys=keys, keys_of=keys_of, layer=layer)
+        located = hull.locate(keys=keys, keys_of=keys_of, layer=layer)
         answers = [SIDES[each] for each in located.sides.tolist()]
     for key, answer in zip(keys, answers, strict=True):
         typer.echo(json_line(asked=key, answer=answer) if as_json else tab_line(key, answer))
 
 
 def _ask_about_points(
-    client: "HullClient",
-    name: str,
+    hull: Any,
     question: Question,
     arguments: list[str] | None,
     named: bool,
@@ -196,10 +196,10 @@ def _ask_about_points(
     for rows in number_rows(given_or_read(arguments), 4 if question is Question.LINES else 2):
         answers: list[Any]
         if named:
-            found = client.support(name, rows, keys=True, layer=layer)
+            found = hull.support(rows, keys=True, layer=layer)
             answers = list(zip(found.vertices.tolist(), found.keys or (), strict=True))
         else:
-            answers = ANSWERS[question](client, name, rows, layer)
+            answers = ANSWERS[question](hull, rows, layer)
         for row, answer in zip(rows.tolist(), answers, strict=True):
             typer.echo(json_line(asked=row, answer=answer) if as_json else tab_line(row, answer))
 

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Request, Response, status
 from dynhull_client import HeldPosition, Hull, Quarantine
 
 from . import examples, schemas
+from .as_of import At, as_of
 from .bodies import GEOJSON, JSON, JsonRoute
 from .callers import Caller
 from .pages import page
@@ -52,10 +53,11 @@ async def get_hull(
     name: HullPath,
     response: Response,
     min_revision: MinRevision = 0,
+    at: At = None,
     f: Format = None,
 ) -> Any:
     """The vertices with their keys, the size and the measures of a hull."""
-    hull = await client.get_hull(name, min_revision=min_revision)
+    hull = await (await as_of(client, name, at)).get_hull(min_revision=min_revision)
     vary = {"Vary": "Accept"}
     if f == "geojson" or (f is None and _prefers_geojson(request)):
         shown = schemas.Feature.model_validate(feature(hull)).model_dump_json()

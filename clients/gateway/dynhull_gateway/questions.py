@@ -5,6 +5,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 
 from . import examples, schemas
+from .as_of import At, as_of
 from .bodies import JsonRoute
 from .callers import Caller
 from .schemas import AlloyPath, AssetsPath, HullPath, MinRevision, Name
@@ -35,105 +36,152 @@ def _about(question: schemas.AboutPointsOrKeys) -> dict[str, Any]:
 
 @router.post("/locate")
 async def locate(
-    client: Caller, name: HullPath, question: AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller,
+    name: HullPath,
+    question: AboutPointsOrKeys,
+    layer: Layer = 1,
+    min_revision: MinRevision = 0,
+    at: At = None,
 ) -> schemas.Located:
     """The side of each point or key: inside, on the boundary or outside. Exact."""
-    answer = await client.locate(name, **_about(question), layer=layer, min_revision=min_revision)
+    answer = await (await as_of(client, name, at)).locate(**_about(question), layer=layer, min_revision=min_revision)
     return schemas.Located.model_validate(answer)
 
 
 @router.post("/distance")
 async def distance(
-    client: Caller, name: HullPath, question: AboutPointsOrKeys, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller,
+    name: HullPath,
+    question: AboutPointsOrKeys,
+    layer: Layer = 1,
+    min_revision: MinRevision = 0,
+    at: At = None,
 ) -> schemas.Distances:
     """The distance of each point or key to the hull; of a geographic hull in metres."""
-    answer = await client.distance(name, **_about(question), layer=layer, min_revision=min_revision)
+    answer = await (await as_of(client, name, at)).distance(**_about(question), layer=layer, min_revision=min_revision)
     return schemas.Distances.model_validate(answer)
 
 
 @router.post("/count")
 async def count(
-    client: Caller, name: HullPath, question: schemas.AboutPoints, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: schemas.AboutPoints, min_revision: MinRevision = 0, at: At = None
 ) -> schemas.Counted:
     """How often the hull holds each point."""
-    return schemas.Counted.model_validate(await client.count(name, question.points, min_revision=min_revision))
+    return schemas.Counted.model_validate(
+        await (await as_of(client, name, at)).count(question.points, min_revision=min_revision)
+    )
 
 
 @router.post("/support")
 async def support(
-    client: Caller, name: HullPath, question: schemas.Directions, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller,
+    name: HullPath,
+    question: schemas.Directions,
+    layer: Layer = 1,
+    min_revision: MinRevision = 0,
+    at: At = None,
 ) -> schemas.Supported:
     """The extreme vertex in each direction. Exact."""
-    answer = await client.support(name, question.directions, keys=question.keys, layer=layer, min_revision=min_revision)
+    answer = await (await as_of(client, name, at)).support(
+        question.directions, keys=question.keys, layer=layer, min_revision=min_revision
+    )
     return schemas.Supported.model_validate(answer)
 
 
 @router.post("/tangents")
 async def tangents(
-    client: Caller, name: HullPath, question: schemas.AboutPoints, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller,
+    name: HullPath,
+    question: schemas.AboutPoints,
+    layer: Layer = 1,
+    min_revision: MinRevision = 0,
+    at: At = None,
 ) -> schemas.Tangents:
     """The tangent points seen from each point. Exact."""
     return schemas.Tangents.model_validate(
-        await client.tangents(name, question.points, layer=layer, min_revision=min_revision)
+        await (await as_of(client, name, at)).tangents(question.points, layer=layer, min_revision=min_revision)
     )
 
 
 @router.post("/intersect-lines")
 async def intersect_lines(
-    client: Caller, name: HullPath, question: schemas.Lines, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller,
+    name: HullPath,
+    question: schemas.Lines,
+    layer: Layer = 1,
+    min_revision: MinRevision = 0,
+    at: At = None,
 ) -> schemas.Crossings:
     """Where each line enters and leaves the hull."""
-    answer = await client.intersect_lines(
-        name, question.origins, question.targets, layer=layer, min_revision=min_revision
+    answer = await (await as_of(client, name, at)).intersect_lines(
+        question.origins, question.targets, layer=layer, min_revision=min_revision
     )
     return schemas.Crossings.model_validate(answer)
 
 
 @router.post("/positions")
 async def positions(
-    client: Caller, name: HullPath, question: schemas.AboutKeys, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, question: schemas.AboutKeys, min_revision: MinRevision = 0, at: At = None
 ) -> schemas.Positions:
     """The positions of keys."""
-    return schemas.Positions.model_validate(await client.positions(name, question.keys, min_revision=min_revision))
+    return schemas.Positions.model_validate(
+        await (await as_of(client, name, at)).positions(question.keys, min_revision=min_revision)
+    )
 
 
 @router.get("/entities")
-async def entities(client: Caller, name: HullPath, min_revision: MinRevision = 0) -> schemas.Entities:
+async def entities(client: Caller, name: HullPath, min_revision: MinRevision = 0, at: At = None) -> schemas.Entities:
     """All keys of a keyed hull with their positions, at one revision."""
-    return schemas.Entities.model_validate(await client.entities(name, min_revision=min_revision))
+    return schemas.Entities.model_validate(await (await as_of(client, name, at)).entities(min_revision=min_revision))
 
 
 @router.get("/sample")
 async def sample_points(
-    client: Caller, name: HullPath, size: SampleSize = 1000, keys: WithKeys = False, min_revision: MinRevision = 0
+    client: Caller,
+    name: HullPath,
+    size: SampleSize = 1000,
+    keys: WithKeys = False,
+    min_revision: MinRevision = 0,
+    at: At = None,
 ) -> schemas.Sampled:
     """A sample of the points, for drawing."""
-    answer = await client.sample_points(name, size, keys=keys, min_revision=min_revision)
+    answer = await (await as_of(client, name, at)).sample_points(size, keys=keys, min_revision=min_revision)
     return schemas.Sampled.model_validate(answer)
 
 
 @router.get("/layers")
 async def layers(
-    client: Caller, name: HullPath, count: LayerCount = 10, keys: WithKeys = False, min_revision: MinRevision = 0
+    client: Caller,
+    name: HullPath,
+    count: LayerCount = 10,
+    keys: WithKeys = False,
+    min_revision: MinRevision = 0,
+    at: At = None,
 ) -> schemas.Layers:
     """The outermost convex layers: each is the hull of the points left without the vertices of those before. Exact."""
-    return schemas.Layers.model_validate(await client.layers(name, count, keys=keys, min_revision=min_revision))
+    return schemas.Layers.model_validate(
+        await (await as_of(client, name, at)).layers(count, keys=keys, min_revision=min_revision)
+    )
 
 
 @router.get("/influence")
 async def influence(
-    client: Caller, name: HullPath, keys: WithKeys = False, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, keys: WithKeys = False, min_revision: MinRevision = 0, at: At = None
 ) -> schemas.Influence:
     """The area that the hull would lose without each of its vertices."""
-    return schemas.Influence.model_validate(await client.influence(name, keys=keys, min_revision=min_revision))
+    return schemas.Influence.model_validate(
+        await (await as_of(client, name, at)).influence(keys=keys, min_revision=min_revision)
+    )
 
 
 @router.get("/measures")
 async def get_measures(
-    client: Caller, name: HullPath, layer: Layer = 1, min_revision: MinRevision = 0
+    client: Caller, name: HullPath, layer: Layer = 1, min_revision: MinRevision = 0, at: At = None
 ) -> schemas.AllMeasures:
     """All measures: also diameter, width, smallest boxes and smallest circle."""
-    return schemas.AllMeasures.model_validate(await client.get_measures(name, layer=layer, min_revision=min_revision))
+    return schemas.AllMeasures.model_validate(
+        await (await as_of(client, name, at)).get_measures(layer=layer, min_revision=min_revision)
+    )
 
 
 @router.get("/series")
@@ -143,9 +191,9 @@ async def series(client: Caller, name: HullPath, last: Last = None) -> schemas.S
 
 
 @router.get("/verification")
-async def verify(client: Caller, name: HullPath, min_revision: MinRevision = 0) -> schemas.Verification:
+async def verify(client: Caller, name: HullPath, min_revision: MinRevision = 0, at: At = None) -> schemas.Verification:
     """Compare the live hull with one that Chan's algorithm computes from the stored points."""
-    return schemas.Verification.model_validate(await client.verify(name, min_revision=min_revision))
+    return schemas.Verification.model_validate(await (await as_of(client, name, at)).verify(min_revision=min_revision))
 
 
 @router.get("/separation")

@@ -19,6 +19,7 @@ from . import _errors
 from ._areas import Circle, Polygon, Prefix
 from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
+from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
 from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncWatch
 from ._async_writer import AsyncWriter
@@ -64,6 +65,7 @@ from ._messages import (
 from ._pipeline import Pipeline
 from ._quarantine_messages import HeldPosition, Quarantine
 from ._series import Series
+from ._sync_past import Past
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import FenceWatch, ManyWatch, Watch
 from ._writer import Writer
@@ -74,6 +76,7 @@ __all__ = [
     "AsyncHullClient",
     "AsyncIngest",
     "AsyncManyWatch",
+    "AsyncPast",
     "AsyncPipeline",
     "AsyncWatch",
     "AsyncWriter",
@@ -111,6 +114,7 @@ __all__ = [
     "ManyWatch",
     "Measured",
     "Measures",
+    "Past",
     "Phases",
     "Pipeline",
     "Points",

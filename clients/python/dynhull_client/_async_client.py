@@ -9,15 +9,18 @@ from . import _fences as fences
 from . import _history as past
 from . import _layers as peeling
 from . import _many as many
+from . import _past as past
 from . import _quarantine as quarantine
 from . import _series as kept
 from . import _uses as uses
 from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
+from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
 from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call, Pages
+from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 
 P = ParamSpec("P")
@@ -64,6 +67,19 @@ def _listing(
     return method
 
 
+def _past(
+    describe: Callable[P, Call[HullInfo]],
+) -> Callable[Concatenate["AsyncHullClient", P], Coroutine[Any, Any, AsyncPast]]:
+    """The coroutine that finds a hull as it was."""
+
+    async def method(self: "AsyncHullClient", /, *arguments: P.args, **options: P.kwargs) -> AsyncPast:
+        info = await self._connection.answer(described(describe, *arguments, **options))
+        return AsyncPast(self._connection, info)
+
+    documented(method, describe, "AsyncPast")
+    return method
+
+
 class AsyncHullClient(Client[AsyncConnection]):
     """A client of a dynhull server for asyncio; arguments and errors as for `HullClient`.
 
@@ -103,6 +119,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     influence = _answering(peeling.influence)
     get_measures = _answering(uses.get_measures)
     series = _answering(kept.series)
+    at = _past(past.at)
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)
     frontier = _answering(uses.frontier)

@@ -37,7 +37,7 @@ def _asking(describe: Callable[P, Call[Answer]]) -> Callable[Concatenate[AsyncPi
     def method(self: AsyncPipeline, /, *arguments: P.args, **options: P.kwargs) -> asyncio.Future[Answer]:
         return self._add(described(describe, *arguments, **options))
 
-    documented(method, describe, f"Future[{answer_of(describe)}]", without="timeout")
+    documented(method, describe, f"Future[{answer_of(describe)}]", without=("timeout",))
     return method
 
 

@@ -9,14 +9,17 @@ from . import _fences as fences
 from . import _history as past
 from . import _layers as peeling
 from . import _many as many
+from . import _past as past
 from . import _quarantine as quarantine
 from . import _series as kept
 from . import _uses as uses
 from ._calls import Call, Pages
 from ._connection import BlockingConnection
 from ._ingest import Ingest
+from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
+from ._sync_past import Past
 from ._watch import FenceWatch, ManyWatch, Watch
 from ._writer import Writer
 
@@ -56,6 +59,17 @@ def _listing(describe: Callable[P, Pages[Result]]) -> Callable[Concatenate["Hull
                 return
 
     documented(method, describe, f"Iterator[{answer_of(describe)}]")
+    return method
+
+
+def _past(describe: Callable[P, Call[HullInfo]]) -> Callable[Concatenate["HullClient", P], Past]:
+    """The method that finds a hull as it was."""
+
+    def method(self: "HullClient", /, *arguments: P.args, **options: P.kwargs) -> Past:
+        info = self._connection.answer(described(describe, *arguments, **options))
+        return Past(self._connection, info)
+
+    documented(method, describe, "Past")
     return method
 
 
@@ -117,6 +131,7 @@ class HullClient(Client[BlockingConnection]):
     influence = _answering(peeling.influence)
     get_measures = _answering(uses.get_measures)
     series = _answering(kept.series)
+    at = _past(past.at)
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)
     frontier = _answering(uses.frontier)

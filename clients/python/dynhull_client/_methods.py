@@ -1,7 +1,7 @@
 """What the methods of both clients have in common: they are made of functions as those in `_calls` and `_uses`."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from copy import copy
 from functools import cache
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar
@@ -75,12 +75,12 @@ class Annotation(str):
     __repr__ = str.__str__
 
 
-def documented(method: Function, describe: Function, returns: str, without: str = "") -> None:
-    """Give a method the name, documentation and parameters of the function that describes its call, but one.
+def documented(method: Function, describe: Function, returns: str, without: Collection[str] = ()) -> None:
+    """Give a method the name, documentation and parameters of the function that describes its call, but some.
 
     Annotations are shown as the source has them: numpy's ArrayLike alone fills five lines otherwise.
     """
-    parameters = [each for each in _parameters(describe) if each.name != without]
+    parameters = [each for each in _parameters(describe) if each.name not in without]
     method.__name__ = method.__qualname__ = describe.__name__
     method.__doc__ = _undocumented(describe.__doc__, without)
     method.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -100,12 +100,12 @@ def _parameters(describe: Function) -> list[inspect.Parameter]:
     ]
 
 
-def _undocumented(documentation: str | None, argument: str) -> str | None:
-    """The documentation without the line about an argument."""
-    if documentation is None or not argument:
+def _undocumented(documentation: str | None, arguments: Collection[str]) -> str | None:
+    """The documentation without the lines about some arguments."""
+    if documentation is None or not arguments:
         return documentation
     lines = documentation.splitlines(keepends=True)
-    return "".join(line for line in lines if not line.lstrip().startswith(f"{argument}:"))
+    return "".join(line for line in lines if line.lstrip().partition(":")[0] not in arguments)
 
 
 def described(describe: Callable[P, Description], *arguments: P.args, **options: P.kwargs) -> Description:

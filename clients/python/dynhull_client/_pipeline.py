@@ -39,7 +39,7 @@ def _asking(describe: Callable[P, Call[Answer]]) -> Callable[Concatenate[Pipelin
     def method(self: Pipeline, /, *arguments: P.args, **options: P.kwargs) -> Future[Answer]:
         return self._add(described(describe, *arguments, **options))
 
-    documented(method, describe, f"Future[{answer_of(describe)}]", without="timeout")
+    documented(method, describe, f"Future[{answer_of(describe)}]", without=("timeout",))
     return method
 
 

@@ -98,7 +98,7 @@ def _microseconds(times: Any, name: str) -> npt.NDArray[np.int64]:
             return values.astype("datetime64[us]").astype(np.int64)
         return _of_integers(values.astype(np.int64), name)
     rows = list(values)
-    micros = np.array([_microsecond(value, f"{name} row {row}") for row, value in enumerate(rows)], np.int64)
+    micros = np.array([as_microsecond(value, f"{name} row {row}") for row, value in enumerate(rows)], np.int64)
     if any(isinstance(value, int | np.integer) for value in rows):
         return _of_integers(micros, name)
     return micros
@@ -129,7 +129,8 @@ def _values(times: Any, name: str) -> Any:
     return np.asarray(times)
 
 
-def _microsecond(value: Any, name: str) -> int:
+def as_microsecond(value: Any, name: str) -> int:
+    """A time in microseconds since 1970; ValueError or TypeError as of `as_microseconds`."""
     if isinstance(value, np.datetime64) and not np.isnat(value):
         value = int(value.astype("datetime64[us]").astype(np.int64))
     if isinstance(value, datetime) and value == value:  # pandas.NaT differs from itself

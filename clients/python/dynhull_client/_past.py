@@ -1,0 +1,82 @@
+"""Hulls as they were: what both clients have in common."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from dynhull_proto.v1 import hull_service_pb2 as pb
+
+from . import _messages as messages
+from ._arguments import whole
+from ._calls import Call
+from ._methods import described, documented
+from ._times import as_microsecond
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ._messages import HullInfo
+
+Result = TypeVar("Result")
+When = int | str | datetime | np.datetime64
+
+
+def at(name: str, when: When | None = None, *, time: int | None = None, timeout: float | None = None) -> Call[HullInfo]:
+    """A hull as it was: an object with the reading methods, which take no name, and answer as of one revision.
+
+    It is a moment of the server's clock: that of the last revision committed at or before it. All answers are exactly
+    those of the hull while that revision was its newest.
+
+    Raises:
+        RevisionForgottenError: the server does not keep that moment any more, or it has not come.
+
+    Args:
+        name: the hull.
+        when: a revision; or a time, a datetime with a time zone or such a text of ISO 8601.
+        time: a time in microseconds since 1970, in place of `when`.
+        timeout: seconds, instead of the client's.
+    """
+    if (when is None) == (time is None):
+        raise TypeError("at takes either when, a revision or a time, or time, microseconds since 1970")
+    request = pb.GetHullRequest(name=name, view=pb.HULL_VIEW_BASIC)
+    if time is not None:
+        request.at_time.FromMicroseconds(as_microsecond(time, "time"))
+    elif isinstance(when, int | np.integer) and not isinstance(when, bool | np.bool_):
+        request.at_revision = whole("when", when, bits=64)
+    else:
+        request.at_time.FromMicroseconds(as_microsecond(when, "when"))
+    return Call("GetHull", request, lambda response: messages.decode_info(response.hull), timeout)
+
+
+class AsOf:
+    """What `Past` and `AsyncPast` have in common: one revision of a hull.
+
+    Attributes:
+        name: the name of the hull.
+        revision: the revision.
+        time: when it was committed; of revision 0, when the hull was created; None where that is not known.
+    """
+
+    def __init__(self, connection: Any, info: HullInfo) -> None:
+        self._connection = connection
+        self.name = info.name
+        self.revision = info.revision
+        self.time = info.changed
+
+    def __repr__(self) -> str:
+        return f"<{self.name} at revision {self.revision}{'' if self.time is None else f', {self.time.isoformat()}'}>"
+
+    def _call(self, describe: Callable[..., Call[Result]], arguments: Any, options: Any) -> Call[Result]:
+        """The call that asks about this revision."""
+        call = described(describe, self.name, *arguments, **options)
+        request: Any = call.request
+        request.at_revision = self.revision
+        return call
+
+
+def without_name(method: Any, describe: Callable[..., Any], returns: str) -> None:
+    """Document a method as the function that describes its call, whose first argument is the hull."""
+    documented(method, describe, returns, without=("name", "min_revision", "keys_of", "keys_min_revision"))

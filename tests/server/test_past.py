@@ -1,0 +1,208 @@
+"""Reads as of an earlier revision or time answer exactly what the hull answered then."""
+
+import asyncio
+import hashlib
+import json
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from server_process import run, server_process
+
+from dynhull_client import (
+    AsyncHullClient,
+    HullClient,
+    HullUnsuitableError,
+    InvalidRequestError,
+    LimitExceededError,
+    PermissionDeniedError,
+    Quarantine,
+    RevisionForgottenError,
+)
+
+BATCHES = 9
+KINDS = {
+    "plain": {},
+    "keyed": {"keyed": "str"},
+    "numbered": {"keyed": "int"},
+    "globe": {"geographic": True},
+    "globe-keyed": {"geographic": True, "keyed": "str"},
+    "newest": {"max_points": 25},
+    "recent": {"max_age": 20.0, "clock": "data"},
+    "recent-keyed": {"max_age": 20.0, "clock": "data", "keyed": "str"},
+    "quarantine": {"keyed": "str", "quarantine": Quarantine(max_growth=1.5)},
+}
+START = datetime(2026, 1, 1, tzinfo=UTC)
+XY = np.random.default_rng(7).normal(size=(12, 2))
+
+
+def write(client, name, rng, second):
+    """One random batch."""
+    n = int(rng.integers(1, 8))
+    xy = np.round(rng.normal(size=(n, 2)) * (1 + 3 * (rng.random() < 0.2)), 3)
+    times = [START + timedelta(seconds=second)] * n if name.startswith("recent") else None
+    if "keyed" in KINDS[name]:
+        keys = rng.permutation(15)[:n].tolist()
+        keys = [f"k{key}" for key in keys] if KINDS[name]["keyed"] == "str" else keys
+        client.put(name, keys, xy, times)
+        if rng.random() < 0.2:
+            client.remove(name, keys[:1], missing="count")
+    elif times is not None:
+        client.apply(name, insert=xy, times=times)
+    else:
+        client.apply(name, insert=xy)
+        if name != "newest" and rng.random() < 0.3:
+            client.apply(name, delete=xy[:1])
+    if KINDS[name].get("geographic") and rng.random() < 0.1:
+        client.recenter(name)
+
+
+def answers(hull, keyed):
+    """What a hull says to every kind of question, with its revision, as values that compare bit for bit."""
+    found = [
+        hull.get_hull(),
+        hull.locate(XY),
+        hull.support(XY),
+        hull.distance(XY),
+        hull.tangents(XY),
+        hull.get_measures(),
+        hull.count(XY),
+        hull.layers(2),
+        hull.influence(),
+        hull.sample_points(1000),
+    ]
+    if keyed:
+        found += [hull.entities(), hull.locate(keys=hull.entities().keys), hull.positions(hull.entities().keys)]
+    return [repr(each) for each in found]
+
+
+class Live:
+    """The reading methods of a client for one hull."""
+
+    def __init__(self, client, name):
+        self._client, self._name = client, name
+
+    def __getattr__(self, method):
+        return lambda *arguments, **options: getattr(self._client, method)(self._name, *arguments, **options)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A folder that a killed server has left, and what its hulls answered at each revision, and when."""
+    folder = str(tmp_path_factory.mktemp("past") / "data")
+    seen = {name: {} for name in KINDS}
+    rng = np.random.default_rng(3)
+    with server_process("--data", folder, killed=True) as server, HullClient(server.address) as client:
+        for name, settings in KINDS.items():
+            client.create_hull(name, **settings)
+            first = {"times": [START]} if name.startswith("recent") else {}
+            if "keyed" in settings:
+                client.put(name, ["first" if settings["keyed"] == "str" else 99], [(0.5, 0.5)], **first)
+            else:
+                client.apply(name, insert=[(0.5, 0.5)], **first)
+        for second in range(BATCHES):
+            for name in KINDS:
+                write(client, name, rng, second)
+                info = client.get_hull(name).info
+                seen[name][info.revision] = answers(Live(client, name), "keyed" in KINDS[name]), info.changed
+        server.process.kill()
+    return folder, seen
+
+
+@pytest.fixture(scope="module")
+def served(recorded):
+    folder, seen = recorded
+    with server_process("--data", folder, torn=True) as server:
+        yield server.address, seen
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_revision_answers_as_it_did(served, name):
+    address, seen = served
+    order = list(seen[name])
+    np.random.default_rng(1).shuffle(order)  # forward from kept ones, and back
+    with HullClient(address) as client:
+        for revision in order[:6]:
+            expected, changed = seen[name][revision]
+            past = client.at(name, revision)
+            assert (past.revision, past.time) == (revision, changed)
+            assert answers(past, "keyed" in KINDS[name]) == expected
+            assert client.at(name, changed).revision == revision
+            assert client.at(name, changed.isoformat()).revision == revision
+            assert past.verify().equal
+
+
+def test_the_past_is_read_while_writers_go_on(served):
+    address, seen = served
+    revisions = [revision for revision in seen["keyed"] if revision % 3 == 0]
+    with HullClient(address) as client, ThreadPoolExecutor() as threads:
+
+        def read(revision):
+            return answers(client.at("keyed", revision), True) == seen["keyed"][revision][0]
+
+        reads = [threads.submit(read, revision) for revision in revisions for _ in range(2)]
+        for number in range(20):
+            client.put("keyed", ["late"], [(float(number), 1.0)])
+        assert all(each.result() for each in reads)
+
+
+def test_what_is_not_there_is_refused_by_name(served):
+    address, _ = served
+    with HullClient(address) as client:
+        newest = client.get_hull("plain").info.revision
+        with pytest.raises(RevisionForgottenError, match=f"the newest {newest}"):
+            client.at("plain", newest + 1)
+        with pytest.raises(RevisionForgottenError, match="is not over by the server's clock"):
+            client.at("plain", datetime.now(UTC) + timedelta(days=1))
+        with pytest.raises(RevisionForgottenError, match="is before the oldest revision with a time, 0 of 20"):
+            client.at("plain", time=1)
+        with pytest.raises(InvalidRequestError, match="keys_of"):
+            client.at("keyed", newest - 1).locate(keys=["k1"], keys_of="quarantine")
+        with pytest.raises(ValueError, match="no time zone"):
+            client.at("plain", "2026-01-01T00:00")
+        assert len(client.at("plain", 0).get_hull().vertices) == 0
+
+
+def test_the_asyncio_client_and_the_command_line_read_the_past(served):
+    address, seen = served
+    revision = sorted(seen["keyed"])[4]
+
+    async def asked():
+        async with AsyncHullClient(address) as client:
+            past = await client.at("keyed", revision)
+            return repr(await past.get_hull())
+
+    assert asyncio.run(asked()) == seen["keyed"][revision][0][0]
+    with HullClient(address) as client:
+        area = client.at("keyed", revision).get_measures().area
+    for when in (str(revision), seen["keyed"][revision][1].isoformat()):
+        result = run("measure", "keyed", "--at", when, "--json", "--address", address)
+        assert (json.loads(result.stdout)["area"], json.loads(result.stdout)["revision"]) == (area, revision)
+
+
+def test_the_past_needs_a_permission_of_its_own_and_has_limits(tmp_path):
+    tokens = tmp_path / "tokens.toml"
+    lines = [
+        f'[[token]]\nsha256 = "{hashlib.sha256(name.encode()).hexdigest()}"\nread = [""]\nwrite = [""]\n{past}\n'
+        for name, past in (("now", ""), ("then", 'past = ["a"]'))
+    ]
+    tokens.write_text("".join(lines))
+    options = "--data", str(tmp_path / "data"), "--tokens", str(tokens), "--max-past-rows", "100", "--create-on-write"
+    with server_process(*options, complaints=None) as server, HullClient(server.address, token="now") as client:
+        for name in ("a", "b"):
+            client.apply(name, insert=XY)
+        client.apply("a", insert=np.random.default_rng(0).random((200, 2)))
+        for name, token in (("a", "now"), ("b", "then")):
+            with pytest.raises(PermissionDeniedError, match="read the past of"):
+                client.with_token(token).at(name, 1)
+        assert client.with_token("then").at("a", 1).count(XY).counts.tolist() == [1] * len(XY)
+        with pytest.raises(LimitExceededError, match="max_past_rows"):
+            client.with_token("then").at("a", 2)
+
+
+def test_a_server_in_memory_has_no_past(address, name):
+    with HullClient(address) as client:
+        client.create_hull(name)
+        with pytest.raises(HullUnsuitableError, match="has no past"):
+            client.at(name, 0)
