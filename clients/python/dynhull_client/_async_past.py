@@ -1,6 +1,7 @@
 """A hull as it was, for the asyncio client."""
 
 from collections.abc import Callable, Coroutine
+from datetime import datetime
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from . import _calls as calls
@@ -35,6 +36,10 @@ class AsyncPast(AsOf):
         revision: the revision.
         time: when it was committed; of revision 0, when the hull was created; None where that is not known.
     """
+
+    name: str
+    revision: int
+    time: datetime | None
 
     get_hull = _asking(calls.get_hull)
     locate = _asking(calls.locate)

@@ -1,6 +1,7 @@
 """A hull as it was, for the synchronous client."""
 
 from collections.abc import Callable
+from datetime import datetime
 from typing import Concatenate, ParamSpec, TypeVar
 
 from . import _calls as calls
@@ -33,6 +34,10 @@ class Past(AsOf):
         revision: the revision.
         time: when it was committed; of revision 0, when the hull was created; None where that is not known.
     """
+
+    name: str
+    revision: int
+    time: datetime | None
 
     get_hull = _asking(calls.get_hull)
     locate = _asking(calls.locate)

@@ -89,7 +89,7 @@ class PastHulls:
         oldest = await self._ask(live.name, partial(self._past.oldest_moment, number))
         if not oldest.revision <= revision <= newest:
             at = None if oldest.committed is None else oldest.committed.time
-            raise RevisionForgottenError(revision, oldest.revision, newest, at)
+            raise RevisionForgottenError(revision, oldest.revision, newest, at, "at_revision")
         return Moment(revision, None)
 
     @asynccontextmanager

@@ -189,7 +189,7 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     ),
     RevisionForgottenError: Refusal(
         "REVISION_FORGOTTEN",
-        lambda e: {"field": "resume.revision", "value": e.revision, "oldest": e.oldest, "newest": e.newest},
+        lambda e: {"field": e.field, "value": e.revision, "oldest": e.oldest, "newest": e.newest},
     ),
     SequenceAheadError: Refusal("SEQUENCE_AHEAD", lambda e: {"field": e.field, "value": e.sequence, "last": e.last}),
     SequenceGapError: Refusal(

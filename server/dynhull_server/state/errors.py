@@ -230,9 +230,17 @@ class RevisionForgottenError(RefusedError):
         revision: the revision.
         oldest: the oldest revision in the history.
         newest: the newest.
+        field: the field of the request that has the revision.
     """
 
-    def __init__(self, revision: int, oldest: int, newest: int, oldest_time: int | None = None) -> None:
+    def __init__(
+        self,
+        revision: int,
+        oldest: int,
+        newest: int,
+        oldest_time: int | None = None,
+        field: str = "resume.revision",
+    ) -> None:
         since = "" if oldest_time is None else f" of {_iso(oldest_time)}"
         super().__init__(
             f"revision {revision} is not in the history: the oldest is {oldest}{since}, the newest {newest}"
@@ -240,6 +248,7 @@ class RevisionForgottenError(RefusedError):
         self.revision = revision
         self.oldest = oldest
         self.newest = newest
+        self.field = field
 
 
 class MomentForgottenError(RefusedError):
