@@ -9,7 +9,7 @@ from . import _fences as fences
 from . import _history as past
 from . import _layers as peeling
 from . import _many as many
-from . import _past as past
+from . import _past as earlier
 from . import _quarantine as quarantine
 from . import _series as kept
 from . import _uses as uses
@@ -131,7 +131,7 @@ class HullClient(Client[BlockingConnection]):
     influence = _answering(peeling.influence)
     get_measures = _answering(uses.get_measures)
     series = _answering(kept.series)
-    at = _past(past.at)
+    at = _past(earlier.at)
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)
     frontier = _answering(uses.frontier)
