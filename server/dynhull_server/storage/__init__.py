@@ -1,1 +1,1 @@
-"""Where hulls are kept: the port, and its implementations in memory and on SQLite."""
+"""Where hulls are kept: the port, its implementations in memory and on SQLite, and segments, which have the past."""
