@@ -290,7 +290,7 @@ def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gat
         misspelled = gateway.get(url)
         assert (misspelled.status, misspelled.json["field"]) == (400, "layr")
         assert "did you mean layer?" in misspelled.json["detail"]
-    assert "here are min_revision" in gateway.get(f"{at}/verification?what=3").json["detail"]
+    assert "here are min_revision" in gateway.get(f"{at}/verification?another=3").json["detail"]
     assert "must be a name: 1 to 200 letters" in gateway.get("/hulls/bad%20name").json["detail"]
     assert (
         "must be PRODUCER:SEQUENCE" in gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number").json["detail"]

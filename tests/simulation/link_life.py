@@ -69,6 +69,7 @@ class LinkedServer(ShellServer):
             self._engine.hulls,
             metrics,
             ManyQuotas(Settings()),
+            Places("max_past_reads", MOST_CALLS, MOST_CALLS),
             create_on_write=True,
             max_watch_lag=math.inf,
         )

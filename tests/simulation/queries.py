@@ -45,8 +45,9 @@ class Queries:
         self._model = model
         metrics = Metrics()
         quotas = ManyQuotas(Settings())
+        past = Places("max_past_reads", MOST_CALLS, MOST_CALLS)
         self._service = HullService(
-            engine.driver, engine.hulls, metrics, quotas, create_on_write=False, max_watch_lag=math.inf
+            engine.driver, engine.hulls, metrics, quotas, past, create_on_write=False, max_watch_lag=math.inf
         )
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
         self._calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))
