@@ -69,12 +69,11 @@ def geojson(vertices: Points, max_segment: float | None = None) -> dict[str, Any
     """
     closed = len(vertices) > 2
     corners = as_tuples(boundary(vertices, max_segment))
-    match len(corners):
-        case 0:
-            return {"type": "Polygon", "coordinates": ()}
-        case 1:
-            ((lon, lat),) = corners
-            return {"type": "Point", "coordinates": (lon if abs(lon) <= 180 else _wrapped(lon), lat)}
+    if not corners:
+        return {"type": "Polygon", "coordinates": ()}
+    if len(corners) == 1:
+        ((lon, lat),) = corners
+        return {"type": "Point", "coordinates": (lon if abs(lon) <= 180 else _wrapped(lon), lat)}
     positions = _crossing(on_sheets(corners, closed=closed))
     if not closed:
         return _geometry("LineString", _lines(positions))

@@ -31,7 +31,8 @@ def geometry(vertices: Points) -> dict[str, Any]:
             return {"type": "Point", "coordinates": corners[0]}
         case 2:
             return {"type": "LineString", "coordinates": tuple(corners)}
-    return {"type": "Polygon", "coordinates": ((*corners, corners[0]),)}
+        case _:
+            return {"type": "Polygon", "coordinates": ((*corners, corners[0]),)}
 
 
 class Shown:

@@ -362,7 +362,8 @@ def _is_convex(geojson: Mapping[str, Any], points: Points, hull: Points) -> bool
             return len(hull) <= 2
         case "Polygon":  # a simple ring is convex if all of its corners are on the boundary of its hull
             return len(geojson["coordinates"]) == 1 and (len(hull) <= 2 or not ring_signs(hull, points).any())
-    return False
+        case _:
+            return False
 
 
 def point(p: npt.ArrayLike) -> Cloud:

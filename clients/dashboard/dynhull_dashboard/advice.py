@@ -36,10 +36,11 @@ def about_server(address: str, error: DynhullError) -> str:
             )
         case PermissionDeniedError():
             return f"{address} refuses the dashboard: {cause}. Start the dashboard with a --token that may read."
-    return (
-        f"No connection to {address}: {cause}. Check that the server runs (dynhull serve) and that the dashboard's "
-        "--address names it. The page shows what it last received, and reconnects by itself."
-    )
+        case _:
+            return (
+                f"No connection to {address}: {cause}. Check that the server runs (dynhull serve) and that the "
+                "dashboard's --address names it. The page shows what it last received, and reconnects by itself."
+            )
 
 
 def about_metrics(metrics: ServerMetrics | None) -> str:

@@ -54,6 +54,8 @@ class Scrape:
                         seconds = sample.value
                     case "dynhull_batch_duration_seconds_bucket":
                         buckets[float(sample.labels["le"])] = sample.value
+                    case _:
+                        continue
         return cls(at, updates, batches, seconds, buckets)
 
     def rates_since(self, before: Self) -> tuple[float, float, float]:

@@ -168,7 +168,8 @@ class ServedDivisions:
                 if not self._store.entitled():  # another one may have the hull, and the shard is deleted if nobody has
                     raise PeerAwayError("this worker may not own the partition any more")
                 return IsWanted(wanted)
-        raise TypeError(f"not a letter: {letter}")
+            case _:
+                raise TypeError(f"not a letter: {letter}")
 
     async def _found(self, greeting: Greeting) -> LocalShard:
         """The shard of a root, a new one if there is none."""

@@ -27,7 +27,7 @@ from ..shards import messages as say
 from ..shards.epochs import Epochs
 from ..shards.logs import FencedError
 from ..shards.placement import ShardAddress
-from ..shards.requests import RootRequest
+from ..shards.requests import AnyRootRequest
 from ..shards.root import Root, ShardsDifferError
 from .asked import Asked, AskedExpiry, AskedWrite, Asker
 from .logs import StoredRootLog
@@ -84,7 +84,7 @@ class RootThread:
         self._epochs = Epochs(epoch)
         self._root: Root | None = None
         self._log: StoredRootLog | None = None
-        self._backlog: list[RootRequest] = []
+        self._backlog: list[AnyRootRequest] = []
         self._refusal: Exception | None = None  # why every request is refused
         self._opened = False
 
@@ -163,7 +163,7 @@ class RootThread:
         backlog, self._backlog = self._backlog, []
         self._submit(backlog)
 
-    def _submit(self, requests: Sequence[RootRequest]) -> None:
+    def _submit(self, requests: Sequence[AnyRootRequest]) -> None:
         for request in requests:
             if isinstance(request, AskedWrite) and request.for_another_hull:
                 request.answer(error=HullNotFoundError(self._hull.name))
@@ -235,6 +235,6 @@ class RootThread:
         return None if isinstance(error, HullNotFoundError | StoppingError) else error
 
 
-def _refuse(requests: Sequence[RootRequest], error: Exception) -> None:
+def _refuse(requests: Sequence[AnyRootRequest], error: Exception) -> None:
     for request in requests:
         request.answer(error=error)

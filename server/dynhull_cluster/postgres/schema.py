@@ -6,7 +6,7 @@ and keys, and compressing them would take longer than writing them.
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, assert_never
 
 from psycopg.errors import InsufficientPrivilege, LockNotAvailable
 from psycopg.sql import Identifier
@@ -123,17 +123,20 @@ REPLACE_EVENTS = b"UPDATE events SET checksum = %s, payload = %b WHERE partition
 
 def queries_of(partition: int, statements: Sequence[Statement]) -> Iterator[Query]:
     """Changes of rows as SQL, in their order; rows that are inserted one after the other share statements."""
-    for (kind, table), run in groupby(statements, lambda each: (type(each), getattr(each, "table", ""))):
-        if kind is Insert:
-            for rows in _some([each.values for each in run if isinstance(each, Insert)]):
-                yield INSERT[table], [partition, *map(list, zip(*rows, strict=True))]
-            continue
+    for (_, table), run in groupby(statements, lambda each: (type(each), getattr(each, "table", ""))):
+        inserted = []
         for each in run:
             match each:
+                case Insert():
+                    inserted.append(each.values)
                 case Remove(_, places):
                     yield REMOVE[table], [partition, list(places)]
                 case Replace(place, checksum, payload):
                     yield REPLACE_EVENTS, [checksum, payload, partition, place]
+                case _:
+                    assert_never(each)
+        for rows in _some(inserted):
+            yield INSERT[table], [partition, *map(list, zip(*rows, strict=True))]
 
 
 def _some(rows: Sequence[tuple[Any, ...]]) -> Iterator[list[tuple[Any, ...]]]:
@@ -146,7 +149,8 @@ def _some(rows: Sequence[tuple[Any, ...]]) -> Iterator[list[tuple[Any, ...]]]:
             some, size = [], 0
         some.append(row)
         size += row_bytes
-    yield some
+    if some:
+        yield some
 
 
 def put_totals(connection: Connection, partition: int, totals: Totals) -> None:

@@ -64,3 +64,6 @@ class Read(RootRequest):
     """
 
     question: Question
+
+
+AnyRootRequest = RootWrite | ExpirePoints | Reshard | Read

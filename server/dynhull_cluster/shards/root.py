@@ -21,7 +21,7 @@ from .moving import puts
 from .parts import merged
 from .placement import SLOTS, Piece, ShardAddress, pieces
 from .planning import Plan, Planner
-from .requests import ExpirePoints, Read, Reshard, RootRequest, RootWrite
+from .requests import AnyRootRequest, ExpirePoints, Read, Reshard, RootWrite
 
 Round = dict[ShardAddress, say.Request]
 Effects = Mapping[int, say.Effect]
@@ -86,8 +86,8 @@ class Root:
         self._names: Names = {}  # the key of each shard that has this vertex
         self._totals = [ShardTotals(0, 0, None)] * shards
         self._numbers = [decided.steps.get(shard, 0) for shard in range(shards)]  # the last step in the log of each
-        self._waiting: deque[RootRequest] = deque()
-        self._current: list[RootRequest] = []
+        self._waiting: deque[AnyRootRequest] = deque()
+        self._current: list[AnyRootRequest] = []
         self._ticket = 0
         self._talk: Talk | None = self._open()
         self._sent: Round = {}
@@ -96,7 +96,7 @@ class Root:
 
     # Requests and messages
 
-    def submit(self, request: RootRequest) -> None:
+    def submit(self, request: AnyRootRequest) -> None:
         """Serve the request after those before it.
 
         Raises:
@@ -154,7 +154,7 @@ class Root:
         if begun:  # otherwise they are being opened
             self._begin_again()
 
-    def leave(self) -> tuple[list[RootRequest], list[RootRequest]]:
+    def leave(self) -> tuple[list[AnyRootRequest], list[AnyRootRequest]]:
         """The requests under way, and those that wait, for another root to serve: this one has failed."""
         current, waiting = self._current, list(self._waiting)
         self._current = []
@@ -203,13 +203,14 @@ class Root:
                 return self._reshard(request)
             case Read():
                 return self._read(request)
-        raise AssertionError(f"not a request: {request}")
+            case _:
+                assert_never(request)
 
     def _drop_abandoned(self) -> None:
         while self._waiting and (first := self._waiting[0]) and isinstance(first, RootWrite) and first.abandoned:
             self._waiting.popleft()
 
-    def _answer(self, request: RootRequest, result: Any = None, error: Exception | None = None) -> None:
+    def _answer(self, request: AnyRootRequest, result: Any = None, error: Exception | None = None) -> None:
         self._current.remove(request)
         request.answer(result, error)
 

@@ -103,7 +103,8 @@ def _decode_area(config: fence_pb2.FenceConfig, most_corners: int) -> Area:
             return _decode_circle(config.circle_area)
         case "polygon_area":
             return _decode_polygons(config.polygon_area, most_corners)
-    raise InvalidFieldError("config", "no area", "a fence needs a hull_area, polygon_area or circle_area")
+        case _:
+            raise InvalidFieldError("config", "no area", "a fence needs a hull_area, polygon_area or circle_area")
 
 
 def _decode_circle(circle: fence_pb2.CircleArea) -> CircleArea:
@@ -205,6 +206,8 @@ def decode_start(request: fence_service_pb2.WatchFenceRequest) -> WatchStart:
             if not request.only_new:
                 raise InvalidFieldError("only_new", "false", "true, or another start")
             return WatchStart()
-    if request.after_sequence > LARGEST_INTEGER:
-        raise InvalidFieldError("after_sequence", request.after_sequence, f"must be at most {LARGEST_INTEGER}")
-    return WatchStart(after=request.after_sequence)
+        case _:
+            after = request.after_sequence
+            if after > LARGEST_INTEGER:
+                raise InvalidFieldError("after_sequence", after, f"must be at most {LARGEST_INTEGER}")
+            return WatchStart(after=after)

@@ -236,6 +236,12 @@ def error_status(error: Exception, batch: int | None = None, within: str = "") -
             return _missing(error, "POINT_MISSING", field, error.point, "point to delete", where)
         case KeyMissingError():
             return _missing(error, "KEY_MISSING", f"{within}batch.removes", error.key, "key to remove", where)
+        case _:
+            return _refused(error, within, where)
+
+
+def _refused(error: Exception, within: str, where: dict[str, str]) -> Status:
+    """The status of an error of `REFUSALS`. Raises the error if it is none of them."""
     refusal = next((REFUSALS[each] for each in type(error).__mro__ if each in REFUSALS), None)
     if refusal is None:
         raise error

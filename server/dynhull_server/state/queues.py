@@ -335,4 +335,5 @@ def names_of(request: Any) -> Sequence[str]:
             return [part.name for part in request.parts]
         case ReadHull():
             return [request.hull.name]
-    return [request.name]
+        case _:
+            return [request.name]

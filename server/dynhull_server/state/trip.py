@@ -158,7 +158,8 @@ class Trip:
             case DeleteHull():
                 self._delete(request, leg)
                 return None
-        raise AssertionError(f"not a request: {request}")
+            case _:
+                raise AssertionError(f"not a request: {request}")
 
     def _delete(self, request: DeleteHull, leg: Leg) -> None:
         if self.fences is not None:

@@ -345,6 +345,8 @@ class MemoryStorage:
                     self._fences[number].events += events
             case PutDelays() | DropEvents() | PutConsumer() | DropConsumer():
                 self._change(self._fences[change.number], change)
+            case _:
+                raise TypeError(f"not a change or a step of this storage: {change}")
 
     def _append(self, change: Append) -> None:
         hull = self._hulls[change.number]

@@ -102,4 +102,5 @@ def _system(name: str, metadata: dict[bytes, bytes]) -> Any:
             return json.loads(metadata.get(value.encode(), b"null"))
         case "srid":
             return f"EPSG:{value}"
-    return name
+        case _:
+            return name

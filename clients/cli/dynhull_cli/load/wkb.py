@@ -50,10 +50,13 @@ class _Reader:
             case "Polygon":
                 rings = [self._vertices(self._take("I"), more) for _ in range(self._take("I"))]
                 return {"type": name, "coordinates": rings}
-        parts = [self.geometry() for _ in range(self._take("I"))]
-        if name == "GeometryCollection":
-            return {"type": name, "geometries": parts}
-        return {"type": name, "coordinates": [part["coordinates"] for part in parts]}
+            case "GeometryCollection":
+                return {"type": name, "geometries": self._parts()}
+            case _:
+                return {"type": name, "coordinates": [part["coordinates"] for part in self._parts()]}
+
+    def _parts(self) -> list[dict[str, Any]]:
+        return [self.geometry() for _ in range(self._take("I"))]
 
     def _take(self, kind: str) -> int:
         (value,) = struct.unpack_from(self._order + kind, self._data, self._at)
