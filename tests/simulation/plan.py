@@ -86,6 +86,13 @@ REQUESTS = (1, 2, 4, 8)
 # The share of plans with fences in which a client does what hardly ever comes together by chance.
 WITH_SCENES = 0.5
 
+# The share of acknowledgements after which the consumer acknowledges an earlier event, and how far it goes back.
+WITH_EARLIER_ACKS = 0.3
+EARLIER = (1, 3)
+
+# The share of plans with immediate commits in which a stream goes on after a batch that is refused.
+WITH_REFUSED_STREAMS = 0.3
+
 SWARM = (0, 1, 1, 5)
 
 # The share of the shell's plans in which a hull is recalled from the storage beside its deletion: by chance the two
@@ -173,6 +180,12 @@ def random_plan(seed: int, layer: str) -> Plan:
     scenes = random.Random(f"scenes {seed}")  # the other plans stay as they were
     if fences and scenes.random() < WITH_SCENES:
         _add_scene(scenes, plan, fences)
+    if fences:
+        _add_earlier_acks(random.Random(f"acks {seed}"), plan)
+    refused = random.Random(f"refused streams {seed}")
+    if immediate and refused.random() < WITH_REFUSED_STREAMS:
+        refused.choice(lives)["clients"].append(_refused_stream(refused, names[0]))
+        plan["limits"] |= {"max_hulls": 10, "max_points": 100}
     quarantine = random.Random(f"quarantine {seed}")
     held = [name for name in timed if name in QUARANTINED]
     if held and quarantine.random() < WITH_QUARANTINE:
@@ -353,6 +366,22 @@ def _few_events_dropped(draw: random.Random, name: str) -> list[Operation]:
     for _ in range(draw.randint(2, 5)):
         scene += [of_fence | {"do": "ack"}, _key_moves(draw, name), of_fence | {"do": "keep"}]
     return [*scene, of_fence | {"do": "follow"}]
+
+
+def _add_earlier_acks(draw: random.Random, plan: Plan) -> None:
+    """Consumers acknowledge events, and then earlier ones."""
+    for life in plan["lives"]:
+        for client in life["clients"]:
+            acks = [op for op in client if op["do"] == "ack" and draw.random() < WITH_EARLIER_ACKS]
+            for ack in acks:
+                client.insert(client.index(ack) + 1, ack | {"back": draw.choice(EARLIER)})
+
+
+def _refused_stream(draw: random.Random, name: str) -> list[Operation]:
+    """A stream of which a batch is refused, and a later one would not be. None waits for the answers before it."""
+    write = {"do": "write", "name": name, "create": name not in GLOBE, "numbered": False, "rows": 1}
+    batches = draw.randint(3, 6)
+    return [write, write | {"do": "stream", "delete": "nowhere", "batches": batches, "window": batches}]
 
 
 # The names of hulls of points, of hulls with keys or a window, and of fences.
