@@ -90,6 +90,9 @@ WITH_SCENES = 0.5
 WITH_EARLIER_ACKS = 0.3
 EARLIER = (1, 3)
 
+# The share of the engine's plans with fences in which one is deleted repeatedly, while old events are dropped.
+WITH_DELETED_FENCES = 0.3
+
 # The share of plans with immediate commits in which a stream goes on after a batch that is refused.
 WITH_REFUSED_STREAMS = 0.3
 
@@ -182,6 +185,12 @@ def random_plan(seed: int, layer: str) -> Plan:
         _add_scene(scenes, plan, fences)
     if fences:
         _add_earlier_acks(random.Random(f"acks {seed}"), plan)
+    deleted = random.Random(f"deleted fences {seed}")
+    compared = [name for name in fences if FENCED[name][0] != "other"]
+    if layer != "core" and compared and deleted.random() < WITH_DELETED_FENCES:
+        deleted.choice(lives)["clients"].append(_fence_deleted(deleted, deleted.choice(compared)))
+        plan["limits"] |= {"max_hulls": 10, "max_points": 100}
+        plan["fences"] |= {"max_fences": 10}
     refused = random.Random(f"refused streams {seed}")
     if immediate and refused.random() < WITH_REFUSED_STREAMS:
         refused.choice(lives)["clients"].append(_refused_stream(refused, names[0]))
@@ -375,6 +384,18 @@ def _add_earlier_acks(draw: random.Random, plan: Plan) -> None:
             acks = [op for op in client if op["do"] == "ack" and draw.random() < WITH_EARLIER_ACKS]
             for ack in acks:
                 client.insert(client.index(ack) + 1, ack | {"back": draw.choice(EARLIER)})
+
+
+def _fence_deleted(draw: random.Random, name: str) -> list[Operation]:
+    """A fence that keeps one event is deleted at any time from round to round of its keeping, and made again."""
+    write, create, fence, _ = _fence_of_scene(name, {"strips": 1, "holes": False})
+    fence["config"]["max_events"] = 1
+    scene = [write, create]
+    for _ in range(draw.randint(3, 6)):
+        moves = [_key_moves(draw, name) for _ in range(4)]
+        rest = {"do": "rest", "name": name, "seconds": draw.uniform(0.0, 1.0)}
+        scene += [fence, *moves, rest, {"do": "unfence", "name": name, "rows": 1}]
+    return scene
 
 
 def _refused_stream(draw: random.Random, name: str) -> list[Operation]:
