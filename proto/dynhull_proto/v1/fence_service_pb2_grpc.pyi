@@ -39,7 +39,8 @@ class FenceServiceStub:
     can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
-    create, replace or delete it; the right to read for the name of the fence for all else.
+    create, replace or delete it; the right to read for the name of the fence for all else. A fence that gives its hull of
+    subjects a centre needs the right to write for that hull, too.
     """
 
     @_typing.overload
@@ -83,7 +84,8 @@ class FenceServiceAsyncStub(FenceServiceStub):
     can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
-    create, replace or delete it; the right to read for the name of the fence for all else.
+    create, replace or delete it; the right to read for the name of the fence for all else. A fence that gives its hull of
+    subjects a centre needs the right to write for that hull, too.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -123,7 +125,8 @@ class FenceServiceServicer(metaclass=_abc_1.ABCMeta):
     can: its subjects that are inside leave, with the cause SUBJECT_REMOVED.
 
     A caller with a token needs the right to write for the name of the fence, and the right to read for the hulls it names, to
-    create, replace or delete it; the right to read for the name of the fence for all else.
+    create, replace or delete it; the right to read for the name of the fence for all else. A fence that gives its hull of
+    subjects a centre needs the right to write for that hull, too.
     """
 
     @_abc_1.abstractmethod

@@ -174,11 +174,12 @@ class Fences:
         names, more = page_of(self._driver.core.fences, prefixes, after, size)
         return [self.get(name) for name in names], more
 
-    async def create(self, name: str, config: FenceConfig) -> LiveFence:
-        """Create a fence, or raise the error that refuses it."""
+    async def create(self, name: str, config: FenceConfig, *, gives_center: bool = True) -> LiveFence:
+        """Create a fence, or raise the error that refuses it; `gives_center` as in CreateFence."""
         driver = self._driver
         checked = await self._checked(config)
-        request = CreateFence(Waiter(), name, driver.time(), config, driver.birth(), checked, rows=self._rows(config))
+        rows = self._rows(config)
+        request = CreateFence(Waiter(), name, driver.time(), config, driver.birth(), checked, gives_center, rows=rows)
         return self.live(await driver.ask(request))
 
     async def replace(self, name: str, config: FenceConfig) -> LiveFence:
@@ -218,17 +219,18 @@ class Fences:
     async def _checked(self, config: FenceConfig) -> CheckedArea | None:
         """The polygons of an area, checked while other requests run; None for other areas.
 
-        On the globe they are checked about the centre that the subjects have now; if that moves, once more.
+        On the globe they are checked about the centre that the subjects have now, or get; if that moves, once more.
         """
         area = config.area
         if not isinstance(area, PolygonArea):
             return None
         try:
-            center = None if config.kind == "prefix" else self._driver.core.get(config.subjects).state.center
+            subjects = None if config.kind == "prefix" else self._driver.core.get(config.subjects).state
         except HullNotFoundError:
-            center = None
+            subjects = None
+        globe = None if subjects is None else subjects.contents.globe
         await self._checks.acquire()
-        checking = asyncio.ensure_future(self._driver.aside(partial(check_polygons, area, center)))
+        checking = asyncio.ensure_future(self._driver.aside(partial(check_polygons, area, globe)))
         checking.add_done_callback(lambda _: self._checks.release())
         # A caller who leaves does not end it, nor free its thread.
         checked: CheckedArea = await asyncio.shield(checking)

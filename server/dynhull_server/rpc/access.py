@@ -72,9 +72,13 @@ class Access:
         if not name.startswith(self.past):
             raise PermissionDeniedError("read the past of", name)
 
+    def may_write(self, name: str) -> bool:
+        """Whether the hull may be written."""
+        return name.startswith(self.write)
+
     def require_write(self, name: str) -> None:
         """Raise PermissionDeniedError if the hull may not be written."""
-        if not name.startswith(self.write):
+        if not self.may_write(name):
             raise PermissionDeniedError("write", name)
 
     def readable(self, prefix: str) -> list[str]:
@@ -134,6 +138,10 @@ class Rights:
     def may_read(self, name: str) -> bool:
         """Whether the name may be told."""
         return self._access.may_read(name)
+
+    def may_write(self, name: str) -> bool:
+        """Whether the hull may be written, at this moment."""
+        return self._access.may_write(name)
 
     def readable(self, prefix: str) -> list[str]:
         """The prefixes of the readable names that begin with `prefix`."""

@@ -40,7 +40,8 @@ class FenceService:
         call.access.require_write(name)
         config = decode_fence(request, self._max_corners)
         _require_hulls(call, config)
-        return pb.CreateFenceResponse(fence=encode_fence(await self._fences.create(name, config), {}))
+        fence = await self._fences.create(name, config, gives_center=call.access.may_write(config.subjects))
+        return pb.CreateFenceResponse(fence=encode_fence(fence, {}))
 
     async def ReplaceFence(self, request: pb.ReplaceFenceRequest, call: Call) -> pb.ReplaceFenceResponse:
         name = decode_fence_name(request.name)

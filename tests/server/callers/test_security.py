@@ -17,6 +17,7 @@ from dynhull_client import (
     HullClient,
     HullFencedError,
     HullNotFoundError,
+    HullUnsuitableError,
     PermissionDeniedError,
     UnauthenticatedError,
     UnavailableError,
@@ -347,3 +348,17 @@ def test_a_refusal_names_no_fence_that_the_caller_may_not_read(guarded: Server) 
                     getattr(root, refused.__name__)("fleet/truck-9")
             root.delete_fence(fence)
         root.delete_hull("fleet/truck-9")
+
+
+def test_a_fence_gives_a_centre_only_to_hulls_that_its_maker_may_write(guarded: Server) -> None:
+    with HullClient(guarded.address, token=FLEET) as fleet, HullClient(guarded.address, token=ROOT) as root:
+        for name in ("fleet/boat", "fleet/truck-8"):
+            root.create_hull(name, keyed="str", geographic=True)
+        with pytest.raises(HullUnsuitableError, match="has no centre so far"):
+            fleet.create_fence("fleet/truck-boat", area=Circle(10, 50, 1), subjects="fleet/boat")
+        fleet.create_fence("fleet/truck-yard", area=Circle(10, 50, 1), subjects="fleet/truck-8")
+        found = root.get_hull("fleet/boat").info.center, root.get_hull("fleet/truck-8").info.center
+        assert found == (None, (10, 50))
+        root.delete_fence("fleet/truck-yard")
+        for name in ("fleet/boat", "fleet/truck-8"):
+            root.delete_hull(name)

@@ -162,15 +162,13 @@ def test_a_replaced_zone_and_those_that_expire(client, name):
 
 
 def test_fences_on_the_globe_that_cannot_be_are_refused(client, fleet, name):
-    plane, elsewhere, chosen = f"{name}-plane", f"{name}-elsewhere", f"{name}-chosen"
+    plane, elsewhere = f"{name}-plane", f"{name}-elsewhere"
     client.create_hull(plane, keyed="str")
     client.create_hull(elsewhere, keyed="str", geographic=True, center=(0, 0))
-    client.create_hull(chosen, keyed="str", geographic=True)
     for area, subjects, words in (
         (fleet, plane, "is a plane, and the other hull is geographic"),
         (plane, fleet, "is a plane, and the other hull is geographic"),
         (elsewhere, fleet, "has another centre"),
-        (ZONE, chosen, "has no centre so far: put its first points, or recenter it"),
         (ZONE, Prefix(name), "fences over a prefix are in the plane"),
     ):
         with pytest.raises(HullUnsuitableError, match=words):
@@ -195,6 +193,79 @@ def test_fences_on_the_globe_that_cannot_be_are_refused(client, fleet, name):
     client.create_hull(f"{name}-new/b", keyed="str")
 
 
+def mean_direction(places):
+    lon, lat = np.radians(places).T
+    x, y, z = (np.cos(lat) * np.cos(lon)).sum(), (np.cos(lat) * np.sin(lon)).sum(), np.sin(lat).sum()
+    return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))
+
+
+def test_a_fence_before_the_first_position_gives_its_middle_as_the_centre(client, name):
+    """Every kind of area; who enters is who is inside of the area by the library."""
+    zone = f"{name}-zone"
+    client.create_hull(zone, geographic=True, center=(181, -17.5))
+    client.apply(zone, insert=ZONE)
+    rng = np.random.default_rng(3)
+    places = rng.uniform([178, -19], [182, -15], (60, 2))
+    around = np.column_stack(WGS84.fwd([180.0] * 720, [-17.0] * 720, -np.arange(0, 360, 0.5), [80_000.0] * 720)[:2])
+    mean = mean_direction(ZONE)
+    for number, (area, center, corners) in enumerate(
+        [
+            (ZONE, mean, ZONE),
+            (Polygon([*ZONE, ZONE[0]]), mean, ZONE),
+            (Circle(180, -17, 80_000), (-180, -17), around),
+            (zone, (-179, -17.5), ZONE),
+        ]
+    ):
+        fleet, fence = f"{name}/{number}", f"{name}/fence{number}"
+        client.create_hull(fleet, keyed="int", geographic=True)
+        client.create_fence(fence, area=area, subjects=fleet, initial="none")
+        hull = client.get_hull(fleet).info
+        assert hull.revision == 1
+        assert [hull.center[0] % 360, hull.center[1]] == pytest.approx([center[0] % 360, center[1]], abs=1e-9)
+        client.create_fence(f"{fence}-second", area=Circle(170, -17, 10_000), subjects=fleet, initial="none")
+        client.put(fleet, range(60), places)
+        assert client.get_hull(fleet).info.center == hull.center
+        expected = dynhull.GeoHull(corners, center=hull.center).contains(places)
+        assert [event.key for event in told(client, fence)] == np.flatnonzero(expected).tolist()
+        verified = client.verify(fleet)
+        assert (verified.fences, verified.fence_differences) == (2, ())
+        with pytest.raises(InvalidRequestError, match="degrees from the centre"):
+            client.put(fleet, [60], [(0, 50)])
+
+
+def test_hulls_about_which_a_fence_asks_get_the_centre_of_the_area(client, name):
+    other, area = f"{name}-other", f"{name}-area"
+    client.create_hull(other, geographic=True)
+    client.create_hull(area, geographic=True, center=(180, -17))
+    client.apply(area, insert=ZONE)
+    client.create_fence(f"{name}/near", area=area, other_hull=other, initial="none")
+    assert client.get_hull(other).info.center == (-180, -17)
+    client.apply(other, insert=[(180, -17)])
+    assert [event.type for event in told(client, f"{name}/near")] == ["begin"]
+
+
+def test_a_fence_that_is_refused_gives_no_centre(client, name):
+    client.create_hull(name, keyed="str", geographic=True)
+    client.create_hull(f"{name}-bare", geographic=True)
+    client.create_hull(f"{name}-zone", geographic=True)
+    fence = f"{name}/fence"
+    for area, options, words in (
+        (Circle(180, -91, 5), {}, "a latitude is from -90 to 90"),
+        (Polygon([(179, -91), (180, 0), (178, 1)]), {}, r"exterior is 3 corners: has the corner \(179\.0, -91\.0\)"),
+        (Polygon([(0, 0), (1, 0), (179, 0)]), {}, "degrees from the centre"),
+        (Polygon([(0, 0), (2, 2), (2, 0), (0, 2)]), {}, "edges 0 and 2 cross"),
+        (ZONE, {"margin": 5}, "a fence on the globe has no margin"),
+    ):
+        with pytest.raises(InvalidRequestError, match=words):
+            client.create_fence(fence, area=area, subjects=name, **options)
+    for area, subjects in ((ZONE, f"{name}-bare"), (f"{name}-zone", name)):
+        with pytest.raises(HullUnsuitableError, match="has no centre so far"):
+            client.create_fence(fence, area=area, subjects=subjects)
+    for each in (name, f"{name}-bare", f"{name}-zone"):
+        hull = client.get_hull(each).info
+        assert (hull.center, hull.revision) == (None, 0)
+
+
 @pytest.mark.parametrize("sudden", [True, False])
 def test_a_restart_continues_the_events(tmp_path, sudden):
     options = ["--data", str(tmp_path / "data")]
@@ -202,15 +273,16 @@ def test_a_restart_continues_the_events(tmp_path, sudden):
     keys = [f"k{i}" for i in range(40)]
     moves = [rng.uniform([178, -19], [182, -15], (40, 2)) for _ in range(12)]
     with server_process(*options, killed=sudden) as server, HullClient(server.address) as client:
-        client.create_hull("fleet", keyed="str", geographic=True, center=(180, -17))
-        client.create_fence("zone", area=ZONE, subjects="fleet", initial="none")
+        client.create_hull("fleet", keyed="str", geographic=True)
         client.create_fence("circle", area=Circle(180, -17, 80_000), subjects="fleet", initial="none")
+        client.create_fence("zone", area=ZONE, subjects="fleet", initial="none")
         for points in moves[:6]:
             client.put("fleet", keys, points)
         if sudden:
             server.process.kill()
             server.process.wait(PATIENCE)
     with server_process(*options) as server, HullClient(server.address) as client:
+        assert client.get_hull("fleet").info.center == (-180, -17)  # that of the circle
         for points in moves[6:]:
             client.put("fleet", keys, points)
         events = told(client, "zone")

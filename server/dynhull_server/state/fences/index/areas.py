@@ -3,11 +3,14 @@
 import re
 
 from dynhull import FenceIndex, KeyedHull
+from dynhull.globe import Gnomonic
 
 from ...errors import InvalidFenceError
 from ...hull import Hull
+from ...records import Center
 from ..model.config import CircleArea, FenceConfig, PolygonArea
 from .checked import CheckedArea
+from .globe import middle
 from .subjects import Subjects, area_vertices, lay
 
 POINT_BYTES = 16
@@ -21,6 +24,17 @@ def check(config: FenceConfig, area: Hull | None, checked: CheckedArea | None) -
         lay(FenceIndex(KeyedHull("str")), 0, config, area_vertices(config, area), checked=checked)
     except ValueError as error:
         raise _invalid(config, str(error)) from None
+
+
+def center_for(config: FenceConfig, area: Hull | None, checked: CheckedArea | None) -> Center:
+    """The centre that the area of a fence gives to subjects without one, or raise InvalidFenceError."""
+    try:
+        center = middle(config.area, area)
+        index, vertices = FenceIndex(KeyedHull("str")), area_vertices(config, area)
+        lay(index, 0, config, vertices, frame=Gnomonic(center), checked=checked)
+    except ValueError as error:
+        raise _invalid(config, str(error)) from None
+    return center
 
 
 def lay_area(

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from dynhull.globe import Gnomonic
 from dynhull.polygons import CheckedPolygons
 
+from ...frames import Globe
 from ...records import Center
 from ..model.config import PolygonArea
-from .globe import projected, rings_of
+from .globe import middle, projected, rings_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +30,16 @@ class CheckedArea:
         return self.found
 
 
-def check_polygons(area: PolygonArea, center: Center | None) -> CheckedArea:
-    """Check the polygons of an area, in the projection about a centre or in the plane."""
-    frame = None if center is None else Gnomonic(center)
+def check_polygons(area: PolygonArea, globe: Globe | None) -> CheckedArea:
+    """Check the polygons of an area, in the frame of a geographic hull or in the plane.
+
+    A hull without a centre gets the middle of the area.
+    """
+    frame: Gnomonic | None = None
     found: CheckedPolygons | str
     try:
+        if globe is not None:
+            frame = globe.frame or Gnomonic(middle(area, None))
         rings = rings_of(area, None)
         found = CheckedPolygons(rings if frame is None else projected(frame, rings))
     except ValueError as error:

@@ -53,8 +53,42 @@ def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull | None
         raise HullUnsuitableError(
             subjects.name, f"has another centre: hulls of a fence on the globe have the same one, not {centers}"
         )
+    require_margin(config)
+
+
+def require_margin(config: FenceConfig) -> None:
+    """Raise InvalidFenceError if a fence on the globe has a margin."""
     if config.margin:
         raise InvalidFenceError("margin", config.margin, "a fence on the globe has no margin")  # nor without_self
+
+
+def lacks_center(area: Hull | None, subjects: Hull | None) -> bool:
+    """Whether the subjects of a fence are geographic and without a centre, which its area can give them."""
+    if subjects is None or not subjects.row.settings.geographic or subjects.state.center is not None:
+        return False
+    return area is None or area.state.center is not None
+
+
+def middle(area: Area, hull: Hull | None) -> Center:
+    """The middle of an area: the centre of a hull or of a circle, the mean direction of the corners of polygons.
+
+    Args:
+        area: the area.
+        hull: the hull that is the area, with a centre; None for other areas.
+
+    Raises:
+        ValueError: the centre of a circle, or a corner, is no place.
+    """
+    if hull is not None:
+        assert hull.state.center is not None
+        return hull.state.center
+    if isinstance(area, CircleArea):
+        _require_places(np.array([[area.x, area.y]]), "the centre is")
+        return area.x, area.y
+    exteriors = [without_border(polygon[0]) for polygon in rings_of(area, None)]
+    for number, corners in enumerate(exteriors):
+        _require_places(corners, f"polygon {number} ring 0 has the corner")
+    return Gnomonic.about(np.unique(np.vstack(exteriors), axis=0)).center  # a ring may be closed by its first corner
 
 
 def require_circle(frame: Gnomonic, area: CircleArea) -> None:
@@ -126,6 +160,12 @@ def compared(a: Points, b: Points, limit: float, center: Center) -> tuple[bool, 
 def corners_of(ring: Ring) -> Points:
     """The corners of a ring."""
     return np.frombuffer(ring, "<f8").astype(np.float64).reshape(-1, 2)
+
+
+def _require_places(lonlat: Points, words: str) -> None:
+    misplaced = off_globe(lonlat)
+    if misplaced is not None:
+        raise ValueError(f"{words} {misplaced.place}: {misplaced.problem}")
 
 
 def _projected(frame: Gnomonic, ring: Points, name: str) -> Points:

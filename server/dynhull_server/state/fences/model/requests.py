@@ -42,11 +42,13 @@ class CreateFence(FenceRequest):
         config: its settings.
         birth: its identity.
         checked: the polygons of its area, if they have been checked.
+        gives_center: whether subjects without a centre get the middle of the area, which writes to their hull.
     """
 
     config: FenceConfig
     birth: Birth
     checked: CheckedArea | None = None
+    gives_center: bool = True
 
 
 @dataclass(slots=True, eq=False)

@@ -5,9 +5,9 @@ from dataclasses import replace
 from ...errors import FenceExistsError, HullNotFoundError, HullUnsuitableError, InvalidFenceError, LimitExceededError
 from ...hull import Hull
 from ..events.sequences import Swap
-from ..index.areas import check, lay_area
+from ..index.areas import center_for, check, lay_area
 from ..index.checked import CheckedArea
-from ..index.globe import require_frames
+from ..index.globe import lacks_center, require_frames, require_margin
 from ..index.pair import Pair
 from ..index.subjects import Subjects
 from ..model.config import FenceConfig
@@ -59,6 +59,8 @@ class Definition:
         waits = _waits(config, 0, request.time)
         fence = Fence(FenceRow(number, request.name, request.birth.uid, request.birth.created, config, waits))
         fence.area = self._area(config)
+        if config.kind != "prefix" and request.gives_center:
+            self._give_center(request, fence.area)
         require_frames(config, fence.area, None if config.kind == "prefix" else self._hull(config.subjects))
         if config.kind == "other":
             assert fence.area is not None  # checked by the caller
@@ -162,6 +164,17 @@ class Definition:
             raise HullNotFoundError(name)
         _require_whole(hull)
         return hull
+
+    def _give_center(self, request: CreateFence, area: Hull | None) -> None:
+        """Give subjects that are geographic and have no centre the middle of the area, as a revision of their hull."""
+        config = request.config
+        subjects = self._hull(config.subjects)
+        if not lacks_center(area, subjects) or (config.kind == "hull" and subjects.row.settings.identity == "multiset"):
+            return
+        require_margin(config)
+        center = center_for(config, area, request.checked)
+        self._comparison.applied = True
+        subjects.state.recenter(center, self._ground.hulls[config.subjects].records)
 
     def _subjects(self, config: FenceConfig, checked: CheckedArea | None) -> list[Subjects]:
         """The hulls whose keys a new fence compares, by name."""
