@@ -1,6 +1,7 @@
 """The settings of the server, defined once for flags, environment, file and help."""
 
 import ipaddress
+import re
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, Self
@@ -11,6 +12,7 @@ from .storage.databases import examples, is_database, kind_of, names
 from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"  # of environment variables
+NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
 EVERY_ADDRESS = "0.0.0.0", "::"  # noqa: S104  (to refuse them)
 
 
@@ -222,7 +224,15 @@ class Settings(BaseModel):
     @field_validator("metrics_prefix", mode="before")
     @classmethod
     def _separated(cls, value: object) -> object:
-        return value.split(",") if isinstance(value, str) else value
+        return [each.strip() for each in value.split(",")] if isinstance(value, str) else value
+
+    @field_validator("metrics_prefix")
+    @classmethod
+    def _of_names(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for prefix in value:
+            if not NAME_CHARACTERS.fullmatch(prefix):
+                raise ValueError(f'no name begins with {prefix!r}: names consist of letters, digits and "._-/"')
+        return value
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -15,13 +15,13 @@ from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
 from ..engine.layers import MOST_LAYERS
 from ..engine.positions import Position, decode_position
 from ..engine.rosters import Choice
+from ..settings import NAME_CHARACTERS
 from ..state.contents.deadlines import Key
 from ..state.frames import off_globe
 from .readings import Reading
 
 NAME = re.compile(r"[A-Za-z0-9._/-]{1,200}")
 NAME_WORDS = '1 to 200 of the letters a to z and A to Z, digits and "._-/"'
-NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
 DEFAULT_PAGE = 100
 LARGEST_PAGE = 1000
 DEFAULT_SAMPLE = 1000

@@ -7,12 +7,12 @@ import numpy as np
 
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
+from ..settings import NAME_CHARACTERS
 from ..state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, Initial, PolygonArea, Ring, SubjectKind
 from . import encode_fence
 from .decode import (
     LARGEST_INTEGER,
     NAME,
-    NAME_CHARACTERS,
     NAME_WORDS,
     InvalidFieldError,
     decode_layer,

@@ -53,7 +53,7 @@ def test_a_setting_of_several_values_comes_from_everywhere(tmp_path: Path, monke
     file.write_text('metrics_prefix = ["fleet/"]\n')
     assert shown()["metrics_prefix"] == ("[]", "default")
     assert shown("--config", str(file))["metrics_prefix"] == ('["fleet/"]', str(file))
-    monkeypatch.setenv("DYNHULL_METRICS_PREFIX", "fleet/,tram/")
+    monkeypatch.setenv("DYNHULL_METRICS_PREFIX", "fleet/, tram/")
     assert shown("--config", str(file))["metrics_prefix"] == ('["fleet/", "tram/"]', "DYNHULL_METRICS_PREFIX")
     flags = ("--metrics-prefix", "a/", "--metrics-prefix", "")
     assert shown("--config", str(file), *flags)["metrics_prefix"] == ('["a/", ""]', "flag")
@@ -95,6 +95,7 @@ def test_the_server_uses_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         ("prot = 1", "prot: there is no such setting; did you mean port?"),
         ('max_hulls = "many"', "max_hulls = 'many': Input should be a valid integer"),
         ("port 1", "settings.toml"),
+        ('metrics_prefix = ["fleet/*"]', "no name begins with 'fleet/*': names consist of letters"),
     ],
 )
 def test_a_wrong_file_is_explained(tmp_path: Path, text: str, message: str) -> None:
