@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from dynhull_client import ManyChange, ManyWatch
+from dynhull_client import DynhullError, ManyChange, ManyWatch
 
 from .closed_pipe import when_pipe_closes
 from .json_lines import json_line, members
@@ -42,6 +42,11 @@ class Followed:
         if self._error is not None:
             raise self._error
         return list(self._states.copy().values())
+
+    @property
+    def lost(self) -> DynhullError | None:
+        """Why the states may be old: the connection is lost. None while it is not."""
+        return self._watch.lost
 
     def _run(self) -> None:
         try:
@@ -77,8 +82,7 @@ def _show(console: Console, what: str, watch: ManyWatch, changes: Iterator[ManyC
     states: dict[str, ManyChange] = {}
 
     def table() -> Table:
-        lost = Text(f"connection lost, trying again: {watch.lost}", "red") if watch.lost else None
-        shown = Table(title=f"{len(states):,} hulls {what}, the last changed first", caption=lost)
+        shown = Table(title=f"{len(states):,} hulls {what}, the last changed first", caption=lost_caption(watch.lost))
         shown.add_column("hull")
         for heading in HEADINGS:
             shown.add_column(heading, justify="right")
@@ -91,6 +95,11 @@ def _show(console: Console, what: str, watch: ManyWatch, changes: Iterator[ManyC
             states.pop(change.hull, None)
             if change.kind == "state":
                 states[change.hull] = change
+
+
+def lost_caption(lost: DynhullError | None) -> Text | None:
+    """What to say below a table while the connection of its watch is lost."""
+    return Text(f"connection lost, trying again: {lost}", "red") if lost else None
 
 
 def _cells(state: ManyChange) -> list[str]:

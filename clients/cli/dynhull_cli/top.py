@@ -12,7 +12,7 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from dynhull_client import HullClient, ManyChange
+    from dynhull_client import DynhullError, HullClient, ManyChange
 
 from .connected import AsJson, connected
 from .json_lines import json_line
@@ -52,13 +52,13 @@ def top(
 
     console = Console(highlight=False)
     live = console.is_terminal and not as_json
-    tables = islice(_readings(client, prefix, interval), looks if looks or live else 1)
+    readings = islice(_readings(client, prefix, interval), looks if looks or live else 1)
     if live:
         with Live(console=console, auto_refresh=False) as screen:
-            for table in tables:
-                screen.update(_shown(table[:rows]), refresh=True)
+            for table, lost in readings:
+                screen.update(_shown(table[:rows], lost), refresh=True)
         return
-    for table in tables:
+    for table, _ in readings:
         for row in listed(table[:rows], below("hulls", prefix)):
             state = row.state
             if as_json:
@@ -68,8 +68,8 @@ def top(
                 typer.echo(tab_line(state.hull, state.revision, state.points, state.distinct, row.batches, row.growth))
 
 
-def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[list[Row]]:
-    """All hulls after each interval, the busiest first, then the largest."""
+def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[tuple[list[Row], "DynhullError | None"]]:
+    """All hulls after each interval, the busiest first, then the largest; and why they may be old."""
     from .many import Followed
 
     with client.watch_many(prefix, max_rate=max(10.0, 2 / interval)) as watch:
@@ -84,14 +84,16 @@ def _readings(client: "HullClient", prefix: str, interval: float) -> Iterator[li
                 passed = now - then
                 grown = (state.points - last.points) / passed
                 rows.append(Row(state, (state.revision - last.revision) / passed, grown))
-            yield sorted(rows, key=lambda row: (-row.batches, -row.state.points, row.state.hull))
+            yield sorted(rows, key=lambda row: (-row.batches, -row.state.points, row.state.hull)), followed.lost
             before, then = {state.uid: state for state in states}, now
 
 
-def _shown(rows: list[Row]) -> "Table":
+def _shown(rows: list[Row], lost: "DynhullError | None") -> "Table":
     from rich.table import Table
 
-    table = Table()
+    from .many import lost_caption
+
+    table = Table(caption=lost_caption(lost))
     table.add_column("hull")
     for heading in ("revision", "points", "distinct", "batches/s", "points/s"):
         table.add_column(heading, justify="right")
