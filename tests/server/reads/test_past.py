@@ -6,6 +6,7 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
+import grpc
 import numpy as np
 import pytest
 from server_process import run, server_process
@@ -13,6 +14,7 @@ from server_process import run, server_process
 from dynhull_client import (
     AsyncHullClient,
     HullClient,
+    HullNotFoundError,
     HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
@@ -20,6 +22,8 @@ from dynhull_client import (
     Quarantine,
     RevisionForgottenError,
 )
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 BATCHES = 9
 KINDS = {
@@ -162,6 +166,50 @@ def test_what_is_not_there_is_refused_by_name(served):
         with pytest.raises(ValueError, match="no time zone"):
             client.at("plain", "2026-01-01T00:00")
         assert len(client.at("plain", 0).get_hull().vertices) == 0
+
+
+def test_points_and_what_is_held_are_read_as_they_were(served):
+    address, _ = served
+    seen = []
+    with grpc.insecure_channel(address) as channel, HullClient(address) as client:
+        stub = HullServiceStub(channel)
+
+        def listed(**moment):
+            points = list(stub.ReadPoints(pb.ReadPointsRequest(name="held", **moment)))
+            held = stub.ListHeld(pb.ListHeldRequest(name="held", **moment))
+            return [each.SerializeToString(deterministic=True) for each in (*points, held)]
+
+        client.create_hull("held", keyed="str", quarantine=Quarantine(max_growth=1.5, confirmations=0))
+        client.put("held", ["a", "b", "c"], [(0, 0), (1, 0), (0, 1)])
+        seen.append((client.get_hull("held").info.revision, listed()))
+        client.put("held", ["d"], [(50, 50)])
+        seen.append((client.get_hull("held").info.revision, listed()))
+        assert [each.key for each in client.list_held("held")] == ["d"]
+        client.release("held", ["d"])
+        seen.append((client.get_hull("held").info.revision, listed()))
+        for revision, expected in reversed(seen):
+            assert listed(at_revision=revision) == expected
+
+
+def test_a_hull_that_is_made_again_has_nothing_of_the_one_before(served):
+    address, _ = served
+    with HullClient(address) as client:
+        client.create_hull("again", keyed="str")
+        client.put("again", ["old"], [(1, 1)])
+        client.put("again", ["old"], [(2, 2)])
+        before = client.at("again", 1)
+        assert list(before.entities().keys) == ["old"]  # it is kept for further reads
+        ended = before.time
+        client.delete_hull("again")
+        with pytest.raises(HullNotFoundError):
+            before.entities()
+        client.create_hull("again", keyed="str")
+        client.put("again", ["new"], [(3, 3)])
+        assert list(client.at("again", 1).entities().keys) == ["new"]
+        with pytest.raises(RevisionForgottenError, match="the newest 1"):
+            client.at("again", 2)
+        with pytest.raises(RevisionForgottenError, match="is before the oldest revision with a time, 0 of 20"):
+            client.at("again", ended)
 
 
 def test_the_asyncio_client_and_the_command_line_read_the_past(served):
