@@ -113,7 +113,7 @@ REASONS: Mapping[str, Reason] = {
     "HULL_REPLACED": Reason(
         Code.OUT_OF_RANGE,
         "HullReplacedError",
-        "A watch cannot resume: the hull was restored from a backup, or deleted and created again.",
+        "A watch cannot resume, or a past is gone: the hull was restored from a backup, or deleted and created again.",
     ),
     "HULL_UNSUITABLE": Reason(
         Code.FAILED_PRECONDITION,

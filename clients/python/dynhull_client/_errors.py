@@ -171,7 +171,7 @@ class RevisionForgottenError(DynhullError, LookupError):
 
 
 class HullReplacedError(RevisionForgottenError):
-    """A watch cannot resume: the hull was restored from a backup, or deleted, and another one has its name."""
+    """A watch cannot resume, or a past is gone: the hull was restored from a backup, or deleted and created again."""
 
 
 class FenceNotFoundError(DynhullError, LookupError):

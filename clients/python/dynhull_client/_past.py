@@ -65,6 +65,7 @@ class AsOf:
         self.name = info.name
         self.revision = info.revision
         self.time = info.changed
+        self._uid = info.uid
 
     def __repr__(self) -> str:
         return f"<{self.name} at revision {self.revision}{'' if self.time is None else f', {self.time.isoformat()}'}>"
@@ -74,6 +75,7 @@ class AsOf:
         call = described(describe, self.name, *arguments, **options)
         request: Any = call.request
         request.at_revision = self.revision
+        request.at_uid = self._uid
         return call
 
 

@@ -180,7 +180,7 @@ class ReshardResponse(_message.Message):
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ...) -> None: ...
 
 class ListHeldRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "page_size", "page_token", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "encoding", "page_size", "page_token", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
@@ -188,6 +188,7 @@ class ListHeldRequest(_message.Message):
     PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
@@ -195,7 +196,8 @@ class ListHeldRequest(_message.Message):
     page_token: str
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class ListHeldResponse(_message.Message):
     __slots__ = ("revision", "keys", "positions", "times", "speeds", "growths", "revisions", "confirmations", "held_count", "next_page_token")
@@ -400,7 +402,7 @@ class GetProducerResponse(_message.Message):
     def __init__(self, last_sequence: _Optional[int] = ..., uid: _Optional[str] = ...) -> None: ...
 
 class LocateRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
@@ -410,6 +412,7 @@ class LocateRequest(_message.Message):
     LAYER_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
@@ -419,7 +422,8 @@ class LocateRequest(_message.Message):
     layer: int
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class LocateResponse(_message.Message):
     __slots__ = ("revision", "sides", "keys_revision")
@@ -432,18 +436,20 @@ class LocateResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., sides: _Optional[bytes] = ..., keys_revision: _Optional[int] = ...) -> None: ...
 
 class CountRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "points", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class CountResponse(_message.Message):
     __slots__ = ("revision", "counts")
@@ -454,20 +460,22 @@ class CountResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ...) -> None: ...
 
 class GetPositionsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "keys", "encoding", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "keys", "encoding", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     keys: _points_pb2.Keys
     encoding: _points_pb2.PointEncoding
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class GetPositionsResponse(_message.Message):
     __slots__ = ("revision", "positions", "present", "times")
@@ -482,18 +490,20 @@ class GetPositionsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., present: _Optional[bytes] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
 
 class ReadEntitiesRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class ReadEntitiesResponse(_message.Message):
     __slots__ = ("revision", "keys", "positions", "times")
@@ -508,18 +518,20 @@ class ReadEntitiesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
 
 class ReadPointsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class ReadPointsResponse(_message.Message):
     __slots__ = ("revision", "hull", "points", "keys", "times", "timed", "expire_times", "expires")
@@ -542,7 +554,7 @@ class ReadPointsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., timed: _Optional[bytes] = ..., expire_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., expires: _Optional[bytes] = ...) -> None: ...
 
 class SupportRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys", "layer", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys", "layer", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
@@ -551,6 +563,7 @@ class SupportRequest(_message.Message):
     LAYER_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     directions: _points_pb2.Points
@@ -559,7 +572,8 @@ class SupportRequest(_message.Message):
     layer: int
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class SupportResponse(_message.Message):
     __slots__ = ("revision", "vertices", "keys")
@@ -572,7 +586,7 @@ class SupportResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class TangentsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "encoding", "layer", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "points", "encoding", "layer", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
@@ -580,6 +594,7 @@ class TangentsRequest(_message.Message):
     LAYER_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
@@ -587,7 +602,8 @@ class TangentsRequest(_message.Message):
     layer: int
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class TangentsResponse(_message.Message):
     __slots__ = ("revision", "left", "right")
@@ -600,7 +616,7 @@ class TangentsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class DistanceRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "points", "keys", "keys_of", "keys_min_revision", "layer", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
@@ -610,6 +626,7 @@ class DistanceRequest(_message.Message):
     LAYER_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
@@ -619,7 +636,8 @@ class DistanceRequest(_message.Message):
     layer: int
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., keys_of: _Optional[str] = ..., keys_min_revision: _Optional[int] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class DistanceResponse(_message.Message):
     __slots__ = ("revision", "distances", "keys_revision")
@@ -632,7 +650,7 @@ class DistanceResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., distances: _Optional[_Iterable[float]] = ..., keys_revision: _Optional[int] = ...) -> None: ...
 
 class IntersectLinesRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "origins", "targets", "encoding", "layer", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "origins", "targets", "encoding", "layer", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ORIGINS_FIELD_NUMBER: _ClassVar[int]
@@ -641,6 +659,7 @@ class IntersectLinesRequest(_message.Message):
     LAYER_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     origins: _points_pb2.Points
@@ -649,7 +668,8 @@ class IntersectLinesRequest(_message.Message):
     layer: int
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., origins: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., targets: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class IntersectLinesResponse(_message.Message):
     __slots__ = ("revision", "entries", "exits")
@@ -662,7 +682,7 @@ class IntersectLinesResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., exits: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class GetHullRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys", "layer", "vertex_page_size", "vertex_page_token", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "encoding", "view", "include_keys", "layer", "vertex_page_size", "vertex_page_token", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
@@ -673,6 +693,7 @@ class GetHullRequest(_message.Message):
     VERTEX_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
@@ -683,7 +704,8 @@ class GetHullRequest(_message.Message):
     vertex_page_token: str
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., vertex_page_size: _Optional[int] = ..., vertex_page_token: _Optional[str] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., view: _Optional[_Union[HullView, str]] = ..., include_keys: bool = ..., layer: _Optional[int] = ..., vertex_page_size: _Optional[int] = ..., vertex_page_token: _Optional[str] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class GetHullResponse(_message.Message):
     __slots__ = ("hull", "vertices", "measures", "vertex_keys", "next_vertex_page_token")
@@ -700,7 +722,7 @@ class GetHullResponse(_message.Message):
     def __init__(self, hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., next_vertex_page_token: _Optional[str] = ...) -> None: ...
 
 class SamplePointsRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "sample_size", "encoding", "include_keys", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "sample_size", "encoding", "include_keys", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     SAMPLE_SIZE_FIELD_NUMBER: _ClassVar[int]
@@ -708,6 +730,7 @@ class SamplePointsRequest(_message.Message):
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     sample_size: int
@@ -715,7 +738,8 @@ class SamplePointsRequest(_message.Message):
     include_keys: bool
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., sample_size: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., sample_size: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class SamplePointsResponse(_message.Message):
     __slots__ = ("revision", "points", "keys")
@@ -728,7 +752,7 @@ class SamplePointsResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class GetLayersRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "layer_count", "encoding", "include_keys", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "layer_count", "encoding", "include_keys", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     LAYER_COUNT_FIELD_NUMBER: _ClassVar[int]
@@ -736,6 +760,7 @@ class GetLayersRequest(_message.Message):
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     layer_count: int
@@ -743,7 +768,8 @@ class GetLayersRequest(_message.Message):
     include_keys: bool
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., layer_count: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., layer_count: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class GetLayersResponse(_message.Message):
     __slots__ = ("revision", "vertex_counts", "vertices", "vertex_keys")
@@ -758,20 +784,22 @@ class GetLayersResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., vertex_counts: _Optional[_Iterable[int]] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class GetInfluenceRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "include_keys", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "encoding", "include_keys", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     include_keys: bool
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_keys: bool = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class GetInfluenceResponse(_message.Message):
     __slots__ = ("revision", "vertices", "areas", "vertex_keys")
@@ -786,20 +814,22 @@ class GetInfluenceResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., vertices: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., areas: _Optional[_Iterable[float]] = ..., vertex_keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class GetMeasuresRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "layer", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "encoding", "layer", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     LAYER_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     layer: int
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., layer: _Optional[int] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class GetMeasuresResponse(_message.Message):
     __slots__ = ("revision", "measures", "diameter", "width", "min_box", "min_perimeter_box", "min_circle_x", "min_circle_y", "min_circle_radius", "label_x", "label_y", "geographic")
@@ -906,20 +936,22 @@ class SeparateResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., other_revision: _Optional[int] = ..., intersect: bool = ..., distance: _Optional[float] = ..., depth: _Optional[float] = ..., normal_x: _Optional[float] = ..., normal_y: _Optional[float] = ..., offset: _Optional[float] = ..., closest: _Optional[_Union[_points_pb2.Points, _Mapping]] = ...) -> None: ...
 
 class PhaseDiagramRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "entries", "encoding", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "entries", "encoding", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENTRIES_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     entries: _points_pb2.Points
     encoding: _points_pb2.PointEncoding
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., entries: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class PhaseDiagramResponse(_message.Message):
     __slots__ = ("revision", "stable", "energies_above_hull", "left", "right", "left_shares", "right_shares")
@@ -940,7 +972,7 @@ class PhaseDiagramResponse(_message.Message):
     def __init__(self, revision: _Optional[int] = ..., stable: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., energies_above_hull: _Optional[_Iterable[float]] = ..., left: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., right: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., left_shares: _Optional[_Iterable[float]] = ..., right_shares: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class FrontierRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "points", "rates", "encoding", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "points", "rates", "encoding", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
@@ -948,6 +980,7 @@ class FrontierRequest(_message.Message):
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     points: _points_pb2.Points
@@ -955,7 +988,8 @@ class FrontierRequest(_message.Message):
     encoding: _points_pb2.PointEncoding
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., rates: _Optional[_Iterable[float]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., rates: _Optional[_Iterable[float]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class FrontierResponse(_message.Message):
     __slots__ = ("revision", "efficient", "turning_rates", "dominated", "tangencies", "sharpe_ratios")
@@ -1246,18 +1280,20 @@ class HullProgress(_message.Message):
     def __init__(self) -> None: ...
 
 class VerifyRequest(_message.Message):
-    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time")
+    __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time", "at_uid")
     NAME_FIELD_NUMBER: _ClassVar[int]
     MIN_REVISION_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
     AT_REVISION_FIELD_NUMBER: _ClassVar[int]
     AT_TIME_FIELD_NUMBER: _ClassVar[int]
+    AT_UID_FIELD_NUMBER: _ClassVar[int]
     name: str
     min_revision: int
     encoding: _points_pb2.PointEncoding
     at_revision: int
     at_time: _timestamp_pb2.Timestamp
-    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    at_uid: str
+    def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class VerifyResponse(_message.Message):
     __slots__ = ("revision", "equal", "point_count", "vertex_count", "rounds", "first_difference", "keys_equal", "fence_count", "fence_differences")

@@ -23,7 +23,7 @@ from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
 from ..engine.watch import watch
 from ..engine.watch_many import watch_many
-from ..state.errors import HullEmptyError, HullFencedError, LimitExceededError, PartRefusedError
+from ..state.errors import HullEmptyError, HullFencedError, HullReplacedError, LimitExceededError, PartRefusedError
 from ..state.frames import require_lines, require_reach
 from ..state.records import Contents
 from . import answers, decode, encode
@@ -589,6 +589,8 @@ class HullService:
         if moment is None:
             return hull
         call.access.require_past(hull.name)
+        if request.at_uid and request.at_uid != hull.uid:
+            raise HullReplacedError(hull.name, hull.uid, "at_uid")
         return await self._hulls.past(hull, *moment, partial(self._pasts.take, call.owner))
 
     def _written(self, call: Call, name: str) -> str:

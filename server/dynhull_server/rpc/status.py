@@ -169,7 +169,7 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     HullExistsError: Refusal("HULL_EXISTS", _name, HULL_TYPE),
     HullFencedError: Refusal("HULL_FENCED", lambda e: {"value": e.name, "fence": e.fence}),
     HullNotFoundError: Refusal("HULL_NOT_FOUND", _name, HULL_TYPE),
-    HullReplacedError: Refusal("HULL_REPLACED", lambda e: {"field": "resume.uid", "value": e.name, "uid": e.uid}),
+    HullReplacedError: Refusal("HULL_REPLACED", lambda e: {"field": e.field, "value": e.name, "uid": e.uid}),
     HullUnsuitableError: Refusal(
         "HULL_UNSUITABLE", lambda e: {"field": e.field or None, "value": e.name, "point": e.point}
     ),

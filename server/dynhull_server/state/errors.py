@@ -291,10 +291,12 @@ class HullReplacedError(RefusedError):
     Attributes:
         name: the name.
         uid: the uid of the present hull.
+        field: what named the hull before.
     """
 
-    def __init__(self, name: str, uid: str) -> None:
+    def __init__(self, name: str, uid: str, field: str = "resume.uid") -> None:
         super().__init__(f"the hull {name!r} was created again, or restored from a backup: its uid is now {uid}")
+        self.field = field
         self.name = name
         self.uid = uid
 

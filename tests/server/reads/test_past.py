@@ -15,6 +15,7 @@ from dynhull_client import (
     AsyncHullClient,
     HullClient,
     HullNotFoundError,
+    HullReplacedError,
     HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
@@ -205,6 +206,8 @@ def test_a_hull_that_is_made_again_has_nothing_of_the_one_before(served):
             before.entities()
         client.create_hull("again", keyed="str")
         client.put("again", ["new"], [(3, 3)])
+        with pytest.raises(HullReplacedError):
+            before.entities()
         assert list(client.at("again", 1).entities().keys) == ["new"]
         with pytest.raises(RevisionForgottenError, match="the newest 1"):
             client.at("again", 2)
