@@ -107,6 +107,8 @@ FOLLOWED_ELSEWHERE = {
     "--client-key": "test_commands.py: test_tls",
     "dynhull serve": "every test with a server",
     "--config": "ogrinfo of GDAL",
+    "--at": "test_pages.py: the page as-of",
+    "--last": "test_series.py: the lines of an hour",
     "--history": "test_history.py: the past that a hull keeps",
     "--history-bytes": "test_history.py: the past that a hull keeps",
     "--help": "test_main.py: test_help_lists_the_commands",
