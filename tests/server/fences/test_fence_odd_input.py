@@ -261,7 +261,7 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
         "config.margin",
         "1.0",
     ),
-    "no centre": (create(subject_hull="odd/nowhere"), FAILED, "", "odd/nowhere"),
+    "no centre": (create(subject_hull="odd/ships", hull_area={"name": "odd/nowhere"}), FAILED, "", "odd/nowhere"),
     "a prefix of the globe": (create(subject_prefix="odd/ship"), FAILED, "", "odd/ships"),
     "another centre": (create(subject_hull="odd/ships", hull_area={"name": "odd/atlantic"}), FAILED, "", "odd/ships"),
     "an area of the plane": (
