@@ -15,7 +15,7 @@ from dynhull.arrays import Points
 from dynhull.keys import PackedKeys, key_list
 
 from .state.records import FOREVER, NO_TIME, Contents, Times
-from .storage.sqlite.disk import make_durable
+from .storage.durable import make_durable
 
 ROWS_A_STEP = 100_000
 HALF_TURN = 180.0

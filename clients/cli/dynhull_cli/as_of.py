@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dynhull_surface.as_of import Present, moment_of
+
 if TYPE_CHECKING:
     from dynhull_client import HullClient
 
@@ -16,26 +18,8 @@ At = Annotated[
 ]
 
 
-class Present:
-    """The reading methods of a client for one hull, without its name.
-
-    Args:
-        client: the client.
-        name: the hull.
-    """
-
-    def __init__(self, client: "HullClient", name: str) -> None:
-        self._client = client
-        self._name = name
-
-    def __getattr__(self, method: str) -> Any:
-        from functools import partial
-
-        return partial(getattr(self._client, method), self._name)
-
-
 def as_of(client: "HullClient", name: str, at: str | None) -> Any:
     """What reads a hull: as it is, or as it was."""
     if at is None:
         return Present(client, name)
-    return client.at(name, int(at) if at.isdecimal() and at.isascii() else at)
+    return client.at(name, moment_of(at))

@@ -21,6 +21,7 @@ from ..state.errors import (
 from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
+from ..state.records import CommitStamp
 from ..state.root_state import state_of
 from ..storage.past import Moment, Past, created
 from .divided_hull import DividedHull
@@ -225,7 +226,7 @@ class PastHull(LiveHull):
         return self._counts
 
     @property
-    def committed(self) -> Any:
+    def committed(self) -> CommitStamp | None:
         """The commit of its revision; None where it is not known."""
         return self._stamp
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from secrets import token_hex
 from typing import NamedTuple
 
+from ..durable import TEMPORARY, make_durable, write_durably
 from ..port import DamagedError, StorageError
 
 BATCHES, STATE = ".batches.parquet", ".state.parquet"
-TEMPORARY = ".part"
 HISTORY = "history"  # the folder within a data folder, unless another one is named
 DIGEST_BYTES = 16
 NEEDS = "needs pyarrow: pip install 'dynhull[history]'"
@@ -61,14 +61,8 @@ class Archive:
         for folder in (self.path, path.parent):
             if not folder.is_dir():
                 folder.mkdir(parents=True, exist_ok=True)
-                _sync(folder.parent)
-        part = path.with_name(path.name + TEMPORARY)
-        with part.open("wb") as opened:
-            opened.write(content)
-            opened.flush()
-            os.fsync(opened.fileno())
-        part.rename(path)
-        _sync(path.parent)
+                make_durable(folder.parent)
+        write_durably(path, content)
         return Written(len(content), _digest(content))
 
     def read(self, file: str, size: int, digest: str) -> bytes:
@@ -127,16 +121,8 @@ class Archive:
     def sync(self) -> None:
         """Make the names of all files durable."""
         for folder in [self.path.parent, self.path, *(each for each in self.path.iterdir() if each.is_dir())]:
-            _sync(folder)
+            make_durable(folder)
 
 
 def _digest(content: bytes) -> str:
     return blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

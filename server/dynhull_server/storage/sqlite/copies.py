@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...state.records import HullRow, HullSettings, Kept
+from ..durable import make_durable
 from ..port import NEWEST, DamagedError, FormatError, LockedError, Progress, StorageError
 from ..rows import divided
 from ..rows.divided import DatabaseView, NoLongerKeptError, Whole, dropping
@@ -21,7 +22,7 @@ from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
 from ..segments.archive import HISTORY, Archive
-from .disk import Disk, OpenMode, make_durable
+from .disk import Disk, OpenMode
 from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
 from .migration import begin_anew, change, make_tables, migrate

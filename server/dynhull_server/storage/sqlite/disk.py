@@ -7,6 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO
 
+from ..durable import write_durably
 from .birth import birth
 
 # Seconds that a statement waits for locks of other connections, unless the connection says otherwise.
@@ -70,11 +71,7 @@ class Disk:
 
     def write(self, file: Path, content: bytes) -> None:
         """Give a small file this content, durably; after a crash it has this or the one before."""
-        part = file.with_name(f"{file.name}.part")
-        part.write_bytes(content)
-        make_durable(part)
-        part.replace(file)
-        make_durable(file.parent)
+        write_durably(file, content)
 
     def open(self, file: Path) -> IO[bytes]:
         """Open a file for reading, or for `sync`."""
@@ -88,12 +85,3 @@ class Disk:
         """A connection to a database, usable from any thread, by one at a time."""
         address = f"{database.absolute().as_uri()}?{access.value}"
         return sqlite3.connect(address, uri=True, isolation_level=None, check_same_thread=False, timeout=LOCK_SECONDS)
-
-
-def make_durable(path: Path) -> None:
-    """Sync the content of a file, or the names in a folder."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
