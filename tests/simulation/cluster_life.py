@@ -146,13 +146,14 @@ class Process:
     Attributes:
         alive: whether it has not ended.
         stopped: whether it stands still, as after SIGSTOP.
+        leaves: whether it has begun to end as planned.
         core: its hulls, once it serves them.
         port: where it listens.
     """
 
     def __init__(self, world: "World", site: Site, worker: str, entry: Entry) -> None:
         self.world, self.site, self.worker, self.entry = world, site, worker, entry
-        self.alive, self.stopped = True, False
+        self.alive, self.stopped, self.leaves = True, False, False
         self.core: CoreServer | None = None
         self.port = 0
         self._doomed = False
@@ -230,6 +231,7 @@ class Process:
 
     def leave(self) -> None:
         """End as planned: nothing begins any more, then the partition is free."""
+        self.leaves = True
         self.world.stop_listening(self)
 
         def release() -> None:
@@ -458,14 +460,15 @@ class World:
             compare(self._settled(site).core.core, site.model)
 
     def _settled(self, site: Site) -> Process:
-        """Who serves a site, and has nothing left to do."""
+        """Who serves a site, and has nothing left to do, once those that leave have ended."""
         found: list[Process] = []
 
         def is_settled() -> bool:
             served = [each for each in self.listening.values() if each.site is site and each.ownership.holds()]
             known = [each for each in served if site.addresses._known.get(PARTITION, (0,) * 5)[4] == each.port]
             found[:] = [each for each in known if each.runs and each.core is not None and not each.core.core.busy]
-            return len(found) == len(served) == 1
+            ending = any(each.alive and each.leaves and each.site is site for each in self.processes)
+            return len(found) == len(served) == 1 and not ending
 
         self._until(is_settled, f"an owner of {site.name}")
         return found[0]
