@@ -57,7 +57,7 @@ CORNERS = 8
 NO_SNAPSHOTS = 10**12
 AT_ONCE = 64  # fences created at a time
 STALLED, CROSSING, WRITES = 8, 16, 250  # watches that never read, subjects that cross in a write, writes of a block
-HISTORY_BYTES = 2**20
+EVENT_BYTES = 2**20
 REST = 0.3  # seconds
 NO_READING_AHEAD = [("grpc.http2.bdp_probe", 0)]
 MOVES = 2**18  # of a run, if these limits on its batches allow
@@ -350,7 +350,7 @@ def stalled(folder: Path, pairs: int) -> None:
     found: dict[bool, list[tuple[float, ...]]] = {False: [], True: []}
     with ExitStack() as stack:
         # Little memory for recent events, which are there in either case: it is full before the first pair.
-        address = started(stack, folder / "stalled", "--fence-history-bytes", str(HISTORY_BYTES))
+        address = started(stack, folder / "stalled", "--fence-event-bytes", str(EVENT_BYTES))
         # gRPC reads ahead of who does not read, the more the faster the connection is: not here.
         channel = stack.enter_context(grpc.insecure_channel(address, NO_READING_AHEAD))
         stub, fence_stub = stack.enter_context(durability.service(address)), FenceServiceStub(channel)

@@ -48,7 +48,7 @@ random = np.random.default_rng(1)
 Draw = Callable[[int], np.ndarray]
 BATCH = 1000
 COUNTS = (2, 4, 8, 16)
-LIMITS = Limits(max_hulls=1, max_points=2**62, max_producers=1, max_producers_per_caller=1, history_bytes=0)
+LIMITS = Limits(max_hulls=1, max_points=2**62, max_producers=1, max_producers_per_caller=1, resume_bytes=0)
 
 
 def uniform(n: int) -> np.ndarray:

@@ -22,7 +22,7 @@ from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-OPTIONS = ["-m", "dynhull_server", "--port", "0", "--scrub-cpu", "0", "--log-level", "warning", "--history-bytes", "0"]
+OPTIONS = ["-m", "dynhull_server", "--port", "0", "--scrub-cpu", "0", "--log-level", "warning", "--resume-bytes", "0"]
 UNLIMITED = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
 VERTICES, ROWS = 3_000, 200_000
 RESUMED, WATCHERS, BATCHES = 1_000_000, 12, 200

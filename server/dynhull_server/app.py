@@ -103,14 +103,14 @@ class Server:
             max_points=settings.max_points,
             max_producers=settings.max_producers,
             max_producers_per_caller=settings.max_producers_per_caller,
-            history_bytes=settings.history_bytes,
+            resume_bytes=settings.resume_bytes,
             max_past_rows=settings.max_past_rows,
             fences=FenceLimits(
                 max_fences=settings.max_fences,
                 max_fence_consumers=settings.max_fence_consumers,
                 max_fence_events=settings.max_fence_events,
                 max_fence_event_age=settings.max_fence_event_age,
-                fence_history_bytes=settings.fence_history_bytes,
+                fence_event_bytes=settings.fence_event_bytes,
             ),
         )
         self._storage = storage

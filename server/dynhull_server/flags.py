@@ -8,7 +8,7 @@ from typing import Annotated, Any, get_origin
 
 import typer
 
-from .settings import PREFIX, Settings
+from .settings import PREFIX, RENAMED, Settings
 
 
 def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callable[..., None]:
@@ -16,11 +16,13 @@ def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callab
 
     def run(config: Path | None, **given: Any) -> None:
         from .failure import fail
-        from .setting_sources import SettingsError, load, origins
+        from .setting_sources import SettingsError, load, old_names, origins
 
         flags = {name: value for name, value in given.items() if value not in (None, [])}
         try:
             settings, where = load(flags, config), origins(flags, config)
+            for line in old_names(flags, config):
+                typer.echo(f"warning: {line}", err=True)
         except SettingsError as error:
             fail(str(error))
         command(settings, where)
@@ -32,6 +34,8 @@ def with_settings(command: Callable[[Settings, dict[str, str]], None]) -> Callab
         option = typer.Option(help=field.description, show_default=default)
         several = get_origin(field.annotation) is tuple
         parameters.append(_parameter(name, list[str] if several else field.annotation, option))
+    for old, name in RENAMED.items():
+        parameters.append(_parameter(old, Settings.model_fields[name].annotation, typer.Option(hidden=True)))
     run.__doc__ = command.__doc__
     run.__name__ = command.__name__
     run.__annotations__ = {each.name: each.annotation for each in parameters}

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict, TomlConfigSettingsSource
+from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
 
-from .settings import PREFIX, Settings
+from .settings import PREFIX, RENAMED, Settings
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -34,13 +34,13 @@ class SettingsError(Exception):
 
 def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
     """The settings from flags, environment and file, or raise SettingsError."""
-    read_file(file)
     _refuse_ignored(flags)
-
+    in_file = with_present_names(read_file(file))
+    renamed = {RENAMED[old]: os.environ[variable] for old, variable in old_variables().items()}
     ignored = set(service_links())
 
     class Sources(Settings, BaseSettings):
-        model_config = SettingsConfigDict(env_prefix=PREFIX, toml_file=file, enable_decoding=False)
+        model_config = SettingsConfigDict(env_prefix=PREFIX, enable_decoding=False)
 
         @classmethod
         def settings_customise_sources(
@@ -50,12 +50,13 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
             named = dict(zip(("init_settings", "env_settings"), sources, strict=False)) | more
 
             def environment() -> dict[str, Any]:
-                return {name: value for name, value in named["env_settings"]().items() if name not in ignored}
+                found = renamed | named["env_settings"]()
+                return {name: value for name, value in found.items() if name not in ignored}
 
-            return named["init_settings"], environment, TomlConfigSettingsSource(settings_cls)  # type: ignore[return-value]
+            return named["init_settings"], environment, InitSettingsSource(settings_cls, in_file)  # type: ignore[return-value]
 
     try:
-        return Sources(**flags)
+        return Sources(**with_present_names(flags))
     except ValidationError as error:
         sources = origins(flags, file)
         lines = [_explained(each, sources, file) for each in error.errors()]
@@ -64,8 +65,9 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
 
 def origins(flags: Mapping[str, Any], file: Path | None) -> dict[str, str]:
     """The origin of each setting."""
-    in_file = read_file(file)
+    in_file, flags = with_present_names(read_file(file)), with_present_names(flags)
     variables, ignored = {name.upper() for name in os.environ}, service_links()
+    renamed = {RENAMED[old]: variable for old, variable in old_variables().items()}
     origins = {}
     for name in Settings.model_fields:
         variable = f"{PREFIX}{name.upper()}"
@@ -73,9 +75,33 @@ def origins(flags: Mapping[str, Any], file: Path | None) -> dict[str, str]:
             origins[name] = "flag"
         elif variable in variables and name not in ignored:
             origins[name] = variable
+        elif name in renamed:
+            origins[name] = renamed[name]
         else:
             origins[name] = str(file) if name in in_file else "default"
     return origins
+
+
+def with_present_names(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of one source under the names that they have now; SettingsError if one has both of its names."""
+    for old, new in RENAMED.items():
+        if old in values and new in values:
+            raise SettingsError(f"{old} is the former name of {new}: leave it out")
+    return {RENAMED.get(name, name): value for name, value in values.items()}
+
+
+def old_variables() -> dict[str, str]:
+    """The variables of the environment with a setting under its former name, by that name."""
+    former = {f"{PREFIX}{old.upper()}": old for old in RENAMED}
+    return {former[name.upper()]: name for name in os.environ if name.upper() in former}
+
+
+def old_names(flags: Mapping[str, Any], file: Path | None) -> list[str]:
+    """A line for each setting that is given under its former name."""
+    given = [(f"--{old.replace('_', '-')}", old) for old in RENAMED if old in flags]
+    given += [(variable, old) for old, variable in old_variables().items()]
+    given += [(f"{file}: {old}", old) for old in RENAMED if old in read_file(file)]
+    return [f"{name} is called --{RENAMED[old].replace('_', '-')} now, and means the same" for name, old in given]
 
 
 def service_links() -> dict[str, str]:

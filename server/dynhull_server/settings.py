@@ -12,6 +12,8 @@ from .storage.databases import examples, is_database, kind_of, names
 from .storage.durability import Durability
 
 PREFIX = "DYNHULL_"  # of environment variables
+# Former names of settings, which are still accepted.
+RENAMED = {"history_bytes": "resume_bytes", "fence_history_bytes": "fence_event_bytes"}
 NAME_CHARACTERS = re.compile(r"[A-Za-z0-9._/-]{0,200}")
 EVERY_ADDRESS = "0.0.0.0", "::"  # noqa: S104  (to refuse them)
 
@@ -158,7 +160,9 @@ class Settings(BaseModel):
         5.0, gt=0, description="Seconds that a client waits between two pings; one that floods pings is cut off."
     )
     max_watch_lag: float = Field(600.0, gt=0, description="Seconds that a watcher may take to receive one event.")
-    history_bytes: int = Field(4 * 2**20, ge=0, description="Memory per hull for the history that watches resume from.")
+    resume_bytes: int = Field(
+        4 * 2**20, ge=0, description="Memory per hull for earlier vertices, from which watches resume."
+    )
 
     series_kept: float = Field(
         3600.0,
@@ -189,7 +193,7 @@ class Settings(BaseModel):
     max_fence_event_age: float = Field(
         0.0, ge=0, description="Seconds after which events of fences are dropped; 0 to keep them."
     )
-    fence_history_bytes: int = Field(
+    fence_event_bytes: int = Field(
         2**18, ge=0, description="Memory for recent events, times the number of fences; 64 MB at most."
     )
 

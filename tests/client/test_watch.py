@@ -93,7 +93,7 @@ def test_it_outlives_its_server(tmp_path: Path, connect: type[HullClient]) -> No
 
 
 def test_it_starts_again_if_the_server_has_forgotten(connect: type[HullClient]) -> None:
-    with server_process("--history-bytes", "0") as server, connect(server.address) as client:
+    with server_process("--resume-bytes", "0") as server, connect(server.address) as client:
         client.create_hull("a")
         copy = HullCopy()
         for x, kind in ((1, Snapshot), (2, Snapshot)):

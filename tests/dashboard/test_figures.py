@@ -16,12 +16,12 @@ from dynhull_dashboard.advice import about_fences
 from dynhull_dashboard.event_rows import MOST_EVENTS, EventRows
 from dynhull_dashboard.feed import HullFeed
 from dynhull_dashboard.fence_drawing import area_of
-from dynhull_dashboard.history import ROWS, History
 from dynhull_dashboard.outline import MOST_DRAWN, drawn
 from dynhull_dashboard.past import past_rows
 from dynhull_dashboard.repeating import pause_after
 from dynhull_dashboard.server_lists import FenceList
 from dynhull_dashboard.server_metrics import Scrape
+from dynhull_dashboard.time_line import ROWS, TimeLine
 from dynhull_dashboard.units import Units
 
 PAGE = """# TYPE dynhull_updates counter
@@ -52,13 +52,13 @@ def test_of_many_vertices_some_are_drawn(vertices: int) -> None:
     assert shown == vertices if vertices <= MOST_DRAWN else MOST_DRAWN / 2 <= shown <= MOST_DRAWN
 
 
-def test_a_history_keeps_the_latest_rows() -> None:
-    history = History("time", "points")
+def test_a_time_line_keeps_the_latest_rows() -> None:
+    line = TimeLine("time", "points")
     for row in range(ROWS + 10):
-        history.append(row, -row)
-    assert history.since(0)["time"] == [0, *range(10, ROWS + 10)]  # of what is older, a row every ten seconds
-    assert history.since(ROWS + 8) == {"time": [ROWS + 8, ROWS + 9], "points": [-ROWS - 8, -ROWS - 9]}
-    assert history.since(ROWS + 10)["time"] == []
+        line.append(row, -row)
+    assert line.since(0)["time"] == [0, *range(10, ROWS + 10)]  # of what is older, a row every ten seconds
+    assert line.since(ROWS + 8) == {"time": [ROWS + 8, ROWS + 9], "points": [-ROWS - 8, -ROWS - 9]}
+    assert line.since(ROWS + 10)["time"] == []
 
 
 def test_time_lines_begin_with_what_the_server_has_kept() -> None:
@@ -71,13 +71,13 @@ def test_time_lines_begin_with_what_the_server_has_kept() -> None:
     first, *rows = past_rows(kept, 1_260_000)
     assert first[:4] == (50_000, 3, 3, 1)
     assert rows == [(60_000, 4, 4, 2, 0.05), (1_200_000, 4, 4, 2, 0), (1_260_000, 5, 4, 3, 0.1)]
-    history = History("time", "points", "vertices", "area", "rate")
-    history.begin(past_rows(kept, 1_260_000))
+    line = TimeLine("time", "points", "vertices", "area", "rate")
+    line.begin(past_rows(kept, 1_260_000))
     assert next(past_rows(kept, 2_260_000))[0] == 1_050_000  # by the dashboard's clock
-    assert history.since(0)["time"] == []
-    history.append(1_261_000, 5, 4, 3, 0)
-    assert history.since(0)["time"] == [50_000, 60_000, 1_200_000, 1_260_000, 1_261_000]
-    assert history.since(1)["time"] == []
+    assert line.since(0)["time"] == []
+    line.append(1_261_000, 5, 4, 3, 0)
+    assert line.since(0)["time"] == [50_000, 60_000, 1_200_000, 1_260_000, 1_261_000]
+    assert line.since(1)["time"] == []
 
 
 def test_a_feed_has_a_past(address: str, name: str) -> None:
@@ -89,9 +89,9 @@ def test_a_feed_has_a_past(address: str, name: str) -> None:
         async with AsyncHullClient(address) as client:
             feed = HullFeed(client, name)
             try:
-                await until(lambda: feed.history.length)
-                lines = feed.history.since(0)
-                assert len(lines["time"]) > feed.history.length
+                await until(lambda: feed.time_line.length)
+                lines = feed.time_line.since(0)
+                assert len(lines["time"]) > feed.time_line.length
                 assert (lines["points"][0], lines["area"][0]) == (3, 8)
             finally:
                 await feed.close()

@@ -12,7 +12,7 @@ from dynhull_server.state.records import HullSettings, Window
 
 SECOND = 1_000_000
 START = 10**9 * SECOND
-LIMITS = Limits(max_hulls=10, max_points=60, max_producers=4, max_producers_per_caller=9, history_bytes=2**16)
+LIMITS = Limits(max_hulls=10, max_points=60, max_producers=4, max_producers_per_caller=9, resume_bytes=2**16)
 KINDS = {
     "points": HullSettings(),
     "strings": HullSettings("str"),

@@ -23,7 +23,7 @@ LIMITS = {
     "max_points": 100,
     "max_producers": 10,
     "max_producers_per_caller": 10,
-    "history_bytes": 1_000_000,
+    "resume_bytes": 1_000_000,
 }
 
 

@@ -167,19 +167,19 @@ def random_plan(seed: int, layer: str) -> Plan:
             "max_points": draw.choice((3, 100, 100, 100)),
             "max_producers": draw.choice((1, 10, 10)),
             "max_producers_per_caller": draw.choice((1, 10, 10)),
-            "history_bytes": draw.choice((0, 0, 700, 1_000_000)),
+            "resume_bytes": draw.choice((0, 0, 700, 1_000_000)),
         },
         "fences": {
             "max_fences": draw.choice((1, 10, 10)),
             "max_fence_consumers": draw.choice((1, 10)),
-            "fence_history_bytes": draw.choice((0, 1000, 100_000)),
+            "fence_event_bytes": draw.choice((0, 1000, 100_000)),
         },
         "lives": lives,
         "faults": [] if immediate or draw.random() < 0.3 else [_fault(draw, layer) for _ in range(draw.randint(1, 3))],
     }
     if layer == "shell" and draw.random() < RECALLS_BESIDE_DELETES:
         draw.choice(lives)["clients"] += _recall_beside_delete(draw, names[0])
-        plan["limits"]["history_bytes"] = 0
+        plan["limits"]["resume_bytes"] = 0
     scenes = random.Random(f"scenes {seed}")  # the other plans stay as they were
     if fences and scenes.random() < WITH_SCENES:
         _add_scene(scenes, plan, fences)

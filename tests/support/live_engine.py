@@ -15,18 +15,18 @@ from dynhull_server.state.batch import Batch, Write
 from dynhull_server.state.limits import Limits
 from dynhull_server.storage.memory import MemoryStorage
 
-LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, max_producers_per_caller=10, history_bytes=10**6)
+LIMITS = Limits(max_hulls=10, max_points=10**9, max_producers=10, max_producers_per_caller=10, resume_bytes=10**6)
 NONE = np.empty((0, 2))
 
 
 @asynccontextmanager
 async def engine_in_memory(
-    history_bytes: int = LIMITS.history_bytes, divisions: Divisions | None = None
+    resume_bytes: int = LIMITS.resume_bytes, divisions: Divisions | None = None
 ) -> AsyncIterator[Engine]:
     """An engine whose background work must not fail."""
     machine = Machine()
     supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
-    engine = Engine(replace(LIMITS, history_bytes=history_bytes), MemoryStorage(), supervisor, machine, divisions)
+    engine = Engine(replace(LIMITS, resume_bytes=resume_bytes), MemoryStorage(), supervisor, machine, divisions)
     await engine.start(lambda *_: None)
     yield engine
     await supervisor.stop()

@@ -23,11 +23,11 @@ from dynhull_client import (
 
 from .degrees import SQUARE_KILOMETRE, Center, outline, poles, shown
 from .drawing import Drawing
-from .history import History
 from .outline import Box, apart, box_around, drawn
 from .past import LONGEST_SECONDS, past_rows
 from .repeating import repeat
 from .search import KeySearch
+from .time_line import TimeLine
 
 MAX_RATE = 10.0
 PROGRESS_SECONDS = 0.5
@@ -67,7 +67,7 @@ class HullFeed:
         poles: the poles in it, such as "south".
         verified: the last verification; None before the first.
         rate: batches per second, over the last second.
-        history: one row per second, after those of the last hour that the server has kept.
+        time_line: one row per second, after those of the last hour that the server has kept.
         keyed: whether the points have keys; True until that is known.
         search: finds keys in the hull.
     """
@@ -77,7 +77,7 @@ class HullFeed:
         self.search = KeySearch(client, name)
         self._reset()
         self.rate = math.nan
-        self.history = History("time", "points", "vertices", "area", "rate")
+        self.time_line = TimeLine("time", "points", "vertices", "area", "rate")
         self._client = client
         self._watch: AsyncWatch | None = None
         self._failure: DynhullError | None = None
@@ -181,10 +181,10 @@ class HullFeed:
         return self.area if self.center is None else self.area / SQUARE_KILOMETRE
 
     async def _count(self) -> None:
-        """Begin the history with what the server has kept, then add a row every second."""
+        """Begin the time line with what the server has kept, then add a row every second."""
         with suppress(DynhullError):  # the server is away or of an earlier version, or the hull is not there
             series = await self._client.series(self.name, LONGEST_SECONDS, timeout=PAST_SECONDS)
-            self.history.begin(past_rows(series, time.time() * 1000))
+            self.time_line.begin(past_rows(series, time.time() * 1000))
         before, then = self.revision, time.monotonic()
         while True:
             await asyncio.sleep(TICK_SECONDS)
@@ -194,9 +194,9 @@ class HullFeed:
             self.rate = (revision - before) / (now - then) if steady else math.nan
             before, then = (revision if self.live else 0), now
             if self.live:
-                self.history.append(time.time() * 1000, self.points, self.vertices, self.shown_area, self.rate)
+                self.time_line.append(time.time() * 1000, self.points, self.vertices, self.shown_area, self.rate)
             else:
-                self.history.append(time.time() * 1000, math.nan, math.nan, math.nan, math.nan)
+                self.time_line.append(time.time() * 1000, math.nan, math.nan, math.nan, math.nan)
 
     async def _sample(self) -> None:
         if self._inner.revision != self.revision:

@@ -10,7 +10,7 @@ from typing import Self
 from prometheus_client.parser import text_string_to_metric_families
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError
 
-from .history import History
+from .time_line import TimeLine
 
 POLL_SECONDS = 1.0
 TIMEOUT_SECONDS = 2.0
@@ -89,14 +89,14 @@ class ServerMetrics:
     """Polls the metrics page once per second.
 
     Attributes:
-        history: updates per second, and the mean and the 99th percentile of the milliseconds from the arrival of a
+        time_line: updates per second, and the mean and the 99th percentile of the milliseconds from the arrival of a
             batch to its acknowledgement.
         url: the page.
         error: why the last request for the page failed; None where it did not.
     """
 
     def __init__(self, url: str) -> None:
-        self.history = History("time", "updates", "mean", "percentile")
+        self.time_line = TimeLine("time", "updates", "mean", "percentile")
         self.url = url
         self.error: str | None = None
         self._http = AsyncHTTPClient()
@@ -112,7 +112,7 @@ class ServerMetrics:
         while True:
             now = await self._scrape()
             rates = now.rates_since(before) if now and before else (math.nan, math.nan, math.nan)
-            self.history.append(time.time() * 1000, *rates)
+            self.time_line.append(time.time() * 1000, *rates)
             before = now
             await asyncio.sleep(POLL_SECONDS)
 

@@ -64,7 +64,7 @@ class Viewer:
         self._ticks = 0
         self._properties: dict[str, Any] = {}
         self._drawn: dict[tuple[str, str], str] = {}
-        self._rows: dict[str, tuple[object, int]] = {}  # of each history, how many rows have been sent
+        self._rows: dict[str, tuple[object, int]] = {}  # of each time line, how many rows have been sent
         self._untouched = hulls is None and not fences and not prefixes
         self._many = ManyPicks(hub)
         self._many.show(prefixes, ())
@@ -141,13 +141,13 @@ class Viewer:
 
     def _lines(self) -> Iterator[str]:
         """The new rows of the time lines."""
-        histories = {name: shown.feed.history for name, shown in self._shown.items()}
+        lines = {name: shown.feed.time_line for name, shown in self._shown.items()}
         if self._hub.metrics is not None:
-            histories[WHOLE_SERVER] = self._hub.metrics.history
-        for name, history in histories.items():
-            known, seen = self._rows.get(name, (history, 0))
-            new = history.since(seen if known is history else 0)
-            self._rows[name] = history, history.length
+            lines[WHOLE_SERVER] = self._hub.metrics.time_line
+        for name, line in lines.items():
+            known, seen = self._rows.get(name, (line, 0))
+            new = line.since(seen if known is line else 0)
+            self._rows[name] = line, line.length
             if new["time"]:
                 yield json.dumps({"kind": "lines", "hull": name, **new})
 

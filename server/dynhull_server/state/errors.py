@@ -224,11 +224,11 @@ class HullUnsuitableError(RefusedError):
 
 
 class RevisionForgottenError(RefusedError):
-    """The history no longer has that revision.
+    """That revision is no longer known.
 
     Attributes:
         revision: the revision.
-        oldest: the oldest revision in the history.
+        oldest: the oldest revision that is.
         newest: the newest.
         field: the field of the request that has the revision.
     """
@@ -242,9 +242,7 @@ class RevisionForgottenError(RefusedError):
         field: str = "resume.revision",
     ) -> None:
         since = "" if oldest_time is None else f" of {_iso(oldest_time)}"
-        super().__init__(
-            f"revision {revision} is not in the history: the oldest is {oldest}{since}, the newest {newest}"
-        )
+        super().__init__(f"revision {revision} is not kept: the oldest is {oldest}{since}, the newest {newest}")
         self.revision = revision
         self.oldest = oldest
         self.newest = newest

@@ -1,4 +1,4 @@
-"""One hull: its points, its revision, its producers, and the history of its vertices."""
+"""One hull: its points, its revision, its producers, and the vertices that were sent."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ from .contents.live import AnyKeyedHull, layer_of
 from .contents.places import GeographicHull
 from .contents.quarantine import Quarantine
 from .errors import HullUnsuitableError, MisfitError, RefusedError
-from .history import History
 from .limits import Limits
 from .outline import GlobeOutline, Outline
 from .producers import Producers
 from .records import Cause, Center, Contents, Expiry, HullSettings, Kept, QuarantineRules, Record
+from .sent_vertices import SentVertices
 
 if TYPE_CHECKING:
     from .contents.live import AnyHull
@@ -93,7 +93,7 @@ class HullState:
         self._layers: dict[int, tuple[int, Points]] = {}  # those that fences ask for
         self._vertex_keys: VertexKeys | None = None
         self._keys_as_of = -1
-        self._history = History(self._limits.history_bytes, self._vertices, last)
+        self._sent = SentVertices(self._limits.resume_bytes, self._vertices, last)
         self._outline: tuple[Points, Center | None, GlobeOutline] | None = None
 
     @property
@@ -275,12 +275,12 @@ class HullState:
         return globe.follow(self.hull.center)
 
     def _applied(self, points: int, cause: Cause, *, hull_changed: bool) -> None:
-        """Update the counts and the history after a change."""
+        """Update the counts and what was sent after a change."""
         revision = self.counts.revision + 1
         outlined = self.counts.outlined
         if hull_changed:
             outlined = self._changed_at = revision
-            self._history.changed(revision)
+            self._sent.changed(revision)
         if self.center != self.counts.center:
             outlined = revision
         self.counts = self._counted(revision, points, cause, outlined)
@@ -300,7 +300,7 @@ class HullState:
             self._vertices = self.hull.vertices()
             self._vertices.setflags(write=False)
             self._vertices_as_of = self.hull.changes
-            self._history.record(self._changed_at, self._vertices)
+            self._sent.record(self._changed_at, self._vertices)
         return self._vertices
 
     def layer(self, number: int) -> Points:
@@ -350,7 +350,7 @@ class HullState:
 
     def earlier_vertices(self, revision: int) -> Points | None:
         """The vertices at an earlier revision, None where they were never sent; raises RevisionForgottenError."""
-        return self._history.at(revision, self.counts.revision)
+        return self._sent.at(revision, self.counts.revision)
 
     def last_sequence(self, producer: str) -> int:
         """The last sequence number applied of a producer, 0 where there is none."""

@@ -12,14 +12,14 @@ class FenceLimits:
         max_fence_consumers: the number of consumers per fence.
         max_fence_events: the number of events to keep per fence.
         max_fence_event_age: the seconds for which events are kept, 0 for no limit.
-        fence_history_bytes: the memory for recent events of all fences, divided by their number; 64 MB at most in all.
+        fence_event_bytes: the memory for recent events of all fences, divided by their number; 64 MB at most in all.
     """
 
     max_fences: int = 100_000
     max_fence_consumers: int = 1_000
     max_fence_events: int = 1_000_000
     max_fence_event_age: float = 0.0
-    fence_history_bytes: int = 2**18
+    fence_event_bytes: int = 2**18
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Limits:
         max_points: the number of points per hull, with multiplicity.
         max_producers: the number of producers (writers that number their batches) per hull.
         max_producers_per_caller: the number of producers per hull that belong to one caller.
-        history_bytes: the memory per hull for the history that watchers resume from.
+        resume_bytes: the memory per hull for earlier vertices, from which watchers resume.
         fences: the limits on fences.
         max_past_rows: the number of points and rows of batches that a read of the past may rebuild.
     """
@@ -40,6 +40,6 @@ class Limits:
     max_points: int
     max_producers: int
     max_producers_per_caller: int
-    history_bytes: int
+    resume_bytes: int
     fences: FenceLimits = FenceLimits()
     max_past_rows: int = 20_000_000

@@ -39,7 +39,7 @@ class Registry:
         self.hulls: SortedDict[str, Hull] = SortedDict()
         self.fences: SortedDict[str, Fence] = SortedDict()
         self.tallies = Tallies()
-        self.recent = RecentEvents(limits.fences.fence_history_bytes)
+        self.recent = RecentEvents(limits.fences.fence_event_bytes)
         self._next_number = next_number
         self._creating = self._fencing = 0
 

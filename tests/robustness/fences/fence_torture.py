@@ -48,7 +48,7 @@ from dynhull_server.state.records import NO_TIME, HullSettings
 from dynhull_server.state.requests import Birth, CreateHull
 from dynhull_server.storage.memory import MemoryStorage
 
-LIMITS = Limits(max_hulls=99, max_points=10**6, max_producers=9, max_producers_per_caller=9, history_bytes=10**5)
+LIMITS = Limits(max_hulls=99, max_points=10**6, max_producers=9, max_producers_per_caller=9, resume_bytes=10**5)
 # Subjects inside of the fences of a trip after which it creates no more: few, as there are few subjects.
 definition.MOST_INSIDE = 5
 # Steps with one seed.

@@ -55,7 +55,7 @@ def test_a_burst_of_calls_is_answered(address: str, name: str) -> None:
 
 def test_watchers_that_do_not_read_cost_no_memory() -> None:
     with (
-        measured("--scrub-cpu", "0", "--history-bytes", "1000000") as (server, address),
+        measured("--scrub-cpu", "0", "--resume-bytes", "1000000") as (server, address),
         HullClient(server.address) as client,
         grpc.insecure_channel(server.address, SMALL_WINDOW) as channel,
     ):

@@ -34,7 +34,7 @@ from dynhull_server.storage.sqlite.storage import Durability, SQLiteStorage
 CIRCLE = FenceConfig(CircleArea(0.0, 0.0, 5.0), "hull", "fleet")
 LARGER = replace(CIRCLE, area=CircleArea(0.0, 0.0, 9.0))
 # Old events are always read from the disk.
-FENCE_LIMITS = FenceLimits(fence_history_bytes=0)
+FENCE_LIMITS = FenceLimits(fence_event_bytes=0)
 SUSPENSIONS = 20  # more than any of these calls has
 
 

@@ -59,6 +59,35 @@ def test_a_setting_of_several_values_comes_from_everywhere(tmp_path: Path, monke
     assert shown("--config", str(file), *flags)["metrics_prefix"] == ('["a/", ""]', "flag")
 
 
+def test_former_names_of_settings_are_accepted_with_a_line_that_says_the_new_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "dynhull.toml"
+    file.write_text("history_bytes = 1\n")
+    monkeypatch.setenv("DYNHULL_FENCE_HISTORY_BYTES", "2")
+    result = dynhull("config", "--config", str(file))
+    assert result.stderr.splitlines() == [
+        "warning: DYNHULL_FENCE_HISTORY_BYTES is called --fence-event-bytes now, and means the same",
+        f"warning: {file}: history_bytes is called --resume-bytes now, and means the same",
+    ]
+    lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
+    assert f"resume_bytes = 1 # {file}" in lines
+    assert "fence_event_bytes = 2 # DYNHULL_FENCE_HISTORY_BYTES" in lines
+    assert "history_bytes = 1" not in result.stdout
+
+    result = dynhull("config", "--config", str(file), "--history-bytes", "3", "--fence-event-bytes", "4")
+    assert "--history-bytes is called --resume-bytes now" in result.stderr
+    lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
+    assert {"resume_bytes = 3 # flag", "fence_event_bytes = 4 # flag"} <= set(lines)
+    assert "--history-bytes" not in dynhull("serve", "--help").stdout.replace("--max-history-bytes", "")
+
+    both = dynhull("config", "--history-bytes", "3", "--resume-bytes", "4")
+    assert (both.exit_code, both.stderr) == (
+        2,
+        "error: history_bytes is the former name of resume_bytes: leave it out\n",
+    )
+
+
 def test_links_of_kubernetes_to_services_are_no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DYNHULL_PORT", "tcp://10.96.0.12:50051")
     monkeypatch.setenv("DYNHULL_PORT_50051_TCP", "tcp://10.96.0.12:50051")

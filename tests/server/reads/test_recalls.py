@@ -18,7 +18,7 @@ def test_recalled_revisions_are_held_a_few_at_a_time(monkeypatch: pytest.MonkeyP
 
     async def recall_all() -> None:
         nonlocal most
-        async with engine_in_memory(history_bytes=0) as engine:
+        async with engine_in_memory(resume_bytes=0) as engine:
             for x in range(REVISIONS):
                 await insert(engine, "h", np.array([[x, x * x]], float))
                 hull = engine.hulls.get("h")

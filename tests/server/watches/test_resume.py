@@ -161,8 +161,8 @@ def test_what_a_reader_was_told_can_be_gone_on_from(address: str, name: str) -> 
 
 
 @pytest.mark.whole_hull("its server keeps no batches")
-def test_history_is_bounded() -> None:
-    with server_process("--history-bytes", "2000") as server, HullClient(server.address) as client:
+def test_what_watches_resume_from_is_bounded() -> None:
+    with server_process("--resume-bytes", "2000") as server, HullClient(server.address) as client:
         client.create_hull("a")
         copy = HullCopy()
         with client.watch("a") as watch:

@@ -19,7 +19,7 @@ class Entry:
     vertices: Points
 
 
-class History:
+class SentVertices:
     """The vertices that have been sent to any client, by revision; the oldest are dropped.
 
     A watcher resumes from vertices it was sent. Others are not kept, so a batch costs nothing while nobody reads.
@@ -27,7 +27,7 @@ class History:
     Args:
         most_bytes: the approximate limit on memory.
         vertices: the vertices at the revision `first`.
-        first: the first revision of the history.
+        first: the first revision that is remembered.
     """
 
     def __init__(self, most_bytes: int, vertices: Points, first: int = 0) -> None:
@@ -51,7 +51,7 @@ class History:
         """The vertices at a revision; None where they were never sent.
 
         Raises:
-            RevisionForgottenError: the revision is older than the history, or later than `newest`, the present one.
+            RevisionForgottenError: the revision is older than those, or later than `newest`, the present one.
         """
         oldest = self._entries[0].first
         if not oldest <= revision <= newest:

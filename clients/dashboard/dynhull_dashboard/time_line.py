@@ -10,7 +10,7 @@ ROWS = 600
 OLDER_ROWS, APART_MILLISECONDS = 360, 10_000
 
 
-class History:
+class TimeLine:
     """The last `ROWS` rows, and some of those before. Each viewer asks for the rows it has not seen.
 
     Attributes:
