@@ -10,7 +10,7 @@ import threading
 import time
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,6 +28,26 @@ INSIDE, OUTSIDE = [[1.0, 1.0]], [[9.0, 9.0]]
 def place(number: int) -> tuple[float, float]:
     """A point that stands for a number."""
     return float(number), float(number * number % 1_009)
+
+
+class Timed:
+    """A client that notes how long each of its calls takes, also of one that fails."""
+
+    def __init__(self, client: HullClient, took: list[str]) -> None:
+        self._client = client
+        self._took = took
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        call = getattr(self._client, name)
+
+        def timed(*arguments: object, **options: object) -> object:
+            begun = time.monotonic()
+            try:
+                return call(*arguments, **options)
+            finally:
+                self._took.append(f"{name} {time.monotonic() - begun:.2f} s")
+
+        return timed
 
 
 class Caller(threading.Thread, ABC):
@@ -53,6 +73,8 @@ class Caller(threading.Thread, ABC):
         self.longest = 0.0
         self.errors: list[str] = []
         self.over = threading.Event()
+        self._begun = time.monotonic()
+        self._took: list[str] = []  # the steps of the call that is under way
 
     def begin(self) -> None:
         """Create the hull, and call."""
@@ -77,23 +99,33 @@ class Caller(threading.Thread, ABC):
             self.work()
         except Exception as error:
             made = "".join(traceback.format_tb(error.__traceback__, 2)[1:]).split("\n")[1].strip()
-            self.errors.append(f"call {self.calls + 1}, {made}: {type(error).__name__}: {error}")
+            took = ", ".join([f"{time.monotonic() - self._begun:.2f} s after it began", *self._took])
+            self.failed(f"call {self.calls + 1}, {made} ({took})", error)
+
+    def failed(self, what: str, error: Exception) -> None:
+        """Note an error, and whose it is."""
+        self.errors.append(f"{type(self).__name__}, {what}: {type(error).__name__}: {error}")
 
     def work(self) -> None:
         """Call."""
         with HullClient(self.address) as client:
             while not self.over.is_set():
-                begun = time.monotonic()
-                self.step(client, self.calls + 1)
-                self.done(begun)
+                self.under_way()
+                self.step(Timed(client, self._took), self.calls + 1)
+                self.done()
                 self.over.wait(BREATH)
 
-    def done(self, begun: float) -> None:
+    def under_way(self) -> None:
+        """A call begins."""
+        self._begun = time.monotonic()
+        self._took.clear()
+
+    def done(self) -> None:
         """Count a call that was answered."""
         self.calls += 1
-        self.longest = max(self.longest, time.monotonic() - begun)
+        self.longest = max(self.longest, time.monotonic() - self._begun)
 
-    def step(self, client: HullClient, number: int) -> None:
+    def step(self, client: Timed, number: int) -> None:
         """One call."""
         raise NotImplementedError
 
@@ -104,7 +136,7 @@ class Caller(threading.Thread, ABC):
     def require(self, holds: object, what: str) -> None:
         """Note a fault unless something holds."""
         if not holds:
-            self.errors.append(what)
+            self.errors.append(f"{type(self).__name__}: {what}")
 
     def require_all(self, client: HullClient, inserted: int) -> None:
         """Each of the first points is there once, and no other one."""
@@ -119,7 +151,7 @@ class Caller(threading.Thread, ABC):
 class Plain(Caller):
     """Batches without numbers."""
 
-    def step(self, client: HullClient, number: int) -> None:
+    def step(self, client: Timed, number: int) -> None:
         applied = client.apply(self.hull, insert=[place(number)])
         self.require(applied.revision == number, f"batch {number} is revision {applied.revision}")
 
@@ -143,7 +175,7 @@ class Large(Caller):
     def prepare(self, client: HullClient) -> None:
         client.apply(self.hull, insert=self._points)
 
-    def step(self, client: HullClient, number: int) -> None:
+    def step(self, client: Timed, number: int) -> None:
         applied = client.apply(self.hull, delete=self._points + (number - 1), insert=self._points + number)
         self.require(applied.revision == number + 1, f"batch {number} is revision {applied.revision}")
         self.over.wait(20 * BREATH)
@@ -157,7 +189,7 @@ class Large(Caller):
 class Numbered(Caller):
     """Numbered batches."""
 
-    def step(self, client: HullClient, number: int) -> None:
+    def step(self, client: Timed, number: int) -> None:
         applied = client.apply(self.hull, insert=[place(number)], producer="p", sequence=number)
         self.require(applied.revision == number, f"batch {number} is revision {applied.revision}")
 
@@ -177,9 +209,9 @@ class Writes(Caller):
     def work(self) -> None:
         with HullClient(self.address) as client, client.writer(self.hull, batch_points=1, linger=0) as writer:
             while not self.over.is_set():
-                begun = time.monotonic()
+                self.under_way()
                 writer.put(insert=[place(self.calls + 1)]).result()
-                self.done(begun)
+                self.done()
                 self.over.wait(BREATH)
 
     def check(self, client: HullClient) -> None:
@@ -204,9 +236,9 @@ class AsyncWrites(Writes):
             client.writer(self.hull, batch_points=1, linger=0) as writer,
         ):
             while not self.over.is_set():
-                begun = time.monotonic()
+                self.under_way()
                 await (await writer.put(insert=[place(self.calls + 1)]))
-                self.done(begun)
+                self.done()
                 await pause_async(BREATH)
 
 
@@ -220,7 +252,6 @@ class Watches(Caller):
         self.copy = HullCopy()
         self._written = 0
         self._last: int | None = None  # the revision of the last event
-        self._heard = time.monotonic()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
 
@@ -231,7 +262,7 @@ class Watches(Caller):
                     self._written = client.apply(self.hull, insert=[place(self._written + 1)]).revision
                     self.over.wait(BREATH)
         except Exception as error:
-            self.errors.append(f"batch {self._written + 1} of the watched hull: {type(error).__name__}: {error}")
+            self.failed(f"batch {self._written + 1} of the watched hull", error)
 
     def finish(self) -> None:
         self.over.set()
@@ -250,8 +281,9 @@ class Watches(Caller):
     def heard(self, revision: int) -> bool:
         """Count an event; returns whether it is the last one."""
         self.require(revision >= self.calls, f"event {revision} after {self.calls}")
-        self.done(self._heard)
-        self.calls, self._heard = revision, time.monotonic()
+        self.done()
+        self.calls = revision
+        self.under_way()
         return revision == self._last
 
     def check(self, client: HullClient) -> None:
@@ -303,15 +335,15 @@ class Consumes(Caller):
                     self._puts += 1
                     self.over.wait(BREATH)
         except Exception as error:
-            self.errors.append(f"put {self._puts + 1} of a fenced key: {type(error).__name__}: {error}")
+            self.failed(f"put {self._puts + 1} of a fenced key", error)
 
     def work(self) -> None:
         with HullClient(self.address) as client, client.watch_fence(self._fence, consumer="c") as events:
             for event in events:
-                begun = time.monotonic()
+                self.under_way()
                 self.require(event.sequence == self.calls + 1, f"event {event.sequence} after {self.calls}")
                 client.ack_fence(self._fence, "c", event.sequence)
-                self.done(begun)
+                self.done()
                 if event.sequence == self._last:
                     return
 
@@ -344,13 +376,13 @@ class Pipes(Caller):
     def work(self) -> None:
         with HullClient(self.address) as client, client.pipeline() as pipeline:
             while not self.over.is_set():
-                begun = time.monotonic()
+                self.under_way()
                 located = [pipeline.locate(name, [[x, 1]]) for name in (self.hull, self._other) for x in (1, 4, 5)]
                 counted = pipeline.count(self._other, [[4, 4]])
                 sides = [each.result().sides.tolist() for each in located]
                 self.require(sides == [[1], [0], [-1]] * 2, f"read {self.calls}: {sides}")
                 self.require(counted.result().counts.tolist() == [1], f"read {self.calls} of a count")
-                self.done(begun)
+                self.done()
                 self.over.wait(BREATH)
 
     def check(self, client: HullClient) -> None:
@@ -366,11 +398,11 @@ class AsyncPipes(Pipes):
     async def _work(self) -> None:
         async with AsyncHullClient(self.address) as client, client.pipeline() as pipeline:
             while not self.over.is_set():
-                begun = time.monotonic()
+                self.under_way()
                 located = [pipeline.locate(name, [[x, 1]]) for name in (self.hull, self._other) for x in (1, 4, 5)]
                 sides = [(await each).sides.tolist() for each in located]
                 self.require(sides == [[1], [0], [-1]] * 2, f"read {self.calls}: {sides}")
-                self.done(begun)
+                self.done()
                 await pause_async(BREATH)
 
 
@@ -380,7 +412,7 @@ class Reads(Pipes):
     def work(self) -> None:
         Caller.work(self)
 
-    def step(self, client: HullClient, number: int) -> None:
+    def step(self, client: Timed, number: int) -> None:
         name = (self.hull, self._other)[number % 2]
         self.require(client.locate(name, [[1, 1]]).sides.tolist() == [1], f"read {number}")
         self.require(client.get_hull(name).info.points == 4, f"read {number}")
@@ -389,7 +421,7 @@ class Reads(Pipes):
 class Creates(Caller):
     """Hulls and fences that are created and deleted; every third hull is over shards."""
 
-    def step(self, client: HullClient, number: int) -> None:
+    def step(self, client: Timed, number: int) -> None:
         name = f"{self.hull}-{number}"
         client.create_hull(name, keyed="str", shards=None if number % 3 else SHARDS)
         self.require(client.put(name, ["key"], INSIDE).revision == 1, f"hull {number} is an older one")

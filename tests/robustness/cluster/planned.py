@@ -181,7 +181,7 @@ class Planned:
         for caller in self.callers:
             if not caller.over.is_set():
                 caller.finish()
-            errors += [f"{type(caller).__name__}, {each}" for each in caller.errors]
+            errors += caller.errors
         errors += [line for machine in self._all for line in machine.complaints()]
         while self.machines:
             self.machines[-1].stop()
