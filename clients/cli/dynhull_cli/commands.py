@@ -154,10 +154,16 @@ def _imported(entry: EntryPoint, args: list[str]) -> tuple[Any, list[str]]:
         command = _typer()
         command.command(entry.name, context_settings=anything)(_not_installed(entry, error))
         return typer.main.get_command(command), []
-    others = getattr(function, "beside", {})
-    if args and args[0] in others:
-        return typer.main.get_command(_made(entry, args[0], others[args[0]])), args[:1]
-    return typer.main.get_command(_made(entry, entry.name, function)), []
+    words = args[:1] if args and args[0] in getattr(function, "beside", {}) else []
+    return _command(entry, *words), words
+
+
+@cache
+def _command(entry: EntryPoint, beside: str = "") -> Any:
+    """The command, or one beside it; kept, because typer takes 4 ms to make one of a function with many options."""
+    function = entry.load()
+    made = _made(entry, beside, function.beside[beside]) if beside else _made(entry, entry.name, function)
+    return typer.main.get_command(made)
 
 
 def _made(entry: EntryPoint, name: str, function: Callable[..., None] | Group) -> typer.Typer:
