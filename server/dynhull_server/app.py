@@ -193,6 +193,7 @@ class Server:
             self._metrics,
             ManyQuotas(self._settings),
             Places("max_past_reads", self._settings.max_past_reads, self._settings.max_past_reads_per_caller),
+            Places("max_replays", self._settings.max_replays, self._settings.max_replays_per_caller),
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )

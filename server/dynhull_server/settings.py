@@ -183,6 +183,10 @@ class Settings(BaseModel):
         description="Largest number of points and of rows of batches that a read of the past may rebuild; and of those "
         "that are kept for the next ones.",
     )
+    max_replays: int = Field(
+        32, ge=1, description="Largest number of simultaneous replays; each has a hull of its own."
+    )
+    max_replays_per_caller: int = Field(8, ge=1, description="The same per token, or without tokens per address.")
 
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
     max_fence_corners: int = Field(100_000, ge=3, description="Largest number of corners of the area of a fence.")

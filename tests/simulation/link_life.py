@@ -70,6 +70,7 @@ class LinkedServer(ShellServer):
             metrics,
             ManyQuotas(Settings()),
             Places("max_past_reads", MOST_CALLS, MOST_CALLS),
+            Places("max_replays", MOST_CALLS, MOST_CALLS),
             create_on_write=True,
             max_watch_lag=math.inf,
         )

@@ -45,9 +45,9 @@ class Queries:
         self._model = model
         metrics = Metrics()
         quotas = ManyQuotas(Settings())
-        past = Places("max_past_reads", MOST_CALLS, MOST_CALLS)
+        pasts = [Places(limit, MOST_CALLS, MOST_CALLS) for limit in ("max_past_reads", "max_replays")]
         self._service = HullService(
-            engine.driver, engine.hulls, metrics, quotas, past, create_on_write=False, max_watch_lag=math.inf
+            engine.driver, engine.hulls, metrics, quotas, *pasts, create_on_write=False, max_watch_lag=math.inf
         )
         places = Places("max_streams", MOST_CALLS, MOST_CALLS)
         self._calls = Calls(lambda _: ANONYMOUS, metrics, MOST_BYTES, places, Unread(MOST_BYTES))

@@ -67,6 +67,7 @@ def reads(client: sdk.HullClient) -> None:
     assert_type(client.verify("a"), sdk.Verification)
     assert_type(client.pipeline(batch_reads=2), sdk.Pipeline)
     assert_type(client.watch("a", copy=sdk.HullCopy()), sdk.Watch)
+    assert_type(client.replay("a", 1, "2026-11-24T16:00Z", speed=60, copy=sdk.HullCopy()), sdk.Replay)
     assert_type(client.watch_many("a/", contents="outline", max_rate=2), sdk.ManyWatch)
     assert_type(sdk.HullCopies()["a"], sdk.HullCopy)
     client.get_hull("a", layer="2")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
@@ -101,6 +102,7 @@ async def asynchronous(client: sdk.AsyncHullClient) -> None:
     assert_type(client.read_points("a"), AsyncIterator[sdk.Stored])
     assert_type(client.presence(), AsyncIterator[bool])
     assert_type(client.watch("a"), sdk.AsyncWatch)
+    assert_type(client.replay("a", every=1), sdk.AsyncReplay)
     assert_type(client.watch_many("a"), sdk.AsyncManyWatch)
     assert_type(client.writer("a"), sdk.AsyncWriter)
     await client.create_hull("a", keyed="float")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

@@ -2,7 +2,9 @@
 
 from collections import deque
 from dataclasses import dataclass
+from datetime import datetime
 from itertools import islice
+from typing import Any
 
 import numpy as np
 import typer
@@ -11,7 +13,19 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from dynhull_client import Change, Deleted, Event, HullClient, HullCopy, Measures, Points, Sketch, Snapshot, Watch
+from dynhull_client import (
+    Change,
+    Deleted,
+    Event,
+    HullClient,
+    HullCopy,
+    Measures,
+    Points,
+    Replay,
+    Sketch,
+    Snapshot,
+    Watch,
+)
 
 from .closed_pipe import when_pipe_closes
 from .json_lines import json_line, members
@@ -39,16 +53,33 @@ class Shown:
 
     def watch(self, client: HullClient, name: str, copy: HullCopy) -> Watch:
         """The watch, which updates the copy. An event with few of the vertices has all of these."""
-        return client.watch(
-            name,
-            max_rate=self.max_rate,
-            measures=True,
-            copy=copy,
-            keys=self.keys,
-            outline=self.max_vertices is not None,
-            layer=self.layer,
-            max_vertices=self.max_vertices,
+        return client.watch(name, copy=copy, **self._options())
+
+    def replay(self, client: HullClient, name: str, copy: HullCopy, played: "Played") -> Replay:
+        """The same of the past."""
+        return client.replay(
+            name, played.start, played.end, speed=played.speed, every=played.every, copy=copy, **self._options()
         )
+
+    def _options(self) -> dict[str, Any]:
+        return {
+            "max_rate": self.max_rate,
+            "measures": True,
+            "keys": self.keys,
+            "outline": self.max_vertices is not None,
+            "layer": self.layer,
+            "max_vertices": self.max_vertices,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What to play of the past of a hull: where it begins and ends, how fast, and the seconds between events."""
+
+    start: int | str | None
+    end: int | str | None
+    speed: float
+    every: float | None
 
 
 class Corners:
@@ -71,15 +102,18 @@ class Corners:
         return printable(" ".join([*(f"+{key}" for key in self.joined), *(f"-{key}" for key in self.left)]))
 
 
-def follow(client: HullClient, name: str, shown: Shown, *, events: int | None, as_json: bool) -> None:
-    """Print the changes of a hull: lines of JSON, a live table on a terminal, or else lines of text.
+def follow(
+    client: HullClient, name: str, shown: Shown, *, played: Played | None = None, events: int | None, as_json: bool
+) -> None:
+    """Print the changes of a hull, or of its past: lines of JSON, a live table on a terminal, or else lines of text.
 
     It returns after that number of events; None for never.
     """
     copy = HullCopy()
     corners = Corners(copy) if shown.keys else None
     console = Console(highlight=False, markup=False)
-    with shown.watch(client, name, copy) as stream:
+    stream = shown.watch(client, name, copy) if played is None else shown.replay(client, name, copy, played)
+    with stream:
         if not as_json and console.is_terminal:
             _show(console, name, stream, copy, corners, events)
             return
@@ -88,17 +122,18 @@ def follow(client: HullClient, name: str, shown: Shown, *, events: int | None, a
         for event in islice(stream, events):
             if corners is not None:
                 corners.update(event)
-            typer.echo(_json(event, corners) if as_json else _line(event, copy, corners))
+            typer.echo(_json(event, corners) if as_json else _line(event, copy, corners, timed=played is not None))
 
 
 def _show(
-    console: Console, name: str, stream: Watch, copy: HullCopy, corners: Corners | None, events: int | None
+    console: Console, name: str, stream: Watch | Replay, copy: HullCopy, corners: Corners | None, events: int | None
 ) -> None:
     recent: deque[list[str]] = deque(maxlen=SHOWN_EVENTS)
+    changed: datetime | None = None
 
     def table() -> Table:
         lost = Text(f"connection lost, trying again: {stream.lost}", "red") if stream.lost else None
-        shown = Table(title=f"{name} at revision {copy.revision:,}", caption=lost)
+        shown = Table(title=f"{name} at revision {copy.revision:,}{_of(changed)}", caption=lost)
         for heading in ("revision", "points", "vertices", "change", "area", "perimeter"):
             shown.add_column(heading, justify="right")
         if corners is not None:
@@ -112,6 +147,7 @@ def _show(
             if corners is not None:
                 corners.update(event)
             recent.append(_cells(event, copy, corners))
+            changed = _changed(event)
 
 
 def _cells(event: Event, copy: HullCopy, corners: Corners | None) -> list[str]:
@@ -136,14 +172,25 @@ def _change(event: Event) -> str:
     return f"+{len(added):,} -{len(removed):,}"
 
 
-def _line(event: Event, copy: HullCopy, corners: Corners | None) -> str:
+def _of(changed: datetime | None) -> str:
+    """When a revision was committed, for people."""
+    return "" if changed is None else f" of {changed:%Y-%m-%d %H:%M:%S} UTC"
+
+
+def _changed(event: Event) -> datetime | None:
+    return None if isinstance(event, Deleted) else event.changed
+
+
+def _line(event: Event, copy: HullCopy, corners: Corners | None, *, timed: bool) -> str:
     measures = _measures(event)
     sizes = ("", "") if measures is None else (measures.area, measures.perimeter)
     named = () if corners is None else (corners.difference(),)
+    changed = _changed(event)
+    head = [event.revision, *(["" if changed is None else changed.isoformat()] if timed else []), event.points]
     if isinstance(event, Sketch):
-        return tab_line(event.revision, event.points, len(event.vertices), *sizes, event.error, *named)
+        return tab_line(*head, len(event.vertices), *sizes, event.error, *named)
     added, removed = _difference(event)
-    return tab_line(event.revision, event.points, len(copy.vertices), len(added), len(removed), *sizes, *named)
+    return tab_line(*head, len(copy.vertices), len(added), len(removed), *sizes, *named)
 
 
 def _json(event: Event, corners: Corners | None) -> str:
@@ -157,7 +204,7 @@ def _json(event: Event, corners: Corners | None) -> str:
         points=event.points,
         snapshot=isinstance(event, Snapshot),
         **vertices,
-        changed=None if isinstance(event, Deleted) else event.changed,
+        changed=_changed(event),
         **({} if measures is None else members(measures)),
         **({} if corners is None else {"joined": corners.joined, "left": corners.left}),
     )

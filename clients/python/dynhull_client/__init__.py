@@ -21,7 +21,7 @@ from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncWatch
+from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._batch import Batch
 from ._client import HullClient
@@ -67,7 +67,7 @@ from ._quarantine_messages import HeldPosition, Quarantine
 from ._series import Series
 from ._sync_past import Past
 from ._uses import Efficient, Measured, Phases, Separation
-from ._watch import FenceWatch, ManyWatch, Watch
+from ._watch import FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 __all__ = [
@@ -78,6 +78,7 @@ __all__ = [
     "AsyncManyWatch",
     "AsyncPast",
     "AsyncPipeline",
+    "AsyncReplay",
     "AsyncWatch",
     "AsyncWriter",
     "Batch",
@@ -123,6 +124,7 @@ __all__ = [
     "Prefix",
     "Progress",
     "Quarantine",
+    "Replay",
     "Sampled",
     "Separation",
     "Series",

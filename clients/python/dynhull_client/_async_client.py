@@ -11,13 +11,14 @@ from . import _layers as peeling
 from . import _many as many
 from . import _past as earlier
 from . import _quarantine as quarantine
+from . import _replay as playing
 from . import _series as kept
 from . import _uses as uses
 from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncWatch
+from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call, Pages
 from ._messages import HullInfo
@@ -136,6 +137,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     ingest = opening(AsyncIngest, calls.ingest)
     pipeline = opening(AsyncPipeline, calls.pipeline)
     watch = opening(AsyncWatch, calls.watch)
+    replay = opening(AsyncReplay, playing.replay)
     watch_many = opening(AsyncManyWatch, many.watch_many)
     watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
     writer = opening(AsyncWriter, calls.writer)

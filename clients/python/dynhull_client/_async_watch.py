@@ -21,6 +21,7 @@ from ._many import ManyPlace, WatchingMany
 from ._many_messages import ManyChange
 from ._messages import Event
 from ._place import Happening, Place
+from ._replay import ReplayPlace
 
 
 class AsyncFollower(AsyncIterator[Happening]):
@@ -62,6 +63,9 @@ class AsyncFollower(AsyncIterator[Happening]):
             self._reading = None
             try:
                 self._arrived.extend(self._place.take(reading.result()))
+            except StopAsyncIteration:
+                self._place.ended = True
+                raise
             except grpc.RpcError as failure:
                 self._call = None
                 self._arrived.extend(self._place.end(self._connection.error_of(failure, self._place.method)))
@@ -104,6 +108,13 @@ class AsyncWatch(AsyncFollower[Event]):
 
     def __init__(self, connection: AsyncConnection, watching: Watching) -> None:
         super().__init__(connection, HullPlace(watching, connection.retries))
+
+
+class AsyncReplay(AsyncFollower[Event]):
+    """`Replay` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+
+    def __init__(self, connection: AsyncConnection, watching: Watching) -> None:
+        super().__init__(connection, ReplayPlace(watching, connection.retries))
 
 
 class AsyncManyWatch(AsyncFollower[ManyChange]):

@@ -822,9 +822,9 @@ def pipeline(*, batch_reads: int = 256, in_flight: int = 4096) -> Piping:
 
 @dataclass(frozen=True, slots=True)
 class Watching:
-    """A watch to begin."""
+    """A watch, or a replay, to begin."""
 
-    request: pb.WatchRequest
+    request: pb.WatchRequest | pb.ReplayRequest
     copy: HullCopy | None
     follow: bool
     reconnect: bool

@@ -11,6 +11,7 @@ from . import _layers as peeling
 from . import _many as many
 from . import _past as earlier
 from . import _quarantine as quarantine
+from . import _replay as playing
 from . import _series as kept
 from . import _uses as uses
 from ._calls import Call, Pages
@@ -20,7 +21,7 @@ from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
 from ._sync_past import Past
-from ._watch import FenceWatch, ManyWatch, Watch
+from ._watch import FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 P = ParamSpec("P")
@@ -148,6 +149,7 @@ class HullClient(Client[BlockingConnection]):
     ingest = opening(Ingest, calls.ingest)
     pipeline = opening(Pipeline, calls.pipeline)
     watch = opening(Watch, calls.watch)
+    replay = opening(Replay, playing.replay)
     watch_many = opening(ManyWatch, many.watch_many)
     watch_fence = opening(FenceWatch, fences.watch_fence)
     writer = opening(Writer, calls.writer)

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Sequence
+from typing import Any
 
 from google.protobuf.unknown_fields import UnknownFieldSet
 
@@ -20,19 +21,19 @@ class HullPlace(Place[Event]):
     """What a watch of a hull has received, and what it requests next."""
 
     method = "Watch"
-    request: pb.WatchRequest
+    request: Any
 
     def __init__(self, watching: Watching, retries: int) -> None:
         longest_pause = LONGEST_PAUSE_FOR_A_HULL if watching.follow else LONGEST_PAUSE
         super().__init__(watching.timeout, watching.reconnect, retries, longest_pause)
-        self.request = pb.WatchRequest()
+        self.request = type(watching.request)()
         self.request.CopyFrom(watching.request)
         self._watching = watching
         self._revision = -1
         self._uid = self.request.resume.uid
         self._unknown: set[int] = set()
 
-    def take(self, message: pb.WatchResponse) -> Sequence[Event]:
+    def take(self, message: Any) -> Sequence[Event]:
         """The event of a message; none for one that the caller did not request or cannot know."""
         self._connected()
         event = decode_event(message, keys=self.request.include_keys)

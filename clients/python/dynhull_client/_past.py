@@ -44,11 +44,22 @@ def at(name: str, when: When | None = None, *, time: int | None = None, timeout:
     request = pb.GetHullRequest(name=name, view=pb.HULL_VIEW_BASIC)
     if time is not None:
         request.at_time.FromMicroseconds(as_microsecond(time, "time"))
-    elif isinstance(when, int | np.integer) and not isinstance(when, bool | np.bool_):
-        request.at_revision = whole("when", when, bits=64)
     else:
-        request.at_time.FromMicroseconds(as_microsecond(when, "when"))
+        encode_moment(request, "at", when, "when")
     return Call("GetHull", request, lambda response: messages.decode_info(response.hull), timeout)
+
+
+def encode_moment(request: Any, field: str, when: When | None, name: str) -> None:
+    """Write a revision, or a time, into the fields of a request that begin so; nothing for None.
+
+    `name` is what error messages call it.
+    """
+    if when is None:
+        return
+    if isinstance(when, int | np.integer) and not isinstance(when, bool | np.bool_):
+        setattr(request, f"{field}_revision", whole(name, when, bits=64))
+    else:
+        getattr(request, f"{field}_time").FromMicroseconds(as_microsecond(when, name))
 
 
 class AsOf:

@@ -20,6 +20,7 @@ from ._many import ManyPlace, WatchingMany
 from ._many_messages import ManyChange
 from ._messages import Event
 from ._place import Happening, Place
+from ._replay import ReplayPlace
 
 
 class Follower(Iterator[Happening]):
@@ -52,6 +53,10 @@ class Follower(Iterator[Happening]):
                 self._begin()
             try:
                 self._arrived.extend(self._place.take(next(self._call)))
+            except StopIteration:
+                self._place.ended = True
+                self._home.end()
+                raise
             except grpc.RpcError as failure:
                 if self._closed.is_set():
                     raise StopIteration from None
@@ -99,6 +104,18 @@ class Watch(Follower[Event]):
 
     def __init__(self, connection: BlockingConnection, watching: Watching) -> None:
         super().__init__(connection, HullPlace(watching, connection.retries))
+
+
+class Replay(Follower[Event]):
+    """The events of the past of a hull: a `Snapshot`, then `Change` and `Progress`. Iterates until the last revision.
+
+    Iterating blocks until the next event, reconnects as often as necessary, and raises DynhullError if the replay
+    cannot continue. A context manager, which closes it; `close` may also be called by another thread, and ends the
+    iteration.
+    """
+
+    def __init__(self, connection: BlockingConnection, watching: Watching) -> None:
+        super().__init__(connection, ReplayPlace(watching, connection.retries))
 
 
 class ManyWatch(Follower[ManyChange]):

@@ -1233,6 +1233,50 @@ class WatchResponse(_message.Message):
     changed_time: _timestamp_pb2.Timestamp
     def __init__(self, revision: _Optional[int] = ..., point_count: _Optional[int] = ..., snapshot: _Optional[_Union[HullSnapshot, _Mapping]] = ..., change: _Optional[_Union[HullChange, _Mapping]] = ..., progress: _Optional[_Union[HullProgress, _Mapping]] = ..., sketch: _Optional[_Union[HullSketch, _Mapping]] = ..., measures: _Optional[_Union[_hull_pb2.Measures, _Mapping]] = ..., cause: _Optional[_Union[_batch_pb2.Cause, str]] = ..., clock_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., center: _Optional[_Union[_hull_pb2.LonLat, _Mapping]] = ..., changed_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
+class ReplayRequest(_message.Message):
+    __slots__ = ("name", "start_revision", "start_time", "end_revision", "end_time", "speed", "every", "encoding", "include_measures", "max_events_per_second", "progress_interval", "resume", "directions", "include_keys", "outline_only", "layer", "max_vertices")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    START_REVISION_FIELD_NUMBER: _ClassVar[int]
+    START_TIME_FIELD_NUMBER: _ClassVar[int]
+    END_REVISION_FIELD_NUMBER: _ClassVar[int]
+    END_TIME_FIELD_NUMBER: _ClassVar[int]
+    SPEED_FIELD_NUMBER: _ClassVar[int]
+    EVERY_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_MEASURES_FIELD_NUMBER: _ClassVar[int]
+    MAX_EVENTS_PER_SECOND_FIELD_NUMBER: _ClassVar[int]
+    PROGRESS_INTERVAL_FIELD_NUMBER: _ClassVar[int]
+    RESUME_FIELD_NUMBER: _ClassVar[int]
+    DIRECTIONS_FIELD_NUMBER: _ClassVar[int]
+    INCLUDE_KEYS_FIELD_NUMBER: _ClassVar[int]
+    OUTLINE_ONLY_FIELD_NUMBER: _ClassVar[int]
+    LAYER_FIELD_NUMBER: _ClassVar[int]
+    MAX_VERTICES_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    start_revision: int
+    start_time: _timestamp_pb2.Timestamp
+    end_revision: int
+    end_time: _timestamp_pb2.Timestamp
+    speed: float
+    every: _duration_pb2.Duration
+    encoding: _points_pb2.PointEncoding
+    include_measures: bool
+    max_events_per_second: float
+    progress_interval: _duration_pb2.Duration
+    resume: WatchResume
+    directions: _points_pb2.Points
+    include_keys: bool
+    outline_only: bool
+    layer: int
+    max_vertices: int
+    def __init__(self, name: _Optional[str] = ..., start_revision: _Optional[int] = ..., start_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end_revision: _Optional[int] = ..., end_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., speed: _Optional[float] = ..., every: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., include_measures: bool = ..., max_events_per_second: _Optional[float] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., resume: _Optional[_Union[WatchResume, _Mapping]] = ..., directions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., include_keys: bool = ..., outline_only: bool = ..., layer: _Optional[int] = ..., max_vertices: _Optional[int] = ...) -> None: ...
+
+class ReplayResponse(_message.Message):
+    __slots__ = ("event",)
+    EVENT_FIELD_NUMBER: _ClassVar[int]
+    event: WatchResponse
+    def __init__(self, event: _Optional[_Union[WatchResponse, _Mapping]] = ...) -> None: ...
+
 class HullSnapshot(_message.Message):
     __slots__ = ("vertices", "uid", "vertex_keys")
     VERTICES_FIELD_NUMBER: _ClassVar[int]

@@ -211,6 +211,12 @@ class HullServiceStub:
     PERMISSION_DENIED if a hull of that prefix, or of these names, may not be read; the stream ends when the token loses
     that.
     """
+    Replay: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.ReplayRequest, _hull_service_pb2.ReplayResponse]
+    """Plays the past of a hull: the events that a watch of it would have had from one moment to another one, as fast as it
+    was, or faster, or as fast as they are read. Ends after the last revision. It needs the permission "past", where tokens
+    are used. OUT_OF_RANGE, reason REVISION_FORGOTTEN, if revisions between these moments are not kept any more, also where
+    they are dropped before the replay has come to them.
+    """
     Verify: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
     which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
@@ -399,6 +405,12 @@ class HullServiceAsyncStub(HullServiceStub):
 
     PERMISSION_DENIED if a hull of that prefix, or of these names, may not be read; the stream ends when the token loses
     that.
+    """
+    Replay: _aio.UnaryStreamMultiCallable[_hull_service_pb2.ReplayRequest, _hull_service_pb2.ReplayResponse]  # type: ignore[assignment]
+    """Plays the past of a hull: the events that a watch of it would have had from one moment to another one, as fast as it
+    was, or faster, or as fast as they are read. Ends after the last revision. It needs the permission "past", where tokens
+    are used. OUT_OF_RANGE, reason REVISION_FORGOTTEN, if revisions between these moments are not kept any more, also where
+    they are dropped before the replay has come to them.
     """
     Verify: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]  # type: ignore[assignment]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
@@ -795,6 +807,18 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
 
         PERMISSION_DENIED if a hull of that prefix, or of these names, may not be read; the stream ends when the token loses
         that.
+        """
+
+    @_abc_1.abstractmethod
+    def Replay(
+        self,
+        request: _hull_service_pb2.ReplayRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.ReplayResponse], _abc.AsyncIterator[_hull_service_pb2.ReplayResponse]]:
+        """Plays the past of a hull: the events that a watch of it would have had from one moment to another one, as fast as it
+        was, or faster, or as fast as they are read. Ends after the last revision. It needs the permission "past", where tokens
+        are used. OUT_OF_RANGE, reason REVISION_FORGOTTEN, if revisions between these moments are not kept any more, also where
+        they are dropped before the replay has come to them.
         """
 
     @_abc_1.abstractmethod

@@ -30,6 +30,7 @@ from .live_hull import LiveHull
 from .past import PastHull, PastHulls, Place
 from .positions import Standing, standing
 from .recalls import UNREADABLE, Recalls
+from .replay import ReplayedHull
 from .rosters import Rosters
 from .series import KeptSeries
 from .waiter import Waiter
@@ -46,6 +47,7 @@ class Hulls:
 
     Attributes:
         rosters: those of the watches of many hulls.
+        pasts: finds and rebuilds earlier revisions.
         series: the measures that are kept.
     """
 
@@ -60,7 +62,7 @@ class Hulls:
         self._storage = storage
         self._changing: set[asyncio.Task[None]] = set()
         self._turn_of_settings = asyncio.Lock()
-        self._pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
+        self.pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
         self._live: dict[Hull, LiveHull] = {}
         self._incarnation = driver.machine.token()  # that of hulls in memory; others find theirs in the storage
         self._standing = standing(self._incarnation, driver.published)
@@ -91,13 +93,25 @@ class Hulls:
             place: holds a place of those who may rebuild at the same time.
         """
         with place():
-            moment = await self._pasts.moment(live, revision, time)
-        hull = self._driver.core.get(live.name)
-        if hull.row.number != live.number:  # another hull of that name
-            raise HullNotFoundError(live.name)
-        past = PastHull(self._driver, hull, self._recalls, self._fences, self._copies, self._pasts, place, moment)
+            moment = await self.pasts.moment(live, revision, time)
+        hull = self._same(live)
+        past = PastHull(self._driver, hull, self._recalls, self._fences, self._copies, self.pasts, place, moment)
         await past.begin()
         return past
+
+    async def replayed(self, live: LiveHull, first: int, last: int) -> ReplayedHull:
+        """A hull at its first revision, on its way to its last one. Raises the errors of `PastHulls.state`."""
+        hull = self._same(live)
+        state = await self.pasts.own(hull, first)
+        around = self._driver, hull, self._recalls, self._fences, self._copies
+        return ReplayedHull(*around, live, self.pasts, state, last)
+
+    def _same(self, live: LiveHull) -> Hull:
+        """The hull of the core, or raise HullNotFoundError if there is another one of that name by now."""
+        hull = self._driver.core.get(live.name)
+        if hull.row.number != live.number:
+            raise HullNotFoundError(live.name)
+        return hull
 
     def has(self, name: str) -> bool:
         """Whether a hull of that name exists."""

@@ -1,7 +1,7 @@
 """Hulls as they were: rebuilt from a stored state and the batches after it, in short steps beside the writes."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager, asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +21,7 @@ from ..state.errors import (
 from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
-from ..state.records import CommitStamp
+from ..state.records import CommitStamp, Record
 from ..state.root_state import state_of
 from ..storage.past import Moment, Past, created
 from .divided_hull import DividedHull
@@ -66,32 +66,36 @@ class PastHulls:
         self._max_rows = max_rows
         self._kept: list[_Rebuilt] = []  # the last used at the end
 
-    async def moment(self, live: LiveHull, revision: int | None, time: int) -> Moment:
+    async def moment(self, live: LiveHull, revision: int | None, time: int, field: str = "at_") -> Moment:
         """The revision that is asked for: a number, or None for the last one committed at or before a time.
+
+        `field` is the beginning of the fields of the request that say so.
 
         Raises:
             HullUnsuitableError: nothing is kept of the past of this hull.
             RevisionForgottenError: that revision is not kept any more, or not reached.
             MomentForgottenError: that time is before the oldest that is kept, or later than now.
         """
-        if not self._keeps:
-            raise HullUnsuitableError(live.name, "has no past: this server keeps no batches")
-        if isinstance(live, DividedHull):
-            raise HullUnsuitableError(live.name, "is divided among shards, and only its present can be read")
+        self._require_past(live)
         number, newest = live.number, live.counts.revision
         if revision is None:
-            await self._settled(time)
+            await self._settled(time, field)
             found: Moment | None = await self._ask(live.name, partial(self._past.moment, number, time))
             if found is None:
                 oldest = await self._ask(live.name, partial(self._past.oldest_moment, number, timed=True))
                 at = None if oldest.committed is None else oldest.committed.time
-                raise MomentForgottenError(time, oldest.revision, at, live.counts.revision)
+                raise MomentForgottenError(time, oldest.revision, at, live.counts.revision, f"{field}time")
             return found
-        oldest = await self._ask(live.name, partial(self._past.oldest_moment, number))
+        oldest = await self.oldest(live)
         if not oldest.revision <= revision <= newest:
-            at = None if oldest.committed is None else oldest.committed.time
-            raise RevisionForgottenError(revision, oldest.revision, newest, at, "at_revision")
+            raise _forgotten(live, revision, oldest, f"{field}revision")
         return Moment(revision, None)
+
+    async def oldest(self, live: LiveHull) -> Moment:
+        """The oldest revision of a hull that can be read, or raise HullUnsuitableError if it has no past."""
+        self._require_past(live)
+        oldest: Moment = await self._ask(live.name, partial(self._past.oldest_moment, live.number))
+        return oldest
 
     @asynccontextmanager
     async def state(self, hull: Hull, revision: int) -> AsyncIterator[HullState]:
@@ -101,11 +105,7 @@ class PastHulls:
             LimitExceededError: it would take too many rows.
             RevisionForgottenError: what it takes is not kept any more.
         """
-        rebuilt = self._take(hull, revision)
-        if rebuilt is None:
-            rebuilt = await self._begin(hull, revision)
-        while rebuilt.state.counts.revision < revision:
-            await self._ask(hull.name, partial(self._step, rebuilt, revision))
+        rebuilt = await self._reach(hull, revision)
         try:
             yield rebuilt.state
         except RefusedError:
@@ -113,6 +113,44 @@ class PastHulls:
             raise
         # After any other end a thread may still read it.
         self._keep(rebuilt)
+
+    async def own(self, hull: Hull, revision: int) -> HullState:
+        """The state of a hull at a revision, for one who changes it. Raises the errors of `state`."""
+        return (await self._reach(hull, revision)).state
+
+    async def batches(self, live: LiveHull, after: int, until: int) -> list[Record]:
+        """The batches that follow revision `after`, none after `until`, as many as are applied in some milliseconds.
+
+        Raises:
+            RevisionForgottenError: they are not kept any more.
+        """
+        try:
+            found: list[Record] = await self._ask(live.name, partial(self._past.batches, live.number, after, until))
+        except NotStoredError:
+            oldest = await self.oldest(live)
+            if oldest.revision > after:
+                raise _forgotten(live, after + 1, oldest, "start_revision") from None
+            raise
+        return found
+
+    async def follow(self, state: HullState, records: Sequence[Record]) -> None:
+        """Apply batches to a state that the caller has for himself."""
+        work = partial(state.catch_up, records, self._driver.machine.clock.monotonic())
+        moved = any(each.center is not None for each in records)
+        if sum(1 + len(each.rows) for each in records) + moved * state.counts.points <= SMALL:
+            work()
+        else:
+            await self._driver.rebuild(work)
+        self._require_room(state.counts.points)
+
+    async def _reach(self, hull: Hull, revision: int) -> _Rebuilt:
+        """A hull at a revision, from a kept one or anew."""
+        rebuilt = self._take(hull, revision)
+        if rebuilt is None:
+            rebuilt = await self._begin(hull, revision)
+        while rebuilt.state.counts.revision < revision:
+            await self._ask(hull.name, partial(self._step, rebuilt, revision))
+        return rebuilt
 
     async def _begin(self, hull: Hull, revision: int) -> _Rebuilt:
         """The newest stored state at or before a revision."""
@@ -164,10 +202,17 @@ class PastHulls:
         while len(self._kept) > MOST_KEPT or sum(each.rows for each in self._kept) > self._max_rows:
             del self._kept[0]
 
-    async def _settled(self, time: int) -> None:
+    def _require_past(self, live: LiveHull) -> None:
+        """Raise HullUnsuitableError if nothing is kept of the past of a hull."""
+        if not self._keeps:
+            raise HullUnsuitableError(live.name, "has no past: this server keeps no batches")
+        if isinstance(live, DividedHull):
+            raise HullUnsuitableError(live.name, "is divided among shards, and only its present can be read")
+
+    async def _settled(self, time: int, field: str) -> None:
         """Wait until no commit can come any more that has this time or an earlier one."""
         if time >= self._driver.commit_time():
-            raise MomentForgottenError(time, None, None, None)
+            raise MomentForgottenError(time, None, None, None, field=f"{field}time")
         if time >= self._driver.published.time:
             await self._driver.settled()
 
@@ -178,6 +223,11 @@ class PastHulls:
             raise HullNotFoundError(name) from None
         except UNREADABLE as error:
             raise NotStoredError(words_for_callers(error)) from error
+
+
+def _forgotten(live: LiveHull, revision: int, oldest: Moment, field: str) -> RevisionForgottenError:
+    at = None if oldest.committed is None else oldest.committed.time
+    return RevisionForgottenError(revision, oldest.revision, live.counts.revision, at, field)
 
 
 class PastHull(LiveHull):

@@ -258,15 +258,15 @@ def _require_sketch(most: int) -> None:
         raise InvalidFieldError("max_vertices", most, f"must be at most {LARGEST_SKETCH}")
 
 
-def decode_max_vertices(request: hull_service_pb2.WatchRequest) -> int:
-    """The most vertices of a sketch, 0 for all vertices."""
+def decode_max_vertices(request: Any, others: Sequence[str] = ("directions",)) -> int:
+    """The most vertices of a sketch, 0 for all vertices; `others` are fields that do not go with it."""
     _require_sketch(request.max_vertices)
     for field in ("layer", "max_vertices"):
-        for other in ("directions", "resume"):
+        for other in others:
             if getattr(request, field) and request.HasField(other):
                 problem = f"cannot be combined with {other}"
                 raise InvalidFieldError(field, getattr(request, field), problem)
-    return request.max_vertices
+    return int(request.max_vertices)
 
 
 def decode_many(request: hull_service_pb2.WatchManyRequest) -> Choice:
@@ -353,7 +353,7 @@ def decode_last(request: hull_service_pb2.GetSeriesRequest) -> float | None:
 
 
 def decode_interval(
-    request: hull_service_pb2.WatchRequest | fence_service_pb2.WatchFenceRequest,
+    request: hull_service_pb2.WatchRequest | hull_service_pb2.ReplayRequest | fence_service_pb2.WatchFenceRequest,
 ) -> float | None:
     """Seconds without an event before a progress mark, None for no marks."""
     if not request.HasField("progress_interval"):

@@ -20,7 +20,7 @@ from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.roster import Roster
 from ..engine.steps import FEW_ROWS, Run, at_once
-from ..engine.views import FewView, ResumedView, SketchView, VerticesView, View
+from ..engine.views import ResumedView
 from ..engine.watch import watch
 from ..engine.watch_many import watch_many
 from ..state.errors import HullEmptyError, HullFencedError, HullReplacedError, LimitExceededError, PartRefusedError
@@ -30,12 +30,14 @@ from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
 from .decode_moment import decode_moment
+from .decode_replay import decode_view
 from .decode_settings import decode_center, decode_history, decode_quarantine, decode_settings, decode_shards
 from .many import MANY_INTERVAL, HullStates, ManyQuotas, encode_many, require_many
 from .metrics import Metrics
 from .places import Places
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
+from .replays import Replays
 from .status import ANSWERED
 from .vertex_pages import VertexPages, page_token
 from .writing import (
@@ -63,6 +65,7 @@ class HullService:
         metrics: counts the work.
         quotas: how much a caller may watch of many hulls.
         pasts: limits the reads of the past at a time.
+        replays: limits the replays at a time.
         create_on_write: whether a write to a missing hull creates it.
         max_watch_lag: the seconds that a watcher may take to receive an event.
     """
@@ -74,12 +77,14 @@ class HullService:
         metrics: Metrics,
         quotas: ManyQuotas,
         pasts: Places,
+        replays: Places,
         *,
         create_on_write: bool,
         max_watch_lag: float,
     ) -> None:
         self._hulls = hulls
         self._pasts = pasts
+        self._replays = Replays(hulls, replays, driver.aside, max_watch_lag)
         self._driver = driver
         self._aside = driver.aside
         self._metrics = metrics
@@ -495,21 +500,11 @@ class HullService:
     async def Watch(self, request: pb.WatchRequest, call: Call) -> None:
         hull = self._read(call, request.name)
         encoding = decode.decode_encoding(request.encoding)
-        directions = decode.decode_directions(request.directions) if request.HasField("directions") else None
         resume = decode.decode_resume(request)
-        keys = request.include_keys
-        if keys:
-            hull.require_keys("include_keys")
-        layer, most = decode.decode_layer(request), decode.decode_max_vertices(request)
-        view: View
-        if directions is not None:
-            view = SketchView(hull, directions, vertices=request.include_measures, keys=keys)
-        elif most:
-            view = FewView(hull, most, vertices=request.include_measures, keys=keys, layer=layer)
-        elif resume is None:
-            view = VerticesView(hull, keys=keys, layer=layer)
-        else:
-            view = ResumedView(hull, resume.uid, resume.revision, keys=keys)
+        decode.decode_max_vertices(request, ("directions", "resume"))
+        view = decode_view(request, hull)
+        if resume is not None:
+            view = ResumedView(hull, resume.uid, resume.revision, keys=request.include_keys)
         events = watch(
             hull,
             view,
@@ -530,6 +525,11 @@ class HullService:
                         encode.encode_changed(hull, message)
                     with self._metrics.sending(watcher, message.WhichOneof("event")):
                         await call.write_within(self._max_watch_lag, message)
+
+    async def Replay(self, request: pb.ReplayRequest, call: Call) -> None:
+        hull = self._read(call, request.name)
+        call.access.require_past(hull.name)
+        await self._replays.send(request, hull, call)
 
     async def WatchMany(self, request: pb.WatchManyRequest, call: Call) -> None:
         choice = decode.decode_many(request)

@@ -185,7 +185,7 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     ),
     MomentForgottenError: Refusal(
         "REVISION_FORGOTTEN",
-        lambda e: {"field": "at_time", "value": str(e.time), "oldest": e.oldest, "newest": e.newest},
+        lambda e: {"field": e.field, "value": str(e.time), "oldest": e.oldest, "newest": e.newest},
     ),
     RevisionForgottenError: Refusal(
         "REVISION_FORGOTTEN",

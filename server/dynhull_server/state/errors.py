@@ -256,9 +256,17 @@ class MomentForgottenError(RefusedError):
         time: the time, in microseconds since 1970.
         oldest: the oldest revision whose commit is known; None for a time that has not come.
         newest: the newest.
+        field: the field of the request that has the time.
     """
 
-    def __init__(self, time: int, oldest: int | None, oldest_time: int | None, newest: int | None) -> None:
+    def __init__(
+        self,
+        time: int,
+        oldest: int | None,
+        oldest_time: int | None,
+        newest: int | None,
+        field: str = "at_time",
+    ) -> None:
         if oldest is None:
             problem = "is not over by the server's clock"
         elif oldest_time is None:
@@ -269,6 +277,7 @@ class MomentForgottenError(RefusedError):
         self.time = time
         self.oldest = oldest
         self.newest = newest
+        self.field = field
 
 
 class PagesForgottenError(RefusedError):

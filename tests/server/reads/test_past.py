@@ -1,4 +1,4 @@
-"""Reads as of an earlier revision or time answer exactly what the hull answered then."""
+"""Reads as of an earlier revision or time answer exactly what the hull answered then, and a replay shows it."""
 
 import asyncio
 import hashlib
@@ -9,20 +9,30 @@ from datetime import UTC, datetime, timedelta
 import grpc
 import numpy as np
 import pytest
+from application_call import called
+from command_line import dynhull
+from proxy import proxy
 from server_process import run, server_process
 
 from dynhull_client import (
     AsyncHullClient,
     HullClient,
+    HullCopy,
     HullNotFoundError,
     HullReplacedError,
     HullUnsuitableError,
     InvalidRequestError,
     LimitExceededError,
     PermissionDeniedError,
+    Progress,
     Quarantine,
     RevisionForgottenError,
+    Sketch,
+    UnauthenticatedError,
+    UnavailableError,
 )
+from dynhull_gateway.app import application
+from dynhull_gateway.settings import Settings
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
@@ -109,8 +119,9 @@ def recorded(tmp_path_factory):
         for second in range(BATCHES):
             for name in KINDS:
                 write(client, name, rng, second)
-                info = client.get_hull(name).info
-                seen[name][info.revision] = answers(Live(client, name), "keyed" in KINDS[name]), info.changed
+                hull = client.get_hull(name)
+                found = answers(Live(client, name), "keyed" in KINDS[name])
+                seen[name][hull.info.revision] = found, hull.info.changed, hull
         server.process.kill()
     return folder, seen
 
@@ -129,13 +140,85 @@ def test_every_revision_answers_as_it_did(served, name):
     np.random.default_rng(1).shuffle(order)  # forward from kept ones, and back
     with HullClient(address) as client:
         for revision in order[:6]:
-            expected, changed = seen[name][revision]
+            expected, changed, _ = seen[name][revision]
             past = client.at(name, revision)
             assert (past.revision, past.time) == (revision, changed)
             assert answers(past, "keyed" in KINDS[name]) == expected
             assert client.at(name, changed).revision == revision
             assert client.at(name, changed.isoformat()).revision == revision
             assert past.verify().equal
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_copy_that_follows_a_replay_is_the_hull_of_each_revision(served, name):
+    address, seen = served
+    keys = "keyed" in KINDS[name]
+    last = max(seen[name])
+    with HullClient(address) as client:
+        copy, revisions = HullCopy(), []
+        for event in client.replay(name, end=last, copy=copy, keys=keys, measures=True):
+            revisions.append(event.revision)
+            if event.revision not in seen[name]:
+                continue
+            _, changed, hull = seen[name][event.revision]
+            assert (event.changed, event.clock) == (changed, hull.info.clock)
+            assert (copy.uid, copy.points, copy.center) == (hull.info.uid, hull.info.points, hull.info.center)
+            assert np.array_equal(copy.vertices, hull.vertices)
+            assert copy.vertex_keys == hull.vertex_keys
+            assert isinstance(event, Progress) or repr(event.measures) == repr(hull.measures)
+        assert revisions == list(range(last + 1))
+        first = sorted(seen[name])[2]
+        begin, end = seen[name][first][1], seen[name][last][1]
+        for event in client.replay(name, begin, end.isoformat(), layer=2, copy=copy, every=10.0):
+            assert event.revision in (first, last)
+        assert np.array_equal(copy.vertices, client.at(name, last).layers(2).layers[1])
+        sketches = [each for each in client.replay(name, last - 1, last, max_vertices=3) if isinstance(each, Sketch)]
+        of_now = next(client.watch(name, max_vertices=3))
+        assert name == "keyed" or (sketches[-1].error, sketches[-1].vertices.tolist()) == (
+            of_now.error,
+            of_now.vertices.tolist(),
+        )
+
+
+def test_a_replay_goes_on_where_it_was_after_a_lost_connection(served):
+    address, seen = served
+    last = max(seen["keyed"])
+    with proxy(address) as way, HullClient(way.address) as client:
+        for options in ({}, {"layer": 2}, {"max_vertices": 3}):
+            revisions, copy = [], HullCopy()
+            for event in client.replay("keyed", 1, last, keys=True, copy=copy, max_rate=400.0, **options):
+                if event.revision % 7 == 0:
+                    way.cut()
+                revisions.append(event.revision)
+            assert revisions == list(range(1, last + 1))
+            if not options:
+                assert copy.vertex_keys == seen["keyed"][last][2].vertex_keys
+        with client.replay("keyed", 1, last, reconnect=False, max_rate=20.0) as played:
+            next(played)
+            way.cut()
+            with pytest.raises(UnavailableError):
+                list(played)
+
+
+def test_a_replay_is_refused_by_name(served):
+    address, seen = served
+    last = max(seen["plain"])
+    with HullClient(address) as client:
+        with pytest.raises(InvalidRequestError, match="is before the start, which is revision 3"):
+            list(client.replay("plain", 3, 2))
+        with pytest.raises(RevisionForgottenError, match=f"the newest {last}") as refused:
+            list(client.replay("plain", end=last + 9))
+        assert refused.value.field == "end_revision"
+        with pytest.raises(RevisionForgottenError, match="is not over by the server's clock") as refused:
+            list(client.replay("plain", end=datetime.now(UTC) + timedelta(days=1)))
+        assert refused.value.field == "end_time"
+        for options, field in (({"speed": -1.0}, "speed"), ({"speed": float("nan")}, "speed"), ({"every": 0}, "every")):
+            with pytest.raises(InvalidRequestError, match=field):
+                list(client.replay("plain", **options))
+        with pytest.raises(HullUnsuitableError, match="keys"):
+            list(client.replay("plain", keys=True))
+        with pytest.raises(HullNotFoundError):
+            list(client.replay("nobody"))
 
 
 def test_the_past_is_read_while_writers_go_on(served):
@@ -232,6 +315,48 @@ def test_the_asyncio_client_and_the_command_line_read_the_past(served):
         assert (json.loads(result.stdout)["area"], json.loads(result.stdout)["revision"]) == (area, revision)
 
 
+def test_faces_of_a_replay(served):
+    address, seen = served
+    last = max(seen["keyed"])
+    first = sorted(seen["keyed"])[4]
+    vertices = [hull.vertices.tolist() for revision, (_, _, hull) in sorted(seen["keyed"].items()) if revision >= first]
+
+    async def played():
+        async with AsyncHullClient(address) as client, client.replay("keyed", first, last) as events:
+            return [event.revision async for event in events]
+
+    async def streamed(path, **headers):
+        async with AsyncHullClient(address) as client:
+            return await called(application(client, Settings()), path, **headers)
+
+    assert asyncio.run(played()) == list(range(first, last + 1))
+    with HullClient(address) as client:
+        expected = list(client.replay("keyed", first, last))
+    shown = dynhull("replay", "keyed", "--from", first, "--to", last, "--json", "--keys", "--address", address)
+    events = [json.loads(line) for line in shown.stdout.splitlines()]
+    assert [event["revision"] for event in events] == list(range(first, last + 1))
+    assert [event["changed"] for event in events] == [event.changed.isoformat() for event in expected]
+    lines = dynhull("replay", "keyed", "--to", seen["keyed"][first][1].isoformat(), "--address", address).stdout
+    assert [line.split("\t")[0] for line in lines.splitlines()] == list(map(str, range(first + 1)))
+    assert lines.splitlines()[-1].split("\t")[1] == seen["keyed"][first][1].isoformat()
+
+    path = f"/hulls/keyed/replay?from={first}&to={last}&f=vertices"
+    status, body = asyncio.run(streamed(path))
+    events = [dict(line.split(": ", 1) for line in each.splitlines()) for each in body.split("\n\n")[1:-1]]
+    assert status == 200
+    shapes = [json.loads(each["data"])["vertices"] for each in events if each["event"] == "snapshot"]
+    assert shapes[0] == vertices[0]
+    assert shapes[-1] == vertices[-1]
+    assert json.loads(events[-1]["data"]) == {"revision": last}
+    assert [each["event"] for each in events].count("end") == 1
+    uid, over = events[-1]["id"].split(":")
+    assert asyncio.run(streamed(path, last_event_id=f"{uid}:{over}")) == (204, "")
+    status, body = asyncio.run(streamed(path, last_event_id=f"{uid}:{last - 1}"))
+    assert next(line for line in body.splitlines() if line.startswith("id: ")) == f"id: {uid}:{last - 1}"
+    assert asyncio.run(streamed(path, last_event_id=f"other:{last - 1}"))[0] == 409
+    assert asyncio.run(streamed("/hulls/nobody/replay"))[0] == 404
+
+
 def test_the_past_needs_a_permission_of_its_own_and_has_limits(tmp_path):
     tokens = tmp_path / "tokens.toml"
     lines = [
@@ -240,6 +365,7 @@ def test_the_past_needs_a_permission_of_its_own_and_has_limits(tmp_path):
     ]
     tokens.write_text("".join(lines))
     options = "--data", str(tmp_path / "data"), "--tokens", str(tokens), "--max-past-rows", "100", "--create-on-write"
+    options += ("--max-replays-per-caller", "1")
     with server_process(*options, complaints=None) as server, HullClient(server.address, token="now") as client:
         for name in ("a", "b"):
             client.apply(name, insert=XY)
@@ -247,9 +373,21 @@ def test_the_past_needs_a_permission_of_its_own_and_has_limits(tmp_path):
         for name, token in (("a", "now"), ("b", "then")):
             with pytest.raises(PermissionDeniedError, match="read the past of"):
                 client.with_token(token).at(name, 1)
+            with pytest.raises(PermissionDeniedError, match="read the past of"):
+                list(client.with_token(token).replay(name))
         assert client.with_token("then").at("a", 1).count(XY).counts.tolist() == [1] * len(XY)
         with pytest.raises(LimitExceededError, match="max_past_rows"):
             client.with_token("then").at("a", 2)
+        then = client.with_token("then")
+        with pytest.raises(LimitExceededError, match="max_past_rows"):
+            list(then.replay("a", 1))
+        with then.replay("a", 0, 1, speed=1e-6) as played:
+            next(played)
+            with pytest.raises(LimitExceededError, match="max_replays_per_caller"):
+                list(then.replay("a", 0, 1))
+            tokens.write_text(lines[0])
+            with pytest.raises(UnauthenticatedError):
+                next(played)
 
 
 def test_a_server_in_memory_has_no_past(address, name):

@@ -108,6 +108,15 @@ OF_HULL = (
     'data: {"revision":3,"points":5,"removed":[[4.0,3.0]],"removed_rows":[2],"added":[[4.0,4.0],[2.0,4.0]],'
     '"added_rows":[2,3],"rotation":0,"cause":"batch"}\n\n'
 )
+OF_PAST = (
+    "retry: 1000\n\n"
+    "event: snapshot\nid: fe203b7c85e2be96:1\n"
+    'data: {"revision":1,"points":3,"changed":"2026-01-31T12:00:00Z","vertices":[[0.0,0.0],[4.0,0.0],[4.0,3.0]],'
+    '"center":null}\n\n'
+    "event: progress\nid: fe203b7c85e2be96:2\n"
+    'data: {"revision":2,"points":4,"cause":"batch","changed":"2026-01-31T12:00:01Z"}\n\n'
+    'event: end\nid: fe203b7c85e2be96:over\ndata: {"revision":2}\n\n'
+)
 OF_FENCE = (
     "retry: 1000\n\n"
     "event: enter\nid: beb1f1fb68d6cfdb:2\n"

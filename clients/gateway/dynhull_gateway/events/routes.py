@@ -15,12 +15,13 @@ from ..callers import Caller, address_of, token_of
 from ..problems import ProblemError
 from ..schemas import LARGEST, NAME, FencePath, HullPath, Prefix
 from . import documents
-from .feeds import PATIENCE_SECONDS, Feed, Form, View
+from .feeds import PATIENCE_SECONDS, Feed
 from .fence_events import Reading
 from .fence_events import events as fence_events
 from .many import ManyFeed, ManyView
 from .messages import parted, position_of, resumed
 from .stream import EventStream
+from .texts import Form, View
 
 router = APIRouter(tags=["events"])
 
@@ -116,7 +117,7 @@ async def hull_events(
     """
     if f is not None and form is not None:
         raise ProblemError(400, f"form: {OLD_NAME}: give f alone", "INVALID_FIELD", field="form", value=form)
-    _admit(request)
+    admit(request)
     awaited = (UnavailableError, HullNotFoundError) if wait else (UnavailableError,)
     with suppress(*awaited):  # an answer of 503 or 404 would end an EventSource for good
         await client.count(name, np.empty((0, 2)))  # whether it is there, and may be read
@@ -156,7 +157,7 @@ async def watch_many(
     if max_vertices is not None and not outlines:
         detail = "max_vertices: only with outlines=true: without it no vertices are sent"
         raise ProblemError(400, detail, "INVALID_FIELD", field="max_vertices", value=str(max_vertices))
-    _admit(request)
+    admit(request)
     token, figures = token_of(request), request.app.state.figures
     caller = address_of(request) if token is None else token
     _admit_many(request, caller)
@@ -193,7 +194,7 @@ async def follow_fence(
     """
     if consumer is not None and (after is not None or conflate):
         raise ValueError("give either consumer, which knows its place, or after and conflate")
-    _admit(request)
+    admit(request)
     ident, exact = parted(last_event_id)
     resume = resumed(ident)
     uid, place = ("", after) if resume is None or consumer is not None else resume
@@ -224,7 +225,8 @@ async def _require_fence(client: AsyncHullClient, reading: Reading, field: str) 
             raise ProblemError(409, detail, "SEQUENCE_AHEAD", field=field, value=str(reading.after))
 
 
-def _admit(request: Request) -> None:
+def admit(request: Request) -> None:
+    """Refuse a stream that the gateway has no place for, or no time."""
     state = request.app.state
     if state.health.draining.is_set():
         raise ProblemError(503, "the gateway stops", "DRAINING")

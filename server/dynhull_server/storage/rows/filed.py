@@ -88,7 +88,10 @@ class Filed:
             if batches is not None:
                 self._open.move_to_end(segment.file)
                 return batches
-        batches = read_batches(self._archive, segment)
+        try:
+            batches = read_batches(self._archive, segment)
+        except DamagedError as error:
+            raise DamagedError(f"revisions {segment.first} to {segment.last} cannot be read: {error}") from error
         with self._turn:
             self._open[segment.file] = batches
             while len(self._open) > KEPT_OPEN:

@@ -1,0 +1,83 @@
+"""Sending the past of a hull to a caller, event by event."""
+
+from contextlib import aclosing
+
+from dynhull_proto.v1 import hull_service_pb2 as pb
+
+from ..engine.hulls import Hulls
+from ..engine.live_hull import LiveHull
+from ..engine.replay import replay
+from ..engine.steps import Run
+from ..state.errors import HullReplacedError
+from . import decode, encode
+from .calls import Call
+from .decode_replay import decode_end, decode_pace, decode_view
+from .places import Places
+
+
+class Replays:
+    """The replays of a server.
+
+    Args:
+        hulls: the hulls.
+        places: limits their number, because each has a hull of its own.
+        aside: runs what takes long.
+        max_lag: the seconds that a reader may take to receive an event.
+    """
+
+    def __init__(self, hulls: Hulls, places: Places, aside: Run, max_lag: float) -> None:
+        self._hulls = hulls
+        self._places = places
+        self._aside = aside
+        self._max_lag = max_lag
+
+    async def send(self, request: pb.ReplayRequest, live: LiveHull, call: Call) -> None:
+        """Send the events of a hull, whose past the caller may read."""
+        encoding = decode.decode_encoding(request.encoding)
+        pace = decode_pace(request)
+        decode_view(request, live)
+        with self._places.take(call.owner):
+            with call.cutoff():
+                first, last = await self._ends(request, live)
+                hull = await self._hulls.replayed(live, first, last)
+            origin = None if hull.committed is None else hull.committed.time
+            if (start := decode_end(request, "start")) is not None and start[0] is None:
+                origin = start[1]
+            events = replay(
+                hull,
+                decode_view(request, hull),
+                pace,
+                origin=origin,
+                resumed=request.HasField("resume"),
+                outline_only=request.outline_only,
+            )
+            measure = hull.measures if request.include_measures else None
+            async with aclosing(events):
+                while True:
+                    with call.cutoff():
+                        event = await anext(events, None)
+                        if event is None:
+                            return
+                        call.require_entitled()
+                        message = await encode.encode_watched(event, encoding, self._aside, measure)
+                        encode.encode_changed(hull, message)
+                    await call.write_within(self._max_lag, pb.ReplayResponse(event=message))
+
+    async def _ends(self, request: pb.ReplayRequest, live: LiveHull) -> tuple[int, int]:
+        """The first revision and the last one."""
+        pasts = self._hulls.pasts
+        newest = live.counts.revision
+        if request.HasField("resume"):
+            if request.resume.uid != live.uid:
+                raise HullReplacedError(live.name, live.uid)
+            first = (await pasts.moment(live, request.resume.revision, 0, "resume.")).revision
+        elif (start := decode_end(request, "start")) is not None:
+            first = (await pasts.moment(live, *start, "start_")).revision
+        else:
+            first = (await pasts.oldest(live)).revision
+        end = decode_end(request, "end")
+        last = newest if end is None else (await pasts.moment(live, *end, "end_")).revision
+        if last < first:
+            problem = f"is before the start, which is revision {first}"
+            raise decode.InvalidFieldError(request.WhichOneof("end") or "start", f"revision {last}", problem)
+        return first, last
