@@ -21,7 +21,8 @@ ELSEWHERE = {"tutorial", "how-to/brokers", "how-to/serve"}  # their commands hav
 PIECES = "reference/sdk"  # of programs: they begin with a client that is there
 
 ENDING = (
-    "create|put|insert|remove|delete|load|verify|query|replay|measure|separate|phases|frontier|fences (create|show|inside)"
+    "create|put|insert|remove|delete|load|verify|query|replay|measure|separate|phases|frontier|"
+    "fences (create|show|inside)"
 )
 COMMAND = re.compile(rf"(?P<given>(printf|echo) [^|]*\| )?dynhull (?P<arguments>({ENDING}) [^|]*)")
 FILE = re.compile(r"printf .* > \S+|gzip .*")

@@ -122,6 +122,20 @@ def test_keys_and_transfers(gateway: Gateway, name: str) -> None:
     assert (at_noon["keys"], at_noon["times"]) == (["b", "t"], [None, "2026-01-31T12:00:00.000000Z"])
 
 
+def test_the_largest_keys_come_back_from_every_read(gateway: Gateway, name: str) -> None:
+    largest = 2**64 - 1
+    at = f"/hulls/{name}"
+    assert gateway.post("/hulls", {"name": name, "keyed": "int"}).status == 201
+    assert gateway.post(f"{at}/points", {"keys": [largest], "points": [[2, 1]]}).status == 200
+    assert gateway.get(at).json["vertex_keys"] == [largest]
+    assert gateway.get(f"{at}/entities").json["keys"] == [largest]
+    assert gateway.get(f"{at}/entities?at=1").json["keys"] == [largest]
+    for read in ("sample", "influence"):
+        assert gateway.get(f"{at}/{read}?keys=true").json["keys"] == [largest]
+    assert gateway.get(f"{at}/layers?keys=true").json["keys"] == [[largest]]
+    assert gateway.post(f"{at}/support", {"directions": [[1, 0]], "keys": True}).json["keys"] == [largest]
+
+
 def test_fences(gateway: Gateway, name: str) -> None:
     gateway.post("/hulls", {"name": name, "keyed": "str"})
     fence = {"name": name, "area": {"exterior": SQUARE}, "subjects": name}

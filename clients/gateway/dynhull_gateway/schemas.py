@@ -73,7 +73,7 @@ Pairs = Annotated[list[Annotated[list[Place], Field(min_length=2, max_length=2)]
 Numbers = Annotated[list[float | None], BeforeValidator(rows)]
 Integers = Annotated[list[int], BeforeValidator(rows)]
 Booleans = Annotated[list[bool], BeforeValidator(rows)]
-Keys = Annotated[list[str] | list[int], BeforeValidator(list)]
+Keys = Annotated[list[str] | list[int], BeforeValidator(lambda keys: list(rows(keys)))]
 Times = Annotated[list[str | None], BeforeValidator(_times)]
 
 Segment = Annotated[str, StringConstraints(pattern=NAME), BeforeValidator(unquoted)]
