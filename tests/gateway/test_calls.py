@@ -129,7 +129,6 @@ def test_the_largest_keys_come_back_from_every_read(gateway: Gateway, name: str)
     assert gateway.post(f"{at}/points", {"keys": [largest], "points": [[2, 1]]}).status == 200
     assert gateway.get(at).json["vertex_keys"] == [largest]
     assert gateway.get(f"{at}/entities").json["keys"] == [largest]
-    assert gateway.get(f"{at}/entities?at=1").json["keys"] == [largest]
     for read in ("sample", "influence"):
         assert gateway.get(f"{at}/{read}?keys=true").json["keys"] == [largest]
     assert gateway.get(f"{at}/layers?keys=true").json["keys"] == [[largest]]
