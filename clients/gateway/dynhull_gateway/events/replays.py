@@ -38,7 +38,11 @@ ReplayRate = Annotated[float, Query(ge=0, le=1000, description="The most events 
 OVER = "over"  # in an id, after the uid
 
 
-@router.get("/hulls/{name}/replay", response_class=Described, responses=events(documents.OF_PAST))
+@router.get(
+    "/hulls/{name}/replay",
+    response_class=Described,
+    responses={**events(documents.OF_PAST), 204: {"description": "The replay is over."}},
+)
 async def replay(
     request: Request,
     client: Caller,
