@@ -1,4 +1,6 @@
-"""Events of fences in C++, with the same results as in Python."""
+"""
+Events of fences and batches of the past in C++, with the same results as in Python.
+"""
 
 
 
@@ -45,4 +47,9 @@ def added(runs: object, places: Numbers, lasts: object, news: object, end: int, 
 def counted(places: object, news: tuple[object, object, object, object], columns: tuple[object, object, object, object, object]) -> None:
     """
     Count events of fences at these places: two columns are set, two are added to, and the last is 1.
+    """
+
+def key_codes(lengths: bytes, data: bytes) -> bytes:
+    """
+    The number of each key, as int32: equal ones have the same, each that is new one more than those before.
     """

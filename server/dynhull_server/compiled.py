@@ -1,4 +1,6 @@
-"""What the server does for each event of a fence, in C++ if that is built; what calls it does the same without.
+"""What the server does for each event of a fence, and each batch of the past, in C++ if that is built.
+
+What calls it does the same without.
 
 The environment variable DYNHULL_KERNEL decides for the library and for this.
 """
@@ -90,6 +92,9 @@ class Native(Protocol):
         columns: "tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]",
     ) -> None:
         """`Tallies.take` in state/fences."""
+
+    def key_codes(self, lengths: bytes, data: bytes) -> bytes:
+        """`_codes` in storage/segments/gathered.py."""
 
 
 def _load() -> Native | None:

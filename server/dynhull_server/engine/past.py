@@ -170,7 +170,7 @@ class PastHulls:
     def _step(self, rebuilt: _Rebuilt, revision: int) -> None:
         """Apply the next batches."""
         state = rebuilt.state
-        records = self._past.batches(rebuilt.hull.row.number, state.counts.revision, revision)
+        records = self._past.gathered(rebuilt.hull.row.number, state.counts.revision, revision)
         rebuilt.rows += sum(1 + len(each.rows) for each in records)
         self._require_room(rebuilt.rows)
         state.catch_up(records, self._driver.machine.clock.monotonic())

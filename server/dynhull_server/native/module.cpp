@@ -1,4 +1,4 @@
-// dynhull_server._native: what the server does for each event of a fence, for Python.
+// dynhull_server._native: what the server does for each event of a fence, and each batch of the past, for Python.
 #include <nanobind/nanobind.h>
 
 #include <memory>
@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "encoding.hpp"
+#include "key_codes.hpp"
 #include "numbering.hpp"
 #include "numbers.hpp"
 
@@ -268,11 +269,35 @@ void counted(const nb::object& places, const nb::tuple& news, const nb::tuple& c
   }
 }
 
+// The number of each key: equal ones have the same, and each that is new one more than those before.
+nb::bytes key_codes(const nb::bytes& lengths, const nb::bytes& data) {
+  const View<std::uint8_t> of_lengths(lengths);
+  const std::size_t count = of_lengths.size();
+  std::size_t total = 0;
+  for (const std::uint8_t length : of_lengths.values()) total += length;
+  if (total != data.size()) throw nb::value_error("the lengths do not add up to the data");
+  nb::object codes = nb::steal(PyBytes_FromStringAndSize(nullptr, Py_ssize_t(count * sizeof(std::int32_t))));
+  if (!codes.is_valid()) throw nb::python_error();
+  auto* const out = reinterpret_cast<std::int32_t*>(PyBytes_AS_STRING(codes.ptr()));
+  {
+    std::optional<nb::gil_scoped_release> release;
+    if (count >= MANY) release.emplace();
+    KeyCodes table(count);
+    const char* at = data.c_str();
+    for (std::size_t row = 0; row < count; ++row) {
+      const std::uint8_t length = of_lengths.data()[row];
+      out[row] = table.code({at, length});
+      at += length;
+    }
+  }
+  return nb::borrow<nb::bytes>(codes);
+}
+
 }  // namespace
 }  // namespace dynhull_server
 
 NB_MODULE(_native, module) {
-  module.doc() = "Events of fences in C++, with the same results as in Python.";
+  module.doc() = "Events of fences and batches of the past in C++, with the same results as in Python.";
   using dynhull_server::Numbers;
   nb::class_<Numbers>(module, "Numbers", "A dictionary of integers, those of fences, without an object for each.")
       .def(nb::init<>())
@@ -310,4 +335,8 @@ NB_MODULE(_native, module) {
              nb::sig("def counted(places: object, news: tuple[object, object, object, object], "
                      "columns: tuple[object, object, object, object, object]) -> None"),
              "Count events of fences at these places: two columns are set, two are added to, and the last is 1.");
+  module.def(
+      "key_codes", &dynhull_server::key_codes, "lengths"_a, "data"_a,
+      nb::sig("def key_codes(lengths: bytes, data: bytes) -> bytes"),
+      "The number of each key, as int32: equal ones have the same, each that is new one more than those before.");
 }

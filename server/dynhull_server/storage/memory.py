@@ -166,6 +166,10 @@ class MemoryStorage:
         with self._turn:
             return [each for each in self._hulls[number].records if after < each.revision <= until][:STEP_RECORDS]
 
+    def gathered(self, number: int, after: int, until: int) -> list[Record]:
+        """The batches themselves."""
+        return self.batches(number, after, until)
+
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""
         first = self.oldest_moment(number)

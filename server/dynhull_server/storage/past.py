@@ -70,5 +70,12 @@ class Past(Protocol):
         At least one, if `after` is before `until`; as many as are read and applied in some milliseconds.
         """
 
+    def gathered(self, number: int, after: int, until: int) -> list[Record]:
+        """What leads from the state at revision `after` towards that at `until`: `batches` in fewer records.
+
+        Each has the revision of the last batch that it stands for, and of a key that several of these move the last
+        place alone. It does not say who has numbered them.
+        """
+
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""

@@ -1,6 +1,7 @@
 """Reading hulls as they were before what the journal has: from segments."""
 
 from collections import OrderedDict
+from collections.abc import Iterator
 from dataclasses import replace
 from threading import Lock
 
@@ -9,6 +10,7 @@ from ..past import Moment, created
 from ..port import DamagedError
 from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.columns import Batches, contents_of
+from ..segments.gathered import gathered
 from ..segments.parquet import from_parquet
 from .chunks import state_from
 from .ledger import HullRows
@@ -70,17 +72,12 @@ class Filed:
 
     def batches(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """Some batches after a revision: no more than one segment has."""
-        segment = next((each for each in _usable(hull) if each.first <= after + 1 <= each.last), None)
-        if segment is None:
-            raise _not_kept(hull, after + 1)
-        found: list[Record] = []
-        points = 0
-        for record in self._batches(segment).between(after, until):
-            if points >= STEP_POINTS:
-                break
-            found.append(record)
-            points += 1 + len(record.rows)
-        return found
+        return _some(self._batches(_segment(hull, after + 1)).between(after, until))
+
+    def gathered(self, hull: HullRows, after: int, until: int) -> list[Record]:
+        """What some batches after a revision come to: no more than one segment has."""
+        batches = self._batches(_segment(hull, after + 1))
+        return _some(gathered(batches, hull.row.settings, after, until))
 
     def _batches(self, segment: StoredSegment) -> Batches:
         with self._turn:
@@ -128,6 +125,26 @@ def _usable(hull: HullRows) -> list[StoredSegment]:
         expected = segment.first - 1
     while found and not found[0].begins:
         del found[0]
+    return found
+
+
+def _segment(hull: HullRows, revision: int) -> StoredSegment:
+    """The segment that has a revision."""
+    found = next((each for each in _usable(hull) if each.first <= revision <= each.last), None)
+    if found is None:
+        raise _not_kept(hull, revision)
+    return found
+
+
+def _some(records: Iterator[Record]) -> list[Record]:
+    """As many as are applied in some milliseconds."""
+    found: list[Record] = []
+    points = 0
+    for record in records:
+        found.append(record)
+        points += 1 + len(record.rows)
+        if points >= STEP_POINTS:
+            break
     return found
 
 

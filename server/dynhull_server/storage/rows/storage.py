@@ -174,6 +174,13 @@ class RowStorage(ABC):
                 return self._filed.batches(hull, after, until)
             return batches_after(reader, hull, after, until)
 
+    def gathered(self, number: int, after: int, until: int) -> list[Record]:
+        """What the batches that follow a revision come to."""
+        with self._of_hull(number) as (reader, hull):
+            if self._filed is not None and after < hull.oldest:
+                return self._filed.gathered(hull, after, until)
+            return batches_after(reader, hull, after, until)
+
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
         """A reader, and the rows of a hull as of the same moment; KeyError if no hull has that number."""
         return self._reading(lambda ledger: ledger.hulls[number].copy())

@@ -286,39 +286,53 @@ class Batches:
 
     Args:
         columns: the columns.
+
+    Attributes:
+        columns: the same.
+        starts: the first row of each batch, and the number of rows.
     """
 
     def __init__(self, columns: SegmentColumns) -> None:
-        self._columns = columns
-        self._starts = np.append(np.flatnonzero(np.diff(columns.revision, prepend=NO_TIME)), len(columns))
-        self._revisions = columns.revision[self._starts[:-1]]
-        self._committed = columns.committed[self._starts[:-1]]
+        self.columns = columns
+        self.starts = np.append(np.flatnonzero(np.diff(columns.revision, prepend=NO_TIME)), len(columns))
+        self._revisions = columns.revision[self.starts[:-1]]
+        self._committed = columns.committed[self.starts[:-1]]
         self._keys_before = np.concatenate([[0], np.cumsum(columns.keyed)])
 
     def between(self, after: int, until: int) -> Iterator[Record]:
         """The batches after one revision up to another one."""
-        first = int(np.searchsorted(self._revisions, after, side="right"))
-        last = int(np.searchsorted(self._revisions, until, side="right"))
-        for place in range(first, last):
-            yield self.record(int(self._starts[place]), int(self._starts[place + 1]))
+        return map(self.at, range(*self.places(after, until)))
+
+    def places(self, after: int, until: int) -> tuple[int, int]:
+        """The place of the first batch after a revision, and of the first one after another."""
+        first, last = np.searchsorted(self._revisions, [after, until], side="right").tolist()
+        return first, max(first, last)
+
+    def rows(self, first: int, last: int) -> slice:
+        """The rows of the batches from one place up to another one."""
+        return slice(int(self.starts[first]), int(self.starts[last]))
+
+    def at(self, place: int) -> Record:
+        """The batch at a place."""
+        return self._record(int(self.starts[place]), int(self.starts[place + 1]))
 
     def until(self, time: int) -> tuple[int, CommitStamp] | None:
         """The last revision committed at or before a time, and its commit; None if there is none."""
         last = int(np.searchsorted(self._committed, time, side="right")) - 1
         if last < 0 or self._committed[last] == NO_TIME:
             return None
-        return int(self._revisions[last]), self._commit(int(self._starts[last]))
+        return int(self._revisions[last]), self._commit(int(self.starts[last]))
 
     def _commit(self, row: int) -> CommitStamp:
-        return CommitStamp(int(self._columns.commit[row]), int(self._columns.committed[row]))
+        return CommitStamp(int(self.columns.commit[row]), int(self.columns.committed[row]))
 
     def keys(self, start: int, end: int) -> Keys:
         """The keys of some rows."""
-        return self._columns.keys[int(self._keys_before[start]) : int(self._keys_before[end])]
+        return self.columns.keys[int(self._keys_before[start]) : int(self._keys_before[end])]
 
-    def record(self, start: int, end: int) -> Record:
+    def _record(self, start: int, end: int) -> Record:
         """The record in some rows, which are all that it has."""
-        columns = self._columns
+        columns = self.columns
         said, center = {}, None
         at = start
         if columns.kind[at] == ROWS and columns.op[at] == NONE:
@@ -338,7 +352,7 @@ class Batches:
         )
 
     def _rows(self, start: int, end: int, said: dict[str, Any]) -> Rows:
-        columns = self._columns
+        columns = self.columns
         if start < end and columns.kind[start] == EXPIRY:
             until = int(columns.event_time[start])
             points = json.loads(columns.detail[start] or "")["points"]
@@ -363,15 +377,15 @@ class Batches:
         )
 
     def _change(self, start: int, end: int) -> HeldChange:
-        kinds = self._columns.kind[start:end]
+        kinds = self.columns.kind[start:end]
         dropped = start + int((kinds == DROPPED).sum())
         held = dropped + int((kinds == HELD).sum())
-        rules = QuarantineRules(**json.loads(self._columns.detail[held] or "")) if held < end else None
+        rules = QuarantineRules(**json.loads(self.columns.detail[held] or "")) if held < end else None
         return HeldChange(self.held(dropped, held), self.keys(start, dropped), rules)
 
     def held(self, start: int, end: int) -> HeldRows:
         """The positions in quarantine in some rows."""
-        columns = self._columns
+        columns = self.columns
         details = [json.loads(detail or "") for detail in columns.detail[start:end]]
 
         def numbers(name: str, kind: type) -> npt.NDArray[Any]:

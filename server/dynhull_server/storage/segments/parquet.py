@@ -105,8 +105,7 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
             raise DamagedError(f"{name} is a Parquet file of another program")
         if int(found[FORMAT]) > VERSION:
             raise DamagedError(f"{name} has format {int(found[FORMAT])}, this version reads {VERSION}")
-        table = table.sort_by([("revision", "ascending"), ("row", "ascending")]).combine_chunks()
-        return _columns(table, found), _about(found), found.get(STATE, b"")
+        return _columns(_in_order(table), found), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
 
@@ -117,6 +116,29 @@ def _about(found: dict[bytes, bytes]) -> dict[str, str]:
         for key, value in found.items()
         if key.startswith(b"dynhull.") and key != STATE
     }
+
+
+def _in_order(table: pa.Table) -> pa.Table:
+    """The rows by revision and place, without sorting: each says where it belongs. ValueError if one is missing."""
+    import pyarrow as pa
+
+    table = table.combine_chunks()
+    if not len(table):
+        return table
+    revision, place = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
+    first, last = int(revision.min()), int(revision.max())
+    if last - first >= len(table) or int(place.min()) < 0:
+        raise ValueError("a row is missing")
+    counts = np.bincount(revision - first)
+    belongs = (np.cumsum(counts) - counts)[revision - first] + place
+    rows = np.arange(len(table))
+    if np.array_equal(belongs, rows):
+        return table
+    order = np.full(len(table), -1)
+    order[belongs[belongs < len(table)]] = rows[belongs < len(table)]
+    if int(order.min()) < 0:
+        raise ValueError("a row is missing")
+    return table.take(pa.array(order))
 
 
 def _columns(table: pa.Table, found: dict[bytes, bytes]) -> SegmentColumns:
@@ -138,8 +160,13 @@ def _columns(table: pa.Table, found: dict[bytes, bytes]) -> SegmentColumns:
         points,
         _integers(table, "event_time", NO_TIME),
         _integers(table, "expire_time", FOREVER),
-        table.column("detail").to_pylist(),
+        _details(table.column("detail")),
     )
+
+
+def _details(column: pa.ChunkedArray) -> list[str | None]:
+    """Most rows have none, and few a file of them."""
+    return [None] * len(column) if column.null_count == len(column) else column.to_pylist()
 
 
 def _optional(values: Integers, none: int) -> pa.Array:
@@ -165,6 +192,8 @@ def _codes(table: pa.Table, name: str, words: tuple[str, ...]) -> Codes:
     import pyarrow.compute as pc
 
     column = table.column(name)
+    if column.null_count == len(column):
+        return np.full(len(column), NONE, np.int8)
     codes = pc.index_in(column, value_set=pa.array(words))
     if codes.null_count != column.null_count:
         raise ValueError(f"column {name} has an unknown word")
@@ -175,7 +204,10 @@ def _codes(table: pa.Table, name: str, words: tuple[str, ...]) -> Codes:
 def _integers(table: pa.Table, name: str, none: int) -> Integers:
     import pyarrow as pa
 
-    found: Integers = table.column(name).cast(pa.int64()).fill_null(none).to_numpy().astype(np.int64)
+    column = table.column(name)
+    if column.null_count == len(column):
+        return np.full(len(column), none)
+    found: Integers = column.cast(pa.int64()).fill_null(none).to_numpy().astype(np.int64, copy=False)
     return found
 
 

@@ -1,0 +1,137 @@
+"""Batches in columns as few records: as many as are needed to lead to the same state.
+
+Of a key that many batches move only the last place counts. What stands for itself (points that leave, a condition,
+the quarantine, a new centre) stays a record of its own.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull.keys import Keys, PackedKeys
+
+from ...compiled import native
+from ...state.contents.key_rows import select_keys
+from ...state.records import FOREVER, NO_TIME, HullSettings, KeyRows, PointRows, Record, Rows, Times
+from .columns import DELETE, INSERT, PUT, REMOVE, ROWS, Batches
+
+Flags = npt.NDArray[np.bool_]
+Codes = npt.NDArray[np.signedinteger]
+
+
+def gathered(batches: Batches, settings: HullSettings, after: int, until: int) -> Iterator[Record]:
+    """The batches after one revision up to another one, many as one.
+
+    Applied in order to the state at revision `after`, they lead to the same state as the batches themselves. Each has
+    the revision of the last batch that it stands for, and does not say who has numbered these.
+    """
+    first, last = batches.places(after, until)
+    alone = _alone(batches, settings, first, last)
+    place = first
+    for end in [*(first + np.flatnonzero(alone)).tolist(), last]:
+        if place < end:
+            yield from _as_one(batches, settings, place, end)
+        if end < last:
+            yield batches.at(end)
+        place = end + 1
+
+
+def key_codes(keys: Keys) -> Codes:
+    """A number for each key, the same for equal ones, from 0 and without a gap."""
+    if not isinstance(keys, PackedKeys):
+        return np.unique(keys, return_inverse=True)[1]
+    if native is not None:
+        return np.frombuffer(native.key_codes(keys.lengths, keys.data), np.int32)
+    return _codes(keys)
+
+
+def _codes(keys: PackedKeys) -> npt.NDArray[np.int32]:
+    numbers: dict[str, int] = {}
+    return np.array([numbers.setdefault(key, len(numbers)) for key in keys], np.int32)
+
+
+def _alone(batches: Batches, settings: HullSettings, first: int, last: int) -> Flags:
+    """Which of some batches stand for themselves."""
+    window = settings.window
+    if settings.identity != "multiset" and window is not None and window.max_points:
+        return np.ones(last - first, np.bool_)  # who is among the newest depends on each batch
+    rows = batches.rows(first, last)
+    columns = batches.columns
+    apart = columns.kind[rows] != ROWS
+    said = columns.detail[rows]
+    if any(said):
+        apart |= np.fromiter((each is not None for each in said), np.bool_, len(said))
+    if settings.identity == "multiset" and window is not None:
+        apart |= columns.op[rows] == DELETE  # of equal points, the oldest
+    if settings.by_event_time:
+        apart |= columns.op[rows] == REMOVE  # what is put after it may be older
+    if first == last or not apart.any():
+        return np.zeros(last - first, np.bool_)
+    return np.logical_or.reduceat(apart, batches.starts[first:last] - rows.start)
+
+
+def _as_one(batches: Batches, settings: HullSettings, first: int, last: int) -> Iterator[Record]:
+    """Batches that have the effect of one: as that, unless only some of their points have times."""
+    if last - first > 1:
+        rows = (
+            _points(batches, first, last) if settings.identity == "multiset" else _keys(batches, settings, first, last)
+        )
+        if rows is not None:
+            yield replace(batches.at(last - 1), rows=rows)
+            return
+    for place in range(first, last):
+        yield batches.at(place)
+
+
+def _points(batches: Batches, first: int, last: int) -> Rows | None:
+    rows = batches.rows(first, last)
+    points, ops, times = (
+        each[rows] for each in (batches.columns.points, batches.columns.op, batches.columns.event_time)
+    )
+    inserted = ops == INSERT
+    if _some_only(times[inserted], NO_TIME):
+        return None
+    dated = _dated(times[inserted], NO_TIME)
+    return PointRows(points[inserted], points[ops == DELETE], times=times[inserted] if dated else None)
+
+
+def _keys(batches: Batches, settings: HullSettings, first: int, last: int) -> Rows | None:
+    """The last place of each key."""
+    rows, columns = batches.rows(first, last), batches.columns
+    keys = batches.keys(rows.start, rows.stop)
+    at = np.flatnonzero(columns.keyed[rows]) + rows.start
+    put = columns.op[at] == PUT
+    times, deadlines = columns.event_time[at], columns.expire_time[at]
+    if _some_only(times[put], NO_TIME) or _some_only(deadlines[put], FOREVER):
+        return None
+    newest = _newest(key_codes(keys), times if settings.by_event_time else None)
+    stays, leaves = newest & put, newest & ~put
+    return KeyRows(
+        select_keys(keys, stays),
+        columns.points[at[stays]],
+        select_keys(keys, leaves),
+        times[stays] if _dated(times[put], NO_TIME) else None,
+        deadlines[stays] if _dated(deadlines[put], FOREVER) else None,
+    )
+
+
+def _newest(codes: Codes, times: Times | None) -> Flags:
+    """Which rows are the last ones of their keys: those with the greatest time, and of these the last."""
+    order = np.arange(len(codes)) if times is None else np.argsort(times, kind="stable")
+    last = np.zeros(int(codes.max(initial=-1)) + 1, np.intp)
+    last[codes[order]] = order  # the last one of a key is what stays
+    newest = np.zeros(len(codes), np.bool_)
+    newest[last] = True
+    return newest
+
+
+def _some_only(times: Times, none: int) -> bool:
+    """Whether some points have a time, and others have none."""
+    return 0 < int(np.count_nonzero(times == none)) < len(times)
+
+
+def _dated(times: Times, none: int) -> bool:
+    """Whether points have times, which then all of them have."""
+    return len(times) > 0 and bool(times[0] != none)

@@ -1,0 +1,150 @@
+"""Many batches of the past as one lead to the very state that they lead to one after the other."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from folders import same
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dynhull.keys import PackedKeys
+from dynhull_server.state.batch import Batch, KeyedBatch, Write
+from dynhull_server.state.errors import MisfitError, RefusedError
+from dynhull_server.state.hull_state import HullState
+from dynhull_server.state.limits import Limits
+from dynhull_server.state.records import CommitStamp, HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.storage.segments import gathered as gathering
+from dynhull_server.storage.segments.columns import Batches, columns_of
+from dynhull_server.storage.segments.gathered import gathered, key_codes
+from dynhull_server.storage.segments.parquet import from_parquet, to_parquet
+
+LIMITS = Limits(10, 1000, 10, 10, 10**6)
+SECOND = 10**6
+BEGIN = 10**9 * SECOND
+KINDS = {
+    "keyed": HullSettings("str"),
+    "numbered": HullSettings("int"),
+    "multiset": HullSettings(),
+    "globe": HullSettings(frame="geographic"),
+    "globe-keyed": HullSettings("str", frame="geographic"),
+    "event-times": HullSettings("str", by_event_time=True),
+    "recent": HullSettings(window=Window(max_age=4 * SECOND)),
+    "newest": HullSettings(window=Window(max_points=5)),
+    "recent-keyed": HullSettings("int", window=Window(max_age=4 * SECOND)),
+    "newest-keyed": HullSettings("str", window=Window(max_points=5)),
+    "recent-by-data": HullSettings("str", window=Window(max_age=4 * SECOND, clock="data"), by_event_time=True),
+    "quarantine": HullSettings("str", quarantine=QuarantineRules(max_growth=1.5)),
+}
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from(
+            ["put", "put", "put", "put", "remove", "both", "dated", "ttl", "absent", "recenter", "nothing"]
+        ),
+        st.integers(0, 255),  # which of eight keys or points
+        st.integers(0, 7),  # where to
+        st.integers(0, 9),  # the tenths of a second until then
+    ),
+    min_size=8,
+    max_size=30,
+)
+
+
+def batch(settings, what, which, where, time):
+    """A batch of a hull of that kind; None if it has none of these."""
+    rows = np.flatnonzero([which >> bit & 1 for bit in range(8)])
+    points = np.random.default_rng(where).integers(-4, 5, (8, 2))[rows] * 0.1
+    none = points[:0]
+    windowed = settings.window is not None
+    if settings.identity == "multiset":
+        puts, takes = (
+            (points, none)
+            if what not in ("remove", "both")
+            else (none, points)
+            if what == "remove"
+            else (points, points[:1])
+        )
+        dated = np.full(len(puts), time - where * SECOND // 8) if windowed and what == "dated" else None
+        return Batch(puts, takes, 0, count_missing=what != "both" or which % 2 == 0, times=dated)
+    kind = settings.identity
+    keys = [f"key {row}" for row in rows] if kind == "str" else rows.tolist()
+    pack = PackedKeys.pack if kind == "str" else lambda keys: np.array(keys, np.uint64)
+    dated = np.full(len(keys), time - where * SECOND // 8) if what == "dated" or settings.by_event_time else None
+    if what == "remove":
+        return KeyedBatch(kind, pack([]), none, pack(keys))
+    if what == "both":
+        last = len(keys) - 1
+        return KeyedBatch(
+            kind, pack(keys[:last]), points[:last], pack(keys[last:]), None if dated is None else dated[:last]
+        )
+    given = {"ttl": (1 + where) * SECOND} if what == "ttl" else {"condition": "absent"} if what == "absent" else {}
+    return KeyedBatch(kind, pack(keys), points, pack([]), dated, **given)
+
+
+def lived(settings, steps):
+    """The records of a hull to which these steps have happened."""
+    state, records, time = HullState(LIMITS, settings, Kept(), 0.0), [], BEGIN
+    for what, which, where, wait in steps:
+        time += wait * SECOND // 10
+        try:
+            if state.next_due is not None and state.next_due <= time:
+                state.expire(time, records)
+            if what == "recenter":
+                state.recenter(None, records)
+            else:
+                state.apply(Write("hull", batch(settings, what, which, where, time), time), 0.0, records)
+        except (MisfitError, RefusedError):
+            continue
+    return [dataclasses.replace(each, committed=CommitStamp(each.revision, each.revision)) for each in records]
+
+
+def seen(state):
+    """What readers see of a state."""
+    keys = state.vertex_keys().tolist() if state.entities() is not None else []
+    return [state.counts, state.committed, state.vertices(), keys, state.kept()]
+
+
+def require_same(hull, records, after, batches):
+    """Gathered from a revision on, batches lead to the state that they lead to one by one; returns what is applied."""
+    found = list(gathered(batches, hull, after, len(records)))
+    one, other = (HullState(LIMITS, hull, Kept(records=records[:after]), 0.0) for _ in range(2))
+    for record in records[after:]:
+        one.catch_up([record], 0.0)
+    if found:
+        other.catch_up(found, 0.0)
+    same(seen(other), seen(one))
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(steps=STEPS, after=st.integers(0, 10))
+@settings(max_examples=10, deadline=None)
+def test_gathered_batches_lead_to_the_same_state(kind, steps, after):
+    hull = KINDS[kind]
+    records = lived(hull, steps)
+    if records:
+        batches = Batches(from_parquet(to_parquet(columns_of(records, hull.identity), {}), "a file")[0])
+        assert len(require_same(hull, records, min(after, len(records)), batches)) <= len(records)
+
+
+@pytest.mark.parametrize("kind", ["keyed", "numbered", "multiset", "event-times", "recent", "recent-keyed"])
+def test_moves_of_a_few_keys_are_one_record(kind):
+    """Otherwise a million batches of one move would be a million records."""
+    hull = KINDS[kind]
+    records = lived(
+        hull, [("both" if hull == HullSettings() else "dated", 1 << place % 8, place % 7, 0) for place in range(100)]
+    )
+    assert len(records) == 100
+    found = require_same(hull, records, 10, Batches(columns_of(records, hull.identity)))
+    assert [each.revision for each in found] == [100]
+    assert hull.identity == "multiset" or len(found[0].rows) == 8
+
+
+def test_keys_have_the_same_numbers_in_both_languages(monkeypatch):
+    keys = PackedKeys.pack(
+        ["b", "a", "é", "b", "a" * 255, "ab", "a" * 255, "a", *(str(each % 700) for each in range(2000))]
+    )
+    found = key_codes(keys)
+    monkeypatch.setattr(gathering, "native", None)
+    assert found.tolist() == key_codes(keys).tolist()
+    assert key_codes(keys[:0]).tolist() == []
