@@ -7,6 +7,8 @@ COMPILER := $(firstword $(shell for each in "$$CXX" c++ g++ clang++; do command 
 export UV_SYSTEM_CERTS ?= 1
 # Without cached bytecode, each server and command that a test starts compiles 800 modules: three times the CPU time.
 unexport PYTHONDONTWRITEBYTECODE
+# Threads of OpenBLAS, which numpy starts, turn 25 ms for nothing after each work, and after the start of a process.
+export OPENBLAS_THREAD_TIMEOUT ?= 4
 # With a compiler, a kernel that does not build is an error; `DYNHULL_REQUIRE_KERNEL=0 make ...` does without.
 export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08

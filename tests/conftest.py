@@ -3,13 +3,16 @@ import os
 import re
 from collections import Counter
 from collections.abc import Generator, Iterator
+from contextlib import nullcontext
 from itertools import chain, groupby
+from pathlib import Path
 from random import Random
 
 import divided_shape
 import pytest
 import server_process as servers
 from hypothesis import HealthCheck, Phase, settings
+from one_first import one_first
 from postgresql import PostgreSQL, postgresql
 from server_process import SHAPES, server_process
 
@@ -75,9 +78,16 @@ def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest
     return [each for each in found if type(each) is pytest.Module]  # those of docstrings are a subclass
 
 
-def pytest_collection() -> None:
-    """No collections of garbage while tests are found: they went through all that is imported, again and again."""
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
+    """One worker finds the tests before the others: in a fresh clone it compiles, for all of them, what is imported.
+
+    No collections of garbage meanwhile: they went through all that is imported, again and again.
+    """
     gc.disable()
+    is_worker = hasattr(session.config, "workerinput")
+    with one_first(Path(session.config.option.basetemp).parent / "found") if is_worker else nullcontext():
+        return (yield)
 
 
 def pytest_collection_finish() -> None:
