@@ -39,8 +39,10 @@ class BatchStream:
         """Send batches that have arrived together."""
         stream = self._stream
         birth = self._driver.birth() if stream.hull is None else None
-        requests = [WriteBatch(self, write, birth, stream) for write in writes]
-        self.rows += sum(request.rows for request in requests)
+        requests = []
+        for write in writes:
+            requests.append(WriteBatch(self, write, birth, stream))
+            self.rows += write.rows
         self.batches += len(requests)
         if len(requests) == 1:
             self._driver.dispatch(requests[0])

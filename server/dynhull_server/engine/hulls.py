@@ -248,9 +248,19 @@ class Hulls:
 
     def moved(self, hulls: Sequence[Hull]) -> None:
         """Wake the watchers of hulls: each has a new revision, or was deleted."""
+        published = self._driver.published
         for hull in hulls:
-            hull.committed = self._driver.published
-            self._move(hull)
+            hull.committed = published
+            if hull.divided and self._divisions is not None:
+                if hull.ended:
+                    self._divisions.end(hull)
+                else:
+                    self._divisions.begin(hull)
+            live = self._live.get(hull)
+            if live is not None:
+                live.moved()
+                if hull.ended:
+                    del self._live[hull]
         self.rosters.moved(hulls)
         self.series.moved(hulls)
 
@@ -258,18 +268,6 @@ class Hulls:
         """Have the shards of a hull carry out requests."""
         assert self._divisions is not None  # otherwise there is no such hull
         self._divisions.carry_out(hull, requests)
-
-    def _move(self, hull: Hull) -> None:
-        if hull.divided and self._divisions is not None:
-            if hull.ended:
-                self._divisions.end(hull)
-            else:
-                self._divisions.begin(hull)
-        live = self._live.get(hull)
-        if live is not None:
-            live.moved()
-            if hull.ended:
-                del self._live[hull]
 
     def _live_hull(self, hull: Hull) -> LiveHull:
         live = self._live.get(hull)

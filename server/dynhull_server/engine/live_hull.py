@@ -77,7 +77,7 @@ class LiveHull:
         self._recalls = recalls
         self._moved: asyncio.Event | None = None
         self._outlined: asyncio.Event | None = None
-        self._last_outlined = hull.counts.outlined
+        self._last_outlined = 0  # when the first caller began to wait for `_outlined`
         self._outline: tuple[Points, Center | None, Outline] | None = None
         self._measures: tuple[Points, HullMeasures] | None = None
         self._measuring: asyncio.Lock | None = None  # made for those of ten thousand hulls that are measured
@@ -439,7 +439,7 @@ class LiveHull:
         """Wait until the vertices change after this revision; raise HullNotFoundError if the hull is deleted."""
         while not self._hull.ended and self.counts.outlined <= revision:
             if self._outlined is None:
-                self._outlined = asyncio.Event()
+                self._outlined, self._last_outlined = asyncio.Event(), self.counts.outlined
             await self._outlined.wait()
         if self._hull.ended:
             raise HullNotFoundError(self.name)
@@ -452,7 +452,6 @@ class LiveHull:
         if self._outlined is not None and (self._hull.ended or self.counts.outlined != self._last_outlined):
             self._outlined.set()
             self._outlined = None
-        self._last_outlined = self.counts.outlined
 
     async def measures(self, vertices: Points) -> HullMeasures:
         """The measures of these vertices: made once, however many ask, until the vertices change."""

@@ -17,11 +17,11 @@ class ServerTime:
     """
 
     def __init__(self, clock: Clock, latest: int | None = None) -> None:
-        self._clock = clock
+        self._monotonic = clock.monotonic
         wall = int(clock.wall() * MICROSECONDS)
         start = wall if latest is None else max(wall, latest)
         self._origin = start - int(clock.monotonic() * MICROSECONDS)
 
     def now(self) -> int:
         """The time."""
-        return self._origin + int(self._clock.monotonic() * MICROSECONDS)
+        return self._origin + int(self._monotonic() * MICROSECONDS)

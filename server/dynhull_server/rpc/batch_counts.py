@@ -32,14 +32,10 @@ class BatchCounts:
         self._inserted += applied.inserted
         self._deleted += applied.deleted
         self._missing += applied.missing
-        if applied.moved or applied.clock is not None or applied.stale or applied.skipped:
-            self._count_entities(applied)
-        if applied.held or applied.released or applied.dropped:
-            self._quarantined["held"] += len(applied.held)
-            self._quarantined["released"] += applied.released
-            self._quarantined["dropped"] += applied.dropped
+        if not applied.plain:
+            self._count_more(applied)
 
-    def _count_entities(self, applied: Applied) -> None:
+    def _count_more(self, applied: Applied) -> None:
         """Count what only hulls with keys or times do."""
         self._updates["move"] += applied.moved
         self._updates["evict"] += applied.evicted
@@ -48,6 +44,9 @@ class BatchCounts:
         self._rows["late"] += applied.late
         self._rows["skipped"] += applied.skipped
         self._rows["clamped"] += applied.clamped
+        self._quarantined["held"] += len(applied.held)
+        self._quarantined["released"] += applied.released
+        self._quarantined["dropped"] += applied.dropped
 
     def refused(self) -> None:
         """Count a refused batch."""

@@ -129,15 +129,18 @@ def _page_size(size: int) -> int:
 def decode_points(points: points_pb2.Points, field: str) -> Points:
     """An (n, 2) array of finite doubles without negative zeros."""
     packed, coordinates = points.packed, points.coordinates
-    if packed and coordinates:
-        raise InvalidFieldError(field, "packed and coordinates", "use one encoding or the other")
-    if len(packed) % BYTES_PER_POINT:
-        problem = f"a point has {BYTES_PER_POINT} bytes, so the number of bytes must be a multiple of that"
-        raise InvalidFieldError(f"{field}.packed", f"{len(packed)} bytes", problem)
-    if not packed and len(coordinates) % 2:
-        problem = "a point has two coordinates, so their number must be even"
-        raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
-    xy = packed_points(packed) if packed else plain_points(np.array(coordinates, float).reshape(-1, 2))
+    if packed:
+        if coordinates:
+            raise InvalidFieldError(field, "packed and coordinates", "use one encoding or the other")
+        if len(packed) % BYTES_PER_POINT:
+            problem = f"a point has {BYTES_PER_POINT} bytes, so the number of bytes must be a multiple of that"
+            raise InvalidFieldError(f"{field}.packed", f"{len(packed)} bytes", problem)
+        xy = packed_points(packed)
+    else:
+        if len(coordinates) % 2:
+            problem = "a point has two coordinates, so their number must be even"
+            raise InvalidFieldError(f"{field}.coordinates", f"{len(coordinates)} coordinates", problem)
+        xy = plain_points(np.array(coordinates, float).reshape(-1, 2))
     if xy is None:
         given = np.array(np.frombuffer(packed, "<f8") if packed else coordinates, float).reshape(-1, 2)
         raise _bad_row(~np.isfinite(given).all(axis=1), field, given, "coordinates must be finite")

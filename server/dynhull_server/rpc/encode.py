@@ -62,8 +62,9 @@ CAUSES: dict[Cause | None, batch_pb2.Cause] = {
     "division": batch_pb2.CAUSE_BATCH,
 }
 
-COUNTED = tuple(name for name in COUNTS if name != "held")  # these rows are listed, too
-counts_of = attrgetter(*COUNTED)
+# The counts of keys and times; the rows that are held are listed, too.
+MORE = tuple(name for name in COUNTS if name not in ("inserted", "deleted", "missing", "held"))
+more_of = attrgetter(*MORE)
 
 FRAMES: dict[Frame, hull_pb2.Frame] = {"plane": hull_pb2.FRAME_PLANE, "geographic": hull_pb2.FRAME_GEOGRAPHIC}
 
@@ -319,7 +320,15 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
         result.hull_changed = True
     if applied.duplicate:
         result.duplicate = True
-    for name in compress(COUNTED, counts_of(applied)):
+    if applied.inserted:
+        result.inserted = applied.inserted
+    if applied.deleted:
+        result.deleted = applied.deleted
+    if applied.missing:
+        result.missing = applied.missing
+    if applied.plain:
+        return
+    for name in compress(MORE, more_of(applied)):
         setattr(result, name, getattr(applied, name))
     if applied.held:
         result.held = len(applied.held)
@@ -330,7 +339,12 @@ def encode_applied(applied: Applied, result: batch_pb2.BatchResult) -> None:
 
 def add_counts(applied: Applied, summary: hull_service_pb2.IngestResponse) -> None:
     """Add the counts of a batch to those of an ingest."""
-    for name in compress(COUNTED, counts_of(applied)):
+    summary.inserted += applied.inserted
+    summary.deleted += applied.deleted
+    summary.missing += applied.missing
+    if applied.plain:
+        return
+    for name in compress(MORE, more_of(applied)):
         setattr(summary, name, getattr(summary, name) + getattr(applied, name))
     summary.held += len(applied.held)
 

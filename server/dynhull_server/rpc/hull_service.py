@@ -23,6 +23,7 @@ from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import ResumedView
 from ..engine.watch import watch
 from ..engine.watch_many import watch_many
+from ..state.batch import Applied
 from ..state.errors import HullEmptyError, HullFencedError, HullReplacedError, LimitExceededError, PartRefusedError
 from ..state.frames import require_lines, require_reach
 from ..state.records import Contents
@@ -45,9 +46,9 @@ from .writing import (
     StreamedBatches,
     decode_together,
     decode_write,
+    decoding,
     gap_explained,
     require_present,
-    run_decoding,
 )
 
 # The side of a missing key.
@@ -155,8 +156,8 @@ class HullService:
         may_skip = decode.decode_may_skip(producer, request.may_skip)
         owner = call.owner if producer else ""  # asking gRPC for the address takes longer than a batch of one point
         rows = call.message_bytes // decode.BYTES_PER_POINT  # an estimate: reading the points would copy them
-        run = run_decoding(self._driver, rows)
-        write = await run(partial(decode_write, name, request, self._driver.time(), rows, producer, owner, may_skip))
+        given = name, request, self._driver.time(), rows, producer, owner, may_skip
+        write = await decoding(self._driver, rows, decode_write, *given)
         try:
             if request.uid and self._hulls.has(name):
                 await require_present(self._hulls.get(name), producer, request.uid)
@@ -174,8 +175,7 @@ class HullService:
         for name in decode.decode_parts(request):
             call.access.require_write(name)
         rows = call.message_bytes // decode.BYTES_PER_POINT
-        run = run_decoding(self._driver, rows)
-        writes = await run(partial(decode_together, request, self._driver.time(), call.owner))
+        writes = await decoding(self._driver, rows, decode_together, request, self._driver.time(), call.owner)
         try:
             for index, each in enumerate(request.batches):
                 if each.uid and self._hulls.has(each.name):
@@ -223,8 +223,17 @@ class HullService:
                 most_bytes = call.max_message_bytes
                 await call.write(pb.StreamResponse(max_batches=MOST_IN_A_MESSAGE, max_message_bytes=most_bytes))
             while await streamed.more():
-                for response in _acknowledgements(streamed):
-                    call.batches += len(response.results) or 1
+                if streamed.several:
+                    response = pb.StreamResponse()
+                    for sequence, applied in streamed.applied():
+                        call.batches += 1
+                        _acknowledge(sequence, applied, response.results.add())
+                    await call.write(response)
+                    continue
+                for sequence, applied in streamed.applied():
+                    call.batches += 1
+                    response = pb.StreamResponse()
+                    _acknowledge(sequence, applied, response)
                     await call.write(response)
 
     async def GetProducer(self, request: pb.GetProducerRequest, call: Call) -> pb.GetProducerResponse:
@@ -627,19 +636,10 @@ def _naming_fences(call: Call) -> Iterator[None]:
         raise HullFencedError(error.name) from None
 
 
-def _acknowledgements(streamed: StreamedBatches) -> Iterator[pb.StreamResponse]:
-    """The responses for the batches applied since the last call."""
-    response = pb.StreamResponse()
-    for sequence, applied in streamed.applied():
-        result = response.results.add() if streamed.several else response
-        if sequence:
-            result.sequence = sequence
-        encode.encode_applied(applied, result.result)
-        if not streamed.several:
-            yield response
-            response = pb.StreamResponse()
-    if streamed.several:
-        yield response
+def _acknowledge(sequence: int, applied: Applied, response: pb.StreamResponse | pb.NumberedResult) -> None:
+    if sequence:
+        response.sequence = sequence
+    encode.encode_applied(applied, response.result)
 
 
 def _parts(contents: Contents) -> Iterator[slice]:

@@ -3,17 +3,16 @@
 import asyncio
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any, Self
+from typing import Any, Self, TypeVar, TypeVarTuple
 
 from dynhull_proto.v1 import batch_pb2, hull_service_pb2
 
 from ..engine.driver import Driver
 from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
-from ..engine.steps import Run, at_once
 from ..state.batch import Applied, Batch, KeyedBatch, Write
 from ..state.errors import HullNotFoundError, RestoredError, SequenceGapError
 from . import decode
@@ -28,6 +27,9 @@ MOST_BATCHES = 1_024
 MOST_IN_A_MESSAGE = 256
 # Batches of at most this many points are decoded on the event loop, in some 25 µs; strings, one by one, in 1.5 ms.
 SMALL = 16_384
+
+T = TypeVar("T")
+Given = TypeVarTuple("Given")
 
 
 def decode_write(name: str, request: Any, arrived: int, rows: int, producer: str, owner: str, may_skip: bool) -> Write:
@@ -44,9 +46,12 @@ def decode_together(request: hull_service_pb2.ApplyTogetherRequest, arrived: int
     return [Write(each.name, decoded(each.batch), arrived, 0, *numbered) for each in request.batches]
 
 
-def run_decoding(driver: Driver, rows: int) -> Run:
-    """The way to run the decoding of this many points."""
-    return at_once if rows <= SMALL else driver.in_turn
+async def decoding(driver: Driver, rows: int, function: Callable[[*Given], T], *given: *Given) -> T:
+    """The result of a function that decodes this many points."""
+    if rows <= SMALL:
+        return function(*given)
+    result: T = await driver.in_turn(partial(function, *given))
+    return result
 
 
 def decoded(batch: batch_pb2.Batch) -> Batch | KeyedBatch | Exception:
@@ -109,12 +114,15 @@ class StreamedBatches:
         self.name = name
         self._producer = decode.decode_producer(first.producer)
         self._may_skip = decode.decode_may_skip(self._producer, first.may_skip)
-        self.several = isinstance(first, hull_service_pb2.StreamRequest) and first.accept_results
+        self._may_be_several = isinstance(first, hull_service_pb2.StreamRequest)
+        self.several = self._may_be_several and first.accept_results
         self._hulls = hulls
         self._driver = driver
         self._uid: str = first.uid
+        self._owner = call.owner
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
+        self._loop = asyncio.get_running_loop()
         self._room = asyncio.Event()
         self._batches = hulls.stream(name, self._notify, create=create)
         self._arrivals: deque[float] = deque()
@@ -143,7 +151,7 @@ class StreamedBatches:
                 if self._failure is not None:
                     raise self._failure
                 return False
-            self._news = asyncio.get_running_loop().create_future()
+            self._news = self._loop.create_future()
             await self._news
         return True
 
@@ -167,10 +175,13 @@ class StreamedBatches:
             raise decode.InvalidFieldError("may_skip", value=True, problem="the first message of the call decides it")
         batches = self._several(message) or ([message] if _has_batch(message) else [])
         rows = self._call.message_bytes // decode.BYTES_PER_POINT
+        arrived = self._driver.time()
         writes: list[Write] = []
-        run = run_decoding(self._driver, rows)
         try:
-            await run(partial(self._decode, batches, self._driver.time(), rows, writes))
+            if rows <= SMALL:
+                self._decode(batches, arrived, rows, writes)
+            else:
+                await self._driver.in_turn(partial(self._decode, batches, arrived, rows, writes))
         except decode.InvalidFieldError:
             self._send(writes)
             raise
@@ -197,7 +208,7 @@ class StreamedBatches:
 
     def _several(self, message: Any) -> Sequence[Any]:
         """The batches of a message that may have several; empty where it has one alone, or none."""
-        several: Sequence[Any] = () if isinstance(message, hull_service_pb2.IngestRequest) else message.batches
+        several: Sequence[Any] = message.batches if self._may_be_several else ()
         if not several:
             return ()
         if not self.several:
@@ -212,9 +223,10 @@ class StreamedBatches:
 
     def _decode(self, batches: Sequence[Any], arrived: int, rows: int, writes: list[Write]) -> None:
         """Decode batches of about `rows` points together."""
-        caller = self._producer, self._call.owner, self._may_skip
+        name, producer, owner, may_skip = self.name, self._producer, self._owner, self._may_skip
+        rows_each = rows // max(len(batches), 1)
         for each in batches:
-            writes.append(decode_write(self.name, each, arrived, rows // len(batches), *caller))  # noqa: PERF401  # those before an invalid one are sent
+            writes.append(decode_write(name, each, arrived, rows_each, producer, owner, may_skip))  # noqa: PERF401  # those before an invalid one are sent
 
     def _send(self, writes: list[Write]) -> None:
         self._arrivals.extend([time.perf_counter()] * len(writes))

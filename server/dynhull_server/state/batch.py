@@ -153,5 +153,12 @@ class Applied:
     released: int = 0
     dropped: int = 0
 
+    @property
+    def plain(self) -> bool:
+        """Whether it counts only points inserted, deleted and missing, and nothing of keys and times."""
+        return self.clock is None and not (  # without a clock nothing is late, clamped, evicted or expired
+            self.moved or self.stale or self.skipped or self.held or self.released or self.dropped
+        )
+
 
 NO_POINTS: Points = np.empty((0, 2))

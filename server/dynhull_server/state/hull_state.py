@@ -85,7 +85,7 @@ class HullState:
         last = kept.last_revision
         self.committed = kept.records[-1].committed if kept.records else kept.committed
         self._follow_center()
-        self.counts = self._counted(last, len(self.hull), _last_cause(kept), last)
+        self.counts = self._counted(last, len(self.hull), _last_cause(kept), self.center, last)
         self._vertices = self.hull.vertices().copy()  # a copy of a few vertices takes a third of the memory
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
@@ -276,21 +276,21 @@ class HullState:
 
     def _applied(self, points: int, cause: Cause, *, hull_changed: bool) -> None:
         """Update the counts and what was sent after a change."""
-        revision = self.counts.revision + 1
-        outlined = self.counts.outlined
+        before, center = self.counts, self.center
+        revision, outlined = before.revision + 1, before.outlined
         if hull_changed:
             outlined = self._changed_at = revision
             self._sent.changed(revision)
-        if self.center != self.counts.center:
+        if center != before.center:
             outlined = revision
-        self.counts = self._counted(revision, points, cause, outlined)
+        self.counts = self._counted(revision, points, cause, center, outlined)
 
-    def _counted(self, revision: int, points: int, cause: Cause | None, outlined: int) -> Counts:
+    def _counted(self, revision: int, points: int, cause: Cause | None, center: Center | None, outlined: int) -> Counts:
         distinct, clock, quarantine = self.hull.distinct, self.contents.clock, self.quarantine
         if quarantine is None:
-            return Counts(revision, points, distinct, clock, cause, self.center, outlined)
+            return Counts(revision, points, distinct, clock, cause, center, outlined)
         held, rules = len(quarantine), quarantine.rules
-        return Counts(revision, points, distinct, clock, cause, self.center, outlined, held, rules)
+        return Counts(revision, points, distinct, clock, cause, center, outlined, held, rules)
 
     # Reads
 

@@ -104,7 +104,7 @@ class RootState(HullState):
         for shard, tally in record.shares.tallies.items():
             self.tallies[shard] = tally
 
-    def _counted(self, revision: int, _: int, cause: Cause | None, outlined: int) -> Counts:
+    def _counted(self, revision: int, _: int, cause: Cause | None, __: object, outlined: int) -> Counts:
         """The counts of all points. Keys of two shards may be at one place: how many places there are is not known."""
         points = sum(each.points for each in self.tallies)
         distinct = 0 if self._keyed_shards else sum(each.distinct for each in self.tallies)

@@ -62,12 +62,11 @@ class Multiset:
 
     def apply(self, batch: Batch, revision: int) -> Applied:
         """Apply the batch, or raise PointMissingError."""
-        hull = self.hull
-        to_delete, before = len(batch.deletes), self._changes
-        deleted = apply_points(hull, batch)
-        missing = to_delete - deleted
-        self._points, self._changes = len(hull), hull.changes
-        return Applied(revision, len(batch.inserts), deleted, missing, self._changes != before, self._points)
+        inserted, to_delete, before = len(batch.inserts), len(batch.deletes), self._changes
+        deleted = apply_points(self.hull, batch)
+        self._points += inserted - deleted
+        self._changes = self.hull.changes
+        return Applied(revision, inserted, deleted, to_delete - deleted, self._changes != before, self._points)
 
     def rows(self, batch: Batch, applied: Applied) -> PointRows:
         """The points of an applied batch."""
