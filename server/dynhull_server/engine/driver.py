@@ -105,7 +105,12 @@ class Driver:
         limits, supervisor, machine: as given.
         core: the core; only the engine's own parts look into it.
         published: the latest commit whose changes callers see.
+        time: the server's clock, in microseconds since 1970, once there is a `start`.
+        commit_time: the time that a commit of now would have, likewise.
     """
+
+    time: Callable[[], int]
+    commit_time: Callable[[], int]
 
     def __init__(self, limits: Limits, storage: Storage, supervisor: Supervisor, machine: Machine) -> None:
         self.limits = limits
@@ -147,20 +152,20 @@ class Driver:
         clock = self.machine.clock
         latest = self.core.latest_time
         self._hulls, self._fences = hulls, fences
-        self._time = ServerTime(clock, latest)
+        self.time = ServerTime(clock, latest).now
         if self._storage.keeps:
             self.published = committed
         # A window does not follow the last commit: the clock that it was made by may have been wrong.
-        self._commit_time = ServerTime(clock, max(latest or 0, committed.time))
+        self.commit_time = ServerTime(clock, max(latest or 0, committed.time)).now
         self._commits = GroupCommit(
             self._storage,
             self.machine.threads,
             clock,
-            self._commit_time.now,
+            self.commit_time,
             lambda error: self._from_thread(partial(self._commit_reported, error)),
             lambda error: self._from_thread(partial(self.supervisor.died, "commits", error)),
         )
-        self._ticked = self._commit_time.now()
+        self._ticked = self.commit_time()
         self._started = True
         self.supervisor.every(TICK, "clock", self._tick)
         self.supervisor.every(WATCH_SECONDS, "commit watch", self._watch_commits)
@@ -181,10 +186,6 @@ class Driver:
                 pool.shutdown()
 
     # Requests
-
-    def time(self) -> int:
-        """The server's clock, in microseconds since 1970."""
-        return self._time.now()
 
     def birth(self) -> Birth:
         """The origin of a hull or fence that is created now."""
@@ -273,10 +274,6 @@ class Driver:
         self._commits.submit(changes, lambda error, _: self._from_thread(partial(_settle, done, error)))
         return done
 
-    def commit_time(self) -> int:
-        """The time that a commit of now would have, in microseconds since 1970."""
-        return self._commit_time.now()
-
     async def settled(self) -> None:
         """Wait for the commits that have begun; raises the error if their outcome cannot be decided."""
         done: asyncio.Future[None] = self._loop.create_future()
@@ -318,7 +315,7 @@ class Driver:
 
     def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
         if trip is None:  # the storage is immediate
-            self.published = self._storage.commit(changes, self._commit_time.now())
+            self.published = self._storage.commit(changes, self.commit_time())
             return
 
         def done(error: Exception | None, unknown: bool) -> None:
@@ -407,7 +404,7 @@ class Driver:
 
     async def _tick(self) -> None:
         now = self.machine.clock.monotonic()
-        time, self._ticked = self.time(), self._commit_time.now()
+        time, self._ticked = self.time(), self.commit_time()
         self.dispatch(Tick(now, time, self._expiries))
         if self.supervisor.fails("expiry") and not self.core.expiring(time):  # `expiring` is O(hulls)
             self.supervisor.succeeded("expiry")

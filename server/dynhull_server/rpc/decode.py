@@ -81,10 +81,8 @@ def decode_may_skip(producer: str, may_skip: bool) -> bool:
     return may_skip
 
 
-def decode_after(may_skip: bool, request: Any) -> int | None:
-    """The number of the batch that must be the producer's last one; None for any."""
-    if not request.HasField("after_sequence"):
-        return None
+def decode_after(may_skip: bool, request: Any) -> int:
+    """The number of the batch that must be the producer's last one."""
     after = int(request.after_sequence)
     if not may_skip:
         raise InvalidFieldError("after_sequence", after, "it is for numbers that may skip: give may_skip")

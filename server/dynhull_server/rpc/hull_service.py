@@ -156,7 +156,7 @@ class HullService:
         may_skip = decode.decode_may_skip(producer, request.may_skip)
         owner = call.owner if producer else ""  # asking gRPC for the address takes longer than a batch of one point
         rows = call.message_bytes // decode.BYTES_PER_POINT  # an estimate: reading the points would copy them
-        given = name, request, self._driver.time(), rows, producer, owner, may_skip
+        given = name, producer, owner, may_skip, request, self._driver.time(), rows
         write = await decoding(self._driver, rows, decode_write, *given)
         try:
             if request.uid and self._hulls.has(name):

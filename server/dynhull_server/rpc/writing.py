@@ -32,9 +32,10 @@ T = TypeVar("T")
 Given = TypeVarTuple("Given")
 
 
-def decode_write(name: str, request: Any, arrived: int, rows: int, producer: str, owner: str, may_skip: bool) -> Write:
+def decode_write(name: str, producer: str, owner: str, may_skip: bool, request: Any, arrived: int, rows: int) -> Write:
     """The batch of a request to a hull; `owner` is the caller that the producer belongs to."""
-    sequence, after = decode.decode_sequence(producer, request.sequence), decode.decode_after(may_skip, request)
+    sequence = decode.decode_sequence(producer, request.sequence)
+    after = decode.decode_after(may_skip, request) if request.HasField("after_sequence") else None
     return Write(name, decoded(request.batch), arrived, rows, producer, sequence, owner, may_skip, after)
 
 
@@ -119,7 +120,7 @@ class StreamedBatches:
         self._hulls = hulls
         self._driver = driver
         self._uid: str = first.uid
-        self._owner = call.owner
+        self._decode_write = partial(decode_write, name, self._producer, call.owner, self._may_skip)
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._loop = asyncio.get_running_loop()
@@ -173,9 +174,8 @@ class StreamedBatches:
             raise decode.InvalidFieldError("producer", producer, f"the producer of this call is {self._producer!r}")
         if message.may_skip and not self._may_skip:
             raise decode.InvalidFieldError("may_skip", value=True, problem="the first message of the call decides it")
-        batches = self._several(message) or ([message] if _has_batch(message) else [])
-        rows = self._call.message_bytes // decode.BYTES_PER_POINT
-        arrived = self._driver.time()
+        batches = self._batches_of(message)
+        rows, arrived = self._call.message_bytes // decode.BYTES_PER_POINT, self._driver.time()
         writes: list[Write] = []
         try:
             if rows <= SMALL:
@@ -206,11 +206,14 @@ class StreamedBatches:
         except Exception as failure:  # raised after the batches before it are answered
             self._failure = failure
 
-    def _several(self, message: Any) -> Sequence[Any]:
-        """The batches of a message that may have several; empty where it has one alone, or none."""
+    def _batches_of(self, message: Any) -> Sequence[Any]:
+        """The batches of a message; a message with one is that batch itself."""
         several: Sequence[Any] = message.batches if self._may_be_several else ()
         if not several:
-            return ()
+            if message.HasField("batch"):
+                return [message]
+            _require_no_number(message)
+            return []
         if not self.several:
             problem = "only in a call whose first message has accept_results"
             raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
@@ -223,22 +226,17 @@ class StreamedBatches:
 
     def _decode(self, batches: Sequence[Any], arrived: int, rows: int, writes: list[Write]) -> None:
         """Decode batches of about `rows` points together."""
-        name, producer, owner, may_skip = self.name, self._producer, self._owner, self._may_skip
-        rows_each = rows // max(len(batches), 1)
         for each in batches:
-            writes.append(decode_write(name, each, arrived, rows_each, producer, owner, may_skip))  # noqa: PERF401  # those before an invalid one are sent
+            writes.append(self._decode_write(each, arrived, rows // len(batches)))  # noqa: PERF401  # those before an invalid one are sent
 
     def _send(self, writes: list[Write]) -> None:
         self._arrivals.extend([time.perf_counter()] * len(writes))
         self._batches.write(writes)
 
 
-def _has_batch(message: Any) -> bool:
-    """Whether a message has a batch; without one, it has no number."""
-    if message.HasField("batch"):
-        return True
+def _require_no_number(message: Any) -> None:
+    """Refuse a number in a message without a batch."""
     if message.sequence:
         raise decode.InvalidFieldError("sequence", message.sequence, "a sequence number needs a batch")
     if message.HasField("after_sequence"):
         raise decode.InvalidFieldError("after_sequence", message.after_sequence, "it needs a batch")
-    return False

@@ -243,24 +243,22 @@ class Core:
         request: CreateHull | DeleteHull | Expire | Follow | ReadHull | Recenter | WriteBatch,
         effects: list[Effect],
     ) -> None:
-        name = request.hull.name if type(request) is ReadHull else request.name  # type: ignore[union-attr]
-        queue = self._queues.get(name) or self._queues.of(name)
-        if queue.hull is not None and queue.hull.divided and isinstance(request, DIVIDED):
-            self._divide(queue.hull, [request], effects)
-            return
-        if queue.trip is None and not queue.waiting and not self._stopping and not request.abandoned:
-            if request.rows <= SMALL and type(request) is ReadHull:
-                self._read(queue, request)
-                effects.append(Reply([request]))
-            elif self._immediate and queue.hull is not None and request.rows <= SMALL and type(request) is WriteBatch:
-                self._write(queue, queue.hull, request, effects)
-            else:
-                self._begin([queue], [request], request.rows, effects)
-                if queue.hull is None:
-                    self._queues.rest(queue)
-            return
-        queue.waiting.append(request)
-        self._go_on([queue], effects)
+        queue = self._queues.of(request.name)
+        hull = queue.hull
+        if hull is not None and hull.divided and isinstance(request, DIVIDED):
+            self._divide(hull, [request], effects)
+        elif queue.trip is not None or queue.waiting or self._stopping or request.abandoned:
+            queue.waiting.append(request)
+            self._go_on([queue], effects)
+        elif self._immediate and hull is not None and request.rows <= SMALL and type(request) is WriteBatch:
+            self._write(queue, hull, request, effects)
+        elif request.rows <= SMALL and type(request) is ReadHull:
+            self._read(queue, request)
+            effects.append(Reply([request]))
+        else:
+            self._begin([queue], [request], request.rows, effects)
+            if hull is None:
+                self._queues.rest(queue)
 
     def _arrived(self, event: Arrived, effects: list[Effect]) -> None:
         queue = self._queues.of(event.batches[0].name)

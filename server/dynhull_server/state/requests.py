@@ -125,6 +125,11 @@ class ReadHull(Request):
     hull: "Hull"
     function: "Callable[[HullState], Any]"
 
+    @property
+    def name(self) -> str:
+        """The name of the hull."""
+        return self.hull.name
+
 
 @dataclass(slots=True, eq=False)
 class ReadTogether(Request):

@@ -140,7 +140,7 @@ class Trip:
         if isinstance(request, AnyFenceRequest):
             assert self.fences is not None  # only the fences' room makes trips of them
             return self.fences.do(request)
-        leg = self.legs[request.hull.name if isinstance(request, ReadHull) else request.name]  # type: ignore[attr-defined]
+        leg = self.legs[request.name]  # type: ignore[attr-defined]
         match request:
             case ReadHull():
                 return _read(request, leg)
