@@ -49,6 +49,11 @@ def counted(places: object, news: tuple[object, object, object, object], columns
     Count events of fences at these places: two columns are set, two are added to, and the last is 1.
     """
 
+def plain_batches(payloads: list[bytes], first: int, kind: int) -> tuple[bytes, ...]:
+    """
+    The batches in payloads of the journal as columns, up to the first payload that has one of another kind.
+    """
+
 def key_codes(lengths: bytes, data: bytes) -> bytes:
     """
     The number of each key, as int32: equal ones have the same, each that is new one more than those before.

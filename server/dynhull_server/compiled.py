@@ -96,6 +96,9 @@ class Native(Protocol):
     def key_codes(self, lengths: bytes, data: bytes) -> bytes:
         """`_codes` in storage/segments/gathered.py."""
 
+    def plain_batches(self, payloads: "list[bytes]", first: int, kind: int) -> "tuple[bytes, ...]":
+        """The columns of `_plain` in storage/rows/batch_columns.py."""
+
 
 def _load() -> Native | None:
     if KERNEL == "python":

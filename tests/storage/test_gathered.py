@@ -1,6 +1,7 @@
 """Many batches of the past as one lead to the very state that they lead to one after the other."""
 
 import dataclasses
+import struct
 
 import numpy as np
 import pytest
@@ -14,6 +15,9 @@ from dynhull_server.state.errors import MisfitError, RefusedError
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import CommitStamp, HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.storage.rows import batch_columns
+from dynhull_server.storage.rows.batch_columns import columns_of_rows
+from dynhull_server.storage.rows.encoding import encode
 from dynhull_server.storage.segments import gathered as gathering
 from dynhull_server.storage.segments.columns import Batches, columns_of
 from dynhull_server.storage.segments.gathered import gathered, key_codes
@@ -125,6 +129,34 @@ def test_gathered_batches_lead_to_the_same_state(kind, steps, after):
     if records:
         batches = Batches(from_parquet(to_parquet(columns_of(records, hull.identity), {}), "a file")[0])
         assert len(require_same(hull, records, min(after, len(records)), batches)) <= len(records)
+
+
+@given(kind=st.sampled_from(sorted(KINDS)), steps=STEPS, together=st.integers(1, 5))
+@settings(max_examples=40, deadline=None)
+def test_rows_of_the_journal_are_the_same_columns_in_both_languages(kind, steps, together):
+    hull = KINDS[kind]
+    records = lived(hull, steps)
+    rows = []
+    for first in range(0, len(records), together):
+        some = records[first : first + together]
+        commit = (None, None) if first == 0 else (first, 10 * first)
+        for each in some:
+            each.committed = None if first == 0 else CommitStamp(*commit)
+        rows.append((some[0].revision, some[-1].revision, 0, encode(some), *commit))
+    expected = columns_of(records, hull.identity)
+    same(columns_of_rows(rows, hull.identity), expected)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batch_columns, "native", None)
+        same(columns_of_rows(rows, hull.identity), expected)
+
+
+def test_a_payload_that_is_cut_anywhere_is_no_batch():
+    for kind in ("keyed", "numbered", "recent", "recent-by-data"):
+        hull = KINDS[kind]
+        payload = encode(lived(hull, [("ttl" if hull.identity == "str" else "dated", 7, 3, 0)]))
+        for length in range(1, len(payload)):
+            with pytest.raises((ValueError, struct.error)):
+                columns_of_rows([(1, 1, 0, payload[:length], 1, 1)], hull.identity)
 
 
 @pytest.mark.parametrize("kind", ["keyed", "numbered", "multiset", "event-times", "recent", "recent-keyed"])

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "batches.hpp"
 #include "encoding.hpp"
 #include "key_codes.hpp"
 #include "numbering.hpp"
@@ -293,6 +294,34 @@ nb::bytes key_codes(const nb::bytes& lengths, const nb::bytes& data) {
   return nb::borrow<nb::bytes>(codes);
 }
 
+template <class Value>
+nb::bytes bytes(const std::vector<Value>& values) {
+  return bytes(values.data(), values.size());
+}
+
+// The batches in payloads of the journal, from one of these on up to the first that has one that is not plain.
+nb::tuple plain_batches(const nb::list& payloads, std::size_t first, std::uint8_t kind) {
+  if (kind != 0 && kind != 16 && kind != 32) throw nb::value_error("no kind of rows");
+  std::vector<View<char>> views;
+  views.reserve(payloads.size());
+  std::size_t size = 0;
+  for (std::size_t place = first; place < payloads.size(); ++place) {
+    views.emplace_back(payloads[place]);
+    size += views.back().size();
+  }
+  PlainBatches batches(kind);
+  {
+    std::optional<nb::gil_scoped_release> release;
+    if (size >= MANY) release.emplace();
+    for (const View<char>& payload : views)
+      if (!batches.add(payload.text())) break;
+  }
+  return nb::make_tuple(bytes(batches.records), bytes(batches.clocks), bytes(batches.causes), bytes(batches.rows),
+                        bytes(batches.ops), nb::bytes(batches.lengths.data(), batches.lengths.size()),
+                        nb::bytes(batches.keys.data(), batches.keys.size()), bytes(batches.points),
+                        bytes(batches.times), bytes(batches.deadlines));
+}
+
 }  // namespace
 }  // namespace dynhull_server
 
@@ -335,6 +364,10 @@ NB_MODULE(_native, module) {
              nb::sig("def counted(places: object, news: tuple[object, object, object, object], "
                      "columns: tuple[object, object, object, object, object]) -> None"),
              "Count events of fences at these places: two columns are set, two are added to, and the last is 1.");
+  module.def(
+      "plain_batches", &dynhull_server::plain_batches, "payloads"_a, "first"_a, "kind"_a,
+      nb::sig("def plain_batches(payloads: list[bytes], first: int, kind: int) -> tuple[bytes, ...]"),
+      "The batches in payloads of the journal as columns, up to the first payload that has one of another kind.");
   module.def(
       "key_codes", &dynhull_server::key_codes, "lengths"_a, "data"_a,
       nb::sig("def key_codes(lengths: bytes, data: bytes) -> bytes"),

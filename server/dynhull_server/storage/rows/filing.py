@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from ...state.records import FOREVER, HullRow, Kept, Record
-from ..port import DamagedError
+from ...state.records import FOREVER, NO_TIME, HullRow, Kept
 from ..segments.archive import BATCHES, STATE, Archive
-from ..segments.columns import SegmentColumns, columns_of, columns_of_state
+from ..segments.columns import SegmentColumns, columns_of_state
 from ..segments.parquet import to_parquet
 from .chunks import state
 from .ledger import HullRows
-from .reading import batch_rows, newest_snapshot, whole_records
+from .past_rows import columns_between
+from .reading import newest_snapshot
 from .segment_rows import SegmentFacts, StoredSegment
 from .tables import Reader
 
@@ -24,23 +24,23 @@ class Due:
 
     Attributes:
         row: the hull.
-        records: its batches, at least one.
+        columns: its batches, at least one.
         before: the state before them, if it is to lie beside them.
     """
 
     row: HullRow
-    records: list[Record]
+    columns: SegmentColumns
     before: Kept | None
 
     @property
     def first(self) -> int:
         """The first revision."""
-        return self.records[0].revision
+        return int(self.columns.revision[0])
 
     @property
     def last(self) -> int:
         """The last revision."""
-        return self.records[-1].revision
+        return int(self.columns.revision[-1])
 
     def write(self, archive: Archive, place: int, file: str) -> StoredSegment:
         """Write the files.
@@ -48,14 +48,14 @@ class Due:
         Raises:
             OSError: the disk is full, or fails.
         """
-        columns = columns_of(self.records, self.row.settings.identity)
+        columns = self.columns
         state, commit = (0, ""), None
         if self.before is not None:
             state, commit = archive.write(file + STATE, state_file(self.row, self.before)), self.before.committed
         wrote = archive.write(file + BATCHES, to_parquet(columns, _about(self.row, columns)))
-        ends = [each.committed.time for each in (self.records[0], self.records[-1]) if each.committed is not None]
-        times = ends if len(ends) == 2 else (0, 0)
-        facts = SegmentFacts(*wrote, *state, commit, len(self.records), columns.moves, *times)
+        ends = int(columns.committed[0]), int(columns.committed[-1])
+        times = (0, 0) if NO_TIME in ends else ends
+        facts = SegmentFacts(*wrote, *state, commit, self.last - self.first + 1, columns.moves, *times)
         return StoredSegment(place, self.first, self.last, file, facts)
 
 
@@ -66,13 +66,11 @@ def read_due(reader: Reader, hull: HullRows) -> Due:
         DamagedError: a row of the journal is damaged.
     """
     after = hull.filed
-    records = _some(reader, hull, after, hull.due)
-    if not records or records[0].revision != after + 1:
-        raise DamagedError(f"hull {hull.row.name!r}: revision {after + 1} is missing: restore a backup")
+    columns = columns_between(reader, hull, after, hull.due, MOST_ROWS)
     kept = None
     if any(each.revision == after for each in hull.snapshots):
         kept = newest_snapshot(reader, hull, after)
-    return Due(hull.row, records, kept if kept is not None and kept.revision == after else None)
+    return Due(hull.row, columns, kept if kept is not None and kept.revision == after else None)
 
 
 def state_file(row: HullRow, kept: Kept) -> bytes:
@@ -83,18 +81,6 @@ def state_file(row: HullRow, kept: Kept) -> bytes:
         "deadlines": str(kept.contents.deadlines is not None),
     }
     return to_parquet(columns, about, state(replace(kept, records=[])))
-
-
-def _some(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:
-    found: list[Record] = []
-    rows = 0
-    for record in whole_records(hull, batch_rows(reader, hull.between(after, until))):
-        if after < record.revision <= until and rows < MOST_ROWS:
-            found.append(record)
-            rows += len(record.rows)
-        elif record.revision > after:
-            break
-    return found
 
 
 def _about(row: HullRow, columns: SegmentColumns) -> dict[str, str]:

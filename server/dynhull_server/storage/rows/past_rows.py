@@ -2,16 +2,23 @@
 
 from array import array
 
+import numpy as np
+
 from ...state.records import CommitStamp, Kept, Record
 from ..past import Moment, created
 from ..port import DamagedError
+from ..segments.columns import Batches, SegmentColumns, joined
+from ..segments.gathered import gathered
+from .batch_columns import columns_of_rows
 from .batch_rows import is_whole
 from .ledger import HullRows
-from .reading import as_damage, batch_rows, commit_of, newest_snapshot, whole_records
+from .reading import as_damage, batch_rows, commit_of, newest_snapshot, whole_records, whole_rows
 from .tables import Reader
 
 # About the rows of points that one read has, and the rows of batches that it looks at.
 STEP_POINTS, STEP_ROWS = 8192, 1024
+# Those of one that gathers them.
+GATHERED_ROWS = 2**17
 
 
 def oldest_moment(reader: Reader, hull: HullRows, *, timed: bool) -> Moment:
@@ -81,6 +88,41 @@ def batches_after(reader: Reader, hull: HullRows, after: int, until: int) -> lis
     if not found and after < min(until, hull.last):
         raise DamagedError(f"hull {hull.row.name!r}: revision {after + 1} is missing: restore a backup")
     return found
+
+
+def gathered_after(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:
+    """What the batches after a revision come to, as many as are read and applied in a tenth of a second."""
+    require_kept(hull, after)
+    last = min(until, hull.last)
+    if after >= last:
+        return []
+    columns = columns_between(reader, hull, after, last, GATHERED_ROWS)
+    return list(gathered(Batches(columns), hull.row.settings, after, last))
+
+
+def columns_between(reader: Reader, hull: HullRows, after: int, until: int, most: int) -> SegmentColumns:
+    """The batches after a revision up to another one that is there, in columns.
+
+    At least those of one row of batches; no further row is read after `most` points and keys.
+    """
+    places, parts, count = hull.between(after, until), list[SegmentColumns](), 0
+    identity = hull.row.settings.identity
+    with as_damage(hull):
+        for start in range(0, len(places), STEP_ROWS):
+            parts.append(
+                columns_of_rows(whole_rows(hull, batch_rows(reader, places[start : start + STEP_ROWS])), identity)
+            )
+            count += len(parts[-1])
+            if count >= most:
+                break
+    columns = joined(parts, identity)
+    first, last = np.searchsorted(columns.revision, [after, until], side="right").tolist()
+    columns = columns.rows(first, last)
+    gaps = np.flatnonzero(np.diff(columns.revision, prepend=after) > 1)
+    if len(gaps) or not len(columns):
+        missing = int(columns.revision[gaps[0] - 1]) + 1 if len(gaps) and gaps[0] else after + 1
+        raise DamagedError(f"hull {hull.row.name!r}: revision {missing} is missing: restore a backup")
+    return columns
 
 
 def require_kept(hull: HullRows, revision: int) -> None:

@@ -84,12 +84,23 @@ def batch_rows(reader: Reader, places: "array[int]") -> Iterator[tuple[Any, ...]
     return reader.some("batches", f"first, last, checksum, payload, {commit_columns(reader.version)}", places)
 
 
+def whole_rows(hull: HullRows, rows: Iterable[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+    """The rows that `batch_rows` has read. Raises DamagedError if one is damaged."""
+    return [_whole(hull, row) for row in rows]
+
+
 def whole_records(hull: HullRows, rows: Iterable[tuple[Any, ...]]) -> Iterator[Record]:
     """The records in rows that `batch_rows` has read. Raises DamagedError for one that is damaged."""
-    for first, last, stored, payload, *commit in rows:
-        if not is_whole(stored, payload, hull.row.number, first, last, *commit):
-            raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
+    for row in rows:
+        first, _, _, payload, *commit = _whole(hull, row)
         yield from batch_records(payload, first, *commit)
+
+
+def _whole(hull: HullRows, row: tuple[Any, ...]) -> tuple[Any, ...]:
+    first, last, stored, payload, *commit = row
+    if not is_whole(stored, payload, hull.row.number, first, last, *commit):
+        raise DamagedError(f"hull {hull.row.name!r}: revisions {first} to {last} are damaged: restore a backup")
+    return row
 
 
 @contextmanager

@@ -37,7 +37,7 @@ from .group import (
     SetHistory,
 )
 from .ledger import DROPPED, HullRows, Ledger, StoredSnapshot
-from .past_rows import batches_after, moment_at, oldest_moment, state_until
+from .past_rows import batches_after, gathered_after, moment_at, oldest_moment, state_until
 from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader
@@ -179,7 +179,7 @@ class RowStorage(ABC):
         with self._of_hull(number) as (reader, hull):
             if self._filed is not None and after < hull.oldest:
                 return self._filed.gathered(hull, after, until)
-            return batches_after(reader, hull, after, until)
+            return gathered_after(reader, hull, after, until)
 
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
         """A reader, and the rows of a hull as of the same moment; KeyError if no hull has that number."""

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -84,10 +84,22 @@ class SegmentColumns:
     def __len__(self) -> int:
         return len(self.revision)
 
+    def rows(self, first: int, last: int) -> "SegmentColumns":
+        """Some of the rows."""
+        before = int(np.count_nonzero(self.keyed[:first]))
+        keys = slice(before, before + int(np.count_nonzero(self.keyed[first:last])))
+        return SegmentColumns(
+            self.identity,
+            *(getattr(self, name)[keys if name == "keys" else slice(first, last)] for name in COLUMNS),
+        )
+
     @property
     def moves(self) -> int:
         """The number of points and keys that these batches write."""
         return int(np.isin(self.op, MOVES).sum())
+
+
+COLUMNS = tuple(each.name for each in fields(SegmentColumns) if each.name != "identity")
 
 
 @dataclass(slots=True)
@@ -130,6 +142,21 @@ def columns_of(records: Iterable[Record], identity: Identity) -> SegmentColumns:
         pieces += _pieces(record)
         heads.numbers.append(len(pieces) - before)
     return _joined(heads, pieces, identity)
+
+
+def joined(parts: Sequence[SegmentColumns], identity: Identity) -> SegmentColumns:
+    """The rows of several columns, one after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    empty = columns_of([], identity)
+    keys = _joined_keys([part.keys for part in parts], identity)
+    detail = [said for part in parts for said in part.detail]
+    arrays = {
+        name: np.concatenate([getattr(empty, name), *(getattr(part, name) for part in parts)])
+        for name in COLUMNS
+        if name not in ("keys", "detail")
+    }
+    return SegmentColumns(identity, **arrays, keys=keys, detail=detail)
 
 
 def columns_of_state(
