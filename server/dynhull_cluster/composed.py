@@ -18,6 +18,7 @@ from dynhull_server.rpc.decode_fence import decode_fence, decode_fence_name
 from dynhull_server.rpc.methods import DESCRIPTOR, FENCES
 from dynhull_server.rpc.status import HullsApartError
 from dynhull_server.state.errors import HullEmptyError, HullUnsuitableError
+from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.hull_state import Counts
 
 from .merged_query import MergedQuery
@@ -25,6 +26,7 @@ from .relay import Relay, Route
 from .worker_link import WorkerLink
 
 HULLS, FENCE_CALLS = f"/{DESCRIPTOR.full_name}", f"/{FENCES.full_name}"
+BETWEEN = f"{FENCE_CALLS}/FenceEventsBetween"
 # The fields of a request that name hulls or fences, and the names.
 Names = Callable[[Any], Iterable[tuple[str, str]]]
 # Raises PermissionDeniedError if a request may not have this name in this field.
@@ -53,6 +55,7 @@ class Composed:
             ),
             f"{HULLS}/Separate": self._separate,
             f"{HULLS}/Query": self._query,
+            BETWEEN: partial(self._between, partial(_names_of_past_fence, max_corners)),
         }
         fences = fence_service_pb2
         together = partial(self._common_link, pb.ApplyTogetherRequest, _names_of_batches, _require_write)
@@ -76,6 +79,15 @@ class Composed:
             for field, name in found:
                 require(call.access, field, name)
             raise
+
+    async def _between(self, names: Names, call: Call) -> None:
+        """The events of a fence after the fact, from the worker that has its hulls."""
+        with call.stream():
+            with call.cutoff():
+                message = await call.receive()
+                kind = fence_service_pb2.FenceEventsBetweenRequest
+                link = self._common_link(kind, names, _require_past, message, call)
+            await self._relay.read_from(link, BETWEEN, call, message)
 
     async def _list(self, request: Any, response: Any, field: str, call: Call) -> bytes:
         """One page of all workers, by name."""
@@ -171,6 +183,10 @@ def _require_read(access: Rights, _: str, name: str) -> None:
     access.require_read(name)
 
 
+def _require_past(access: Rights, _: str, name: str) -> None:
+    access.require_past(name)
+
+
 def _require_write(access: Rights, _: str, name: str) -> None:
     access.require_write(name)
 
@@ -187,11 +203,19 @@ def _names_of_fence(max_corners: int, request: Any) -> Iterable[tuple[str, str]]
     """The names of a fence and of its hulls. A prefix has to have a whole first part."""
     config = decode_fence(request, max_corners)
     yield "name", decode_fence_name(request.name)
-    field = request.config.WhichOneof("subjects")
     if config.kind == "prefix" and "/" not in config.subjects:
         problem = 'with several workers, a prefix has a "/": names have a worker in common if they agree before it'
         raise decode.InvalidFieldError("config.subject_prefix", config.subjects, problem)
-    yield f"config.{field}", config.subjects
+    yield from _hulls_of(request, config)
+
+
+def _names_of_past_fence(max_corners: int, request: Any) -> Iterable[tuple[str, str]]:
+    """The names of the hulls of a fence after the fact."""
+    return _hulls_of(request, decode_fence(request, max_corners))
+
+
+def _hulls_of(request: Any, config: FenceConfig) -> Iterable[tuple[str, str]]:
+    yield f"config.{request.config.WhichOneof('subjects')}", config.subjects
     if config.area_hull is not None:
         yield "config.hull_area.name", config.area_hull
 

@@ -187,18 +187,22 @@ class Server:
         """
         if self.address:
             return
+        settings = self._settings
+        pasts = Places("max_past_reads", settings.max_past_reads, settings.max_past_reads_per_caller)
         service = HullService(
             self._engine.driver,
             self._engine.hulls,
             self._metrics,
             ManyQuotas(self._settings),
-            Places("max_past_reads", self._settings.max_past_reads, self._settings.max_past_reads_per_caller),
+            pasts,
             Places("max_replays", self._settings.max_replays, self._settings.max_replays_per_caller),
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )
         fences = FenceService(
             self._engine.fences,
+            self._engine.past_fences,
+            pasts,
             self._metrics,
             max_corners=self._settings.max_fence_corners,
             max_watch_lag=self._settings.max_watch_lag,

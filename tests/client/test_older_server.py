@@ -41,6 +41,7 @@ CALLS: dict[str, Callable[[HullClient], Any]] = {
     "ReadPoints": lambda client: next(iter(client.read_points("fleet"))),
     "Watch": lambda client: next(iter(client.watch("fleet"))),
     "WatchFence": lambda client: next(iter(client.watch_fence("yard"))),
+    "FenceEventsBetween": lambda client: next(iter(client.fence_events_between("fleet", "fleet"))),
     "Stream": written,
     "Ingest": ingested,
     "Query": piped,

@@ -19,6 +19,7 @@ from dynhull_client import AsyncHullClient, HullClient, HullCopy, Located, Measu
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4], [1, 1]]
 EXPORTED = [
     "Applied",
+    "AsyncFenceEvents",
     "AsyncFenceWatch",
     "AsyncHullClient",
     "AsyncPast",
@@ -51,6 +52,7 @@ EXPORTED = [
     "FenceExistsError",
     "FenceNotFoundError",
     "FenceReplacedError",
+    "FenceEvents",
     "FenceWatch",
     "HeldPosition",
     "History",

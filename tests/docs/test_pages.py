@@ -22,7 +22,7 @@ PIECES = "reference/sdk"  # of programs: they begin with a client that is there
 
 ENDING = (
     "create|put|insert|remove|delete|load|verify|query|replay|measure|separate|phases|frontier|"
-    "fences (create|show|inside)"
+    "fences (create|show|inside|between)"
 )
 COMMAND = re.compile(rf"(?P<given>(printf|echo) [^|]*\| )?dynhull (?P<arguments>({ENDING}) [^|]*)")
 FILE = re.compile(r"printf .* > \S+|gzip .*")

@@ -51,6 +51,12 @@ FENCES = _named(
     port=("A disk", {"name": "port", "area": {"center": [0, 0], "radius": 2}, "subjects": "fleet", "dwell": 60}),
     pack=("The hull of the others", {"name": "pack", "area": {"hull": "fleet"}, "subjects": "fleet"}),
 )
+PAST_FENCES = _named(
+    yard=(
+        "Who was in this yard?",
+        {"area": {"exterior": [[-1, -1], [5, -1], [5, 5]]}, "subjects": "fleet", "start": "1"},
+    ),
+)
 REPLACED = _named(
     yard=("A larger polygon", {"area": {"exterior": [[-2, -2], [6, -2], [6, 6]]}, "subjects": "fleet"}),
 )

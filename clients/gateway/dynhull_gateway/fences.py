@@ -31,7 +31,7 @@ async def create_fence(
     client: Caller, fence: Annotated[schemas.NewFence, schemas.body(examples.FENCES)]
 ) -> schemas.Fence:
     """Create a fence: it compares subjects with an area, and makes an event when one enters or leaves."""
-    return _shown(await client.create_fence(**_arguments(fence)))
+    return _shown(await client.create_fence(**arguments_of(fence)))
 
 
 @router.get("/fences/{name}")
@@ -45,7 +45,7 @@ async def replace_fence(
     client: Caller, name: FencePath, settings: Annotated[schemas.FenceSettings, schemas.body(examples.REPLACED)]
 ) -> schemas.Fence:
     """Replace the area and the settings of a fence; the subjects must stay the same."""
-    return _shown(await client.replace_fence(name, **_arguments(settings)))
+    return _shown(await client.replace_fence(name, **arguments_of(settings)))
 
 
 @router.delete("/fences/{name}", status_code=status.HTTP_204_NO_CONTENT)
@@ -75,7 +75,7 @@ async def delete_consumer(client: Caller, name: FencePath, consumer: ConsumerPat
     await client.delete_consumer(name, consumer)
 
 
-def _arguments(fence: schemas.FenceSettings) -> dict[str, Any]:
+def arguments_of(fence: schemas.FenceSettings) -> dict[str, Any]:
     """The settings as arguments of the SDK."""
     given = fence.arguments()
     prefix = given.pop("subject_prefix")

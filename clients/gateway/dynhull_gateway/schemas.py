@@ -152,6 +152,9 @@ class Response(BaseModel):
     model_config = ConfigDict(from_attributes=True)
 
 
+# A moment of the past, as text.
+Moment = Annotated[str, Field(strict=True, max_length=100)] | None
+
 # Hulls
 
 
@@ -674,6 +677,18 @@ class FenceSettings(Request):
         None, description="or a prefix of the names of several,"
     )
     other_hull: Name | None = Field(None, description="or a hull that is compared as a whole.")
+
+
+@with_settings(surface.FenceSettings, at_creation=True)
+class PastFence(FenceSettings):
+    """A fence after the fact: its settings, and between which moments it would have been there."""
+
+    start: Moment = Field(
+        None,
+        description="Where it begins: a revision of the subjects' hull, all digits, or a time of RFC 3339, for the "
+        "last revision committed at or before it. By default the oldest that the server keeps.",
+    )
+    end: Moment = Field(None, description="The last revision, or the last time, that counts. By default now.")
 
 
 @with_settings(surface.FenceSettings, at_creation=True)

@@ -21,7 +21,7 @@ from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
+from ._async_watch import AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._batch import Batch
 from ._client import HullClient
@@ -67,11 +67,12 @@ from ._quarantine_messages import HeldPosition, Quarantine
 from ._series import Series
 from ._sync_past import Past
 from ._uses import Efficient, Measured, Phases, Separation
-from ._watch import FenceWatch, ManyWatch, Replay, Watch
+from ._watch import FenceEvents, FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 __all__ = [
     "Applied",
+    "AsyncFenceEvents",
     "AsyncFenceWatch",
     "AsyncHullClient",
     "AsyncIngest",
@@ -97,6 +98,7 @@ __all__ = [
     "FenceConsumer",
     "FenceDifference",
     "FenceEvent",
+    "FenceEvents",
     "FenceWatch",
     "HeldPosition",
     "History",

@@ -6,6 +6,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from . import _calls as calls
 from . import _fences as fences
+from . import _fences_between as between
 from . import _history as past
 from . import _layers as peeling
 from . import _many as many
@@ -18,7 +19,7 @@ from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
+from ._async_watch import AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call, Pages
 from ._messages import HullInfo
@@ -140,6 +141,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     replay = opening(AsyncReplay, playing.replay)
     watch_many = opening(AsyncManyWatch, many.watch_many)
     watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
+    fence_events_between = opening(AsyncFenceEvents, between.fence_events_between)
     writer = opening(AsyncWriter, calls.writer)
 
     def presence(self) -> AsyncIterator[bool]:

@@ -16,6 +16,7 @@ from ._errors import DynhullError
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
+from ._fences_between import BetweenPlace, ReadingBetween
 from ._hull_place import HullPlace
 from ._many import ManyPlace, WatchingMany
 from ._many_messages import ManyChange
@@ -129,3 +130,10 @@ class AsyncFenceWatch(AsyncFollower[FenceEvent]):
 
     def __init__(self, connection: AsyncConnection, watching: WatchingFence) -> None:
         super().__init__(connection, FencePlace(watching, connection.retries))
+
+
+class AsyncFenceEvents(AsyncFollower[FenceEvent]):
+    """`FenceEvents` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+
+    def __init__(self, connection: AsyncConnection, reading: ReadingBetween) -> None:
+        super().__init__(connection, BetweenPlace(reading, connection.retries))

@@ -6,6 +6,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 
 from . import _calls as calls
 from . import _fences as fences
+from . import _fences_between as between
 from . import _history as past
 from . import _layers as peeling
 from . import _many as many
@@ -21,7 +22,7 @@ from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
 from ._sync_past import Past
-from ._watch import FenceWatch, ManyWatch, Replay, Watch
+from ._watch import FenceEvents, FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 P = ParamSpec("P")
@@ -152,6 +153,7 @@ class HullClient(Client[BlockingConnection]):
     replay = opening(Replay, playing.replay)
     watch_many = opening(ManyWatch, many.watch_many)
     watch_fence = opening(FenceWatch, fences.watch_fence)
+    fence_events_between = opening(FenceEvents, between.fence_events_between)
     writer = opening(Writer, calls.writer)
 
     def close(self) -> None:

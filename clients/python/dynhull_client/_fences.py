@@ -76,7 +76,7 @@ def create_fence(  # noqa: D417  # the settings have their descriptions
             others, or without `exist_ok`.
         timeout: seconds, instead of the client's.
     """
-    config = _config(locals())
+    config = encode_fence(locals())
     create: Call[Fence] = Call(
         "CreateFence",
         pb.CreateFenceRequest(name=text("name", name), config=config),
@@ -120,7 +120,7 @@ def replace_fence(
     Subjects that are inside of one area and outside of the other make events with the cause "fence_changed". The same
     settings again make none.
     """
-    request = pb.ReplaceFenceRequest(name=text("name", name), config=_config(locals()))
+    request = pb.ReplaceFenceRequest(name=text("name", name), config=encode_fence(locals()))
     return Call("ReplaceFence", request, lambda response: decode_fence(response.fence), timeout)
 
 
@@ -247,8 +247,8 @@ def watch_fence(
     return WatchingFence(request, reconnect, timeout)
 
 
-def _config(given: dict[str, Any]) -> fence_pb2.FenceConfig:
-    """The settings of a fence, given the arguments of the call by name: `create_fence` says what each of them is."""
+def encode_fence(given: dict[str, Any]) -> fence_pb2.FenceConfig:
+    """The settings of a fence, given the arguments of a call by name: `create_fence` says what each of them is."""
     subjects, other_hull = given["subjects"], given["other_hull"]
     if (subjects is None) == (other_hull is None):
         raise ValueError("give either subjects or other_hull")

@@ -14,6 +14,7 @@ from ._errors import DynhullError
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
+from ._fences_between import BetweenPlace, ReadingBetween
 from ._home import Home
 from ._hull_place import HullPlace
 from ._many import ManyPlace, WatchingMany
@@ -139,3 +140,14 @@ class FenceWatch(Follower[FenceEvent]):
 
     def __init__(self, connection: BlockingConnection, watching: WatchingFence) -> None:
         super().__init__(connection, FencePlace(watching, connection.retries))
+
+
+class FenceEvents(Follower[FenceEvent]):
+    """The events that a fence would have made, in order. Iterates until the end of the asked time, or until closed.
+
+    Iterating blocks until the next event, and raises DynhullError if the server cannot go on, or is lost. A context
+    manager, which closes it; `close` may also be called by another thread, and ends the iteration.
+    """
+
+    def __init__(self, connection: BlockingConnection, reading: ReadingBetween) -> None:
+        super().__init__(connection, BetweenPlace(reading, connection.retries))

@@ -24,9 +24,10 @@ _sym_db = _symbol_database.Default()
 
 from dynhull_proto.v1 import fence_pb2 as dynhull__proto_dot_v1_dot_fence__pb2
 from google.protobuf import duration_pb2 as google_dot_protobuf_dot_duration__pb2
+from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$dynhull_proto/v1/fence_service.proto\x12\ndynhull.v1\x1a\x1c\x64ynhull_proto/v1/fence.proto\x1a\x1egoogle/protobuf/duration.proto\"K\n\x12\x43reateFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\'\n\x06\x63onfig\x18\x02 \x01(\x0b\x32\x17.dynhull.v1.FenceConfig\"7\n\x13\x43reateFenceResponse\x12 \n\x05\x66\x65nce\x18\x01 \x01(\x0b\x32\x11.dynhull.v1.Fence\"L\n\x13ReplaceFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\'\n\x06\x63onfig\x18\x02 \x01(\x0b\x32\x17.dynhull.v1.FenceConfig\"8\n\x14ReplaceFenceResponse\x12 \n\x05\x66\x65nce\x18\x01 \x01(\x0b\x32\x11.dynhull.v1.Fence\"\"\n\x12\x44\x65leteFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x15\n\x13\x44\x65leteFenceResponse\"\x1f\n\x0fGetFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"4\n\x10GetFenceResponse\x12 \n\x05\x66\x65nce\x18\x01 \x01(\x0b\x32\x11.dynhull.v1.Fence\"J\n\x11ListFencesRequest\x12\x0e\n\x06prefix\x18\x01 \x01(\t\x12\x11\n\tpage_size\x18\x02 \x01(\x05\x12\x12\n\npage_token\x18\x03 \x01(\t\"P\n\x12ListFencesResponse\x12!\n\x06\x66\x65nces\x18\x01 \x03(\x0b\x32\x11.dynhull.v1.Fence\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"!\n\x11ReadInsideRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"S\n\x12ReadInsideResponse\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12+\n\x08subjects\x18\x02 \x03(\x0b\x32\x19.dynhull.v1.FenceSubjects\"\xe3\x01\n\x11WatchFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x18\n\x0e\x61\x66ter_sequence\x18\x02 \x01(\x04H\x00\x12\x12\n\x08\x63onsumer\x18\x03 \x01(\tH\x00\x12\x12\n\x08only_new\x18\x04 \x01(\x08H\x00\x12\x10\n\x08\x63onflate\x18\x05 \x01(\x08\x12 \n\x18max_responses_per_second\x18\x06 \x01(\x01\x12\x34\n\x11progress_interval\x18\x07 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x0b\n\x03uid\x18\x08 \x01(\tB\x07\n\x05start\"\x94\x01\n\x12WatchFenceResponse\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.dynhull.v1.FenceEvent\x12$\n\x04lost\x18\x02 \x01(\x0b\x32\x16.dynhull.v1.LostEvents\x12\x11\n\tconflated\x18\x03 \x01(\x04\x12\x10\n\x08sequence\x18\x04 \x01(\x04\x12\x0b\n\x03uid\x18\x05 \x01(\t\";\n\nLostEvents\x12\x16\n\x0e\x66irst_sequence\x18\x01 \x01(\x04\x12\x15\n\rlast_sequence\x18\x02 \x01(\x04\"P\n\x0f\x41\x63kFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08\x63onsumer\x18\x02 \x01(\t\x12\x10\n\x08sequence\x18\x03 \x01(\x04\x12\x0b\n\x03uid\x18\x04 \x01(\t\"?\n\x10\x41\x63kFenceResponse\x12+\n\x08\x63onsumer\x18\x01 \x01(\x0b\x32\x19.dynhull.v1.FenceConsumer\"7\n\x15\x44\x65leteConsumerRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08\x63onsumer\x18\x02 \x01(\t\"\x18\n\x16\x44\x65leteConsumerResponse2\xd3\x05\n\x0c\x46\x65nceService\x12N\n\x0b\x43reateFence\x12\x1e.dynhull.v1.CreateFenceRequest\x1a\x1f.dynhull.v1.CreateFenceResponse\x12Q\n\x0cReplaceFence\x12\x1f.dynhull.v1.ReplaceFenceRequest\x1a .dynhull.v1.ReplaceFenceResponse\x12N\n\x0b\x44\x65leteFence\x12\x1e.dynhull.v1.DeleteFenceRequest\x1a\x1f.dynhull.v1.DeleteFenceResponse\x12\x45\n\x08GetFence\x12\x1b.dynhull.v1.GetFenceRequest\x1a\x1c.dynhull.v1.GetFenceResponse\x12K\n\nListFences\x12\x1d.dynhull.v1.ListFencesRequest\x1a\x1e.dynhull.v1.ListFencesResponse\x12M\n\nReadInside\x12\x1d.dynhull.v1.ReadInsideRequest\x1a\x1e.dynhull.v1.ReadInsideResponse0\x01\x12M\n\nWatchFence\x12\x1d.dynhull.v1.WatchFenceRequest\x1a\x1e.dynhull.v1.WatchFenceResponse0\x01\x12\x45\n\x08\x41\x63kFence\x12\x1b.dynhull.v1.AckFenceRequest\x1a\x1c.dynhull.v1.AckFenceResponse\x12W\n\x0e\x44\x65leteConsumer\x12!.dynhull.v1.DeleteConsumerRequest\x1a\".dynhull.v1.DeleteConsumerResponseB\x16Z\x14\x64ynhull/v1;dynhullv1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$dynhull_proto/v1/fence_service.proto\x12\ndynhull.v1\x1a\x1c\x64ynhull_proto/v1/fence.proto\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"K\n\x12\x43reateFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\'\n\x06\x63onfig\x18\x02 \x01(\x0b\x32\x17.dynhull.v1.FenceConfig\"7\n\x13\x43reateFenceResponse\x12 \n\x05\x66\x65nce\x18\x01 \x01(\x0b\x32\x11.dynhull.v1.Fence\"L\n\x13ReplaceFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\'\n\x06\x63onfig\x18\x02 \x01(\x0b\x32\x17.dynhull.v1.FenceConfig\"8\n\x14ReplaceFenceResponse\x12 \n\x05\x66\x65nce\x18\x01 \x01(\x0b\x32\x11.dynhull.v1.Fence\"\"\n\x12\x44\x65leteFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"\x15\n\x13\x44\x65leteFenceResponse\"\x1f\n\x0fGetFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"4\n\x10GetFenceResponse\x12 \n\x05\x66\x65nce\x18\x01 \x01(\x0b\x32\x11.dynhull.v1.Fence\"J\n\x11ListFencesRequest\x12\x0e\n\x06prefix\x18\x01 \x01(\t\x12\x11\n\tpage_size\x18\x02 \x01(\x05\x12\x12\n\npage_token\x18\x03 \x01(\t\"P\n\x12ListFencesResponse\x12!\n\x06\x66\x65nces\x18\x01 \x03(\x0b\x32\x11.dynhull.v1.Fence\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"!\n\x11ReadInsideRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\"S\n\x12ReadInsideResponse\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12+\n\x08subjects\x18\x02 \x03(\x0b\x32\x19.dynhull.v1.FenceSubjects\"\xe3\x01\n\x11WatchFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x18\n\x0e\x61\x66ter_sequence\x18\x02 \x01(\x04H\x00\x12\x12\n\x08\x63onsumer\x18\x03 \x01(\tH\x00\x12\x12\n\x08only_new\x18\x04 \x01(\x08H\x00\x12\x10\n\x08\x63onflate\x18\x05 \x01(\x08\x12 \n\x18max_responses_per_second\x18\x06 \x01(\x01\x12\x34\n\x11progress_interval\x18\x07 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x0b\n\x03uid\x18\x08 \x01(\tB\x07\n\x05start\"\x94\x01\n\x12WatchFenceResponse\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.dynhull.v1.FenceEvent\x12$\n\x04lost\x18\x02 \x01(\x0b\x32\x16.dynhull.v1.LostEvents\x12\x11\n\tconflated\x18\x03 \x01(\x04\x12\x10\n\x08sequence\x18\x04 \x01(\x04\x12\x0b\n\x03uid\x18\x05 \x01(\t\";\n\nLostEvents\x12\x16\n\x0e\x66irst_sequence\x18\x01 \x01(\x04\x12\x15\n\rlast_sequence\x18\x02 \x01(\x04\"P\n\x0f\x41\x63kFenceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08\x63onsumer\x18\x02 \x01(\t\x12\x10\n\x08sequence\x18\x03 \x01(\x04\x12\x0b\n\x03uid\x18\x04 \x01(\t\"?\n\x10\x41\x63kFenceResponse\x12+\n\x08\x63onsumer\x18\x01 \x01(\x0b\x32\x19.dynhull.v1.FenceConsumer\"7\n\x15\x44\x65leteConsumerRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08\x63onsumer\x18\x02 \x01(\t\"\x18\n\x16\x44\x65leteConsumerResponse\"\xe8\x01\n\x19\x46\x65nceEventsBetweenRequest\x12\'\n\x06\x63onfig\x18\x01 \x01(\x0b\x32\x17.dynhull.v1.FenceConfig\x12\x18\n\x0estart_revision\x18\x02 \x01(\x04H\x00\x12\x30\n\nstart_time\x18\x03 \x01(\x0b\x32\x1a.google.protobuf.TimestampH\x00\x12\x16\n\x0c\x65nd_revision\x18\x04 \x01(\x04H\x01\x12.\n\x08\x65nd_time\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.TimestampH\x01\x42\x07\n\x05startB\x05\n\x03\x65nd\"D\n\x1a\x46\x65nceEventsBetweenResponse\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.dynhull.v1.FenceEvent2\xba\x06\n\x0c\x46\x65nceService\x12N\n\x0b\x43reateFence\x12\x1e.dynhull.v1.CreateFenceRequest\x1a\x1f.dynhull.v1.CreateFenceResponse\x12Q\n\x0cReplaceFence\x12\x1f.dynhull.v1.ReplaceFenceRequest\x1a .dynhull.v1.ReplaceFenceResponse\x12N\n\x0b\x44\x65leteFence\x12\x1e.dynhull.v1.DeleteFenceRequest\x1a\x1f.dynhull.v1.DeleteFenceResponse\x12\x45\n\x08GetFence\x12\x1b.dynhull.v1.GetFenceRequest\x1a\x1c.dynhull.v1.GetFenceResponse\x12K\n\nListFences\x12\x1d.dynhull.v1.ListFencesRequest\x1a\x1e.dynhull.v1.ListFencesResponse\x12M\n\nReadInside\x12\x1d.dynhull.v1.ReadInsideRequest\x1a\x1e.dynhull.v1.ReadInsideResponse0\x01\x12M\n\nWatchFence\x12\x1d.dynhull.v1.WatchFenceRequest\x1a\x1e.dynhull.v1.WatchFenceResponse0\x01\x12\x45\n\x08\x41\x63kFence\x12\x1b.dynhull.v1.AckFenceRequest\x1a\x1c.dynhull.v1.AckFenceResponse\x12W\n\x0e\x44\x65leteConsumer\x12!.dynhull.v1.DeleteConsumerRequest\x1a\".dynhull.v1.DeleteConsumerResponse\x12\x65\n\x12\x46\x65nceEventsBetween\x12%.dynhull.v1.FenceEventsBetweenRequest\x1a&.dynhull.v1.FenceEventsBetweenResponse0\x01\x42\x16Z\x14\x64ynhull/v1;dynhullv1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -34,44 +35,48 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'dynhull_proto.v1.fence_serv
 if not _descriptor._USE_C_DESCRIPTORS:
   _globals['DESCRIPTOR']._loaded_options = None
   _globals['DESCRIPTOR']._serialized_options = b'Z\024dynhull/v1;dynhullv1'
-  _globals['_CREATEFENCEREQUEST']._serialized_start=114
-  _globals['_CREATEFENCEREQUEST']._serialized_end=189
-  _globals['_CREATEFENCERESPONSE']._serialized_start=191
-  _globals['_CREATEFENCERESPONSE']._serialized_end=246
-  _globals['_REPLACEFENCEREQUEST']._serialized_start=248
-  _globals['_REPLACEFENCEREQUEST']._serialized_end=324
-  _globals['_REPLACEFENCERESPONSE']._serialized_start=326
-  _globals['_REPLACEFENCERESPONSE']._serialized_end=382
-  _globals['_DELETEFENCEREQUEST']._serialized_start=384
-  _globals['_DELETEFENCEREQUEST']._serialized_end=418
-  _globals['_DELETEFENCERESPONSE']._serialized_start=420
-  _globals['_DELETEFENCERESPONSE']._serialized_end=441
-  _globals['_GETFENCEREQUEST']._serialized_start=443
-  _globals['_GETFENCEREQUEST']._serialized_end=474
-  _globals['_GETFENCERESPONSE']._serialized_start=476
-  _globals['_GETFENCERESPONSE']._serialized_end=528
-  _globals['_LISTFENCESREQUEST']._serialized_start=530
-  _globals['_LISTFENCESREQUEST']._serialized_end=604
-  _globals['_LISTFENCESRESPONSE']._serialized_start=606
-  _globals['_LISTFENCESRESPONSE']._serialized_end=686
-  _globals['_READINSIDEREQUEST']._serialized_start=688
-  _globals['_READINSIDEREQUEST']._serialized_end=721
-  _globals['_READINSIDERESPONSE']._serialized_start=723
-  _globals['_READINSIDERESPONSE']._serialized_end=806
-  _globals['_WATCHFENCEREQUEST']._serialized_start=809
-  _globals['_WATCHFENCEREQUEST']._serialized_end=1036
-  _globals['_WATCHFENCERESPONSE']._serialized_start=1039
-  _globals['_WATCHFENCERESPONSE']._serialized_end=1187
-  _globals['_LOSTEVENTS']._serialized_start=1189
-  _globals['_LOSTEVENTS']._serialized_end=1248
-  _globals['_ACKFENCEREQUEST']._serialized_start=1250
-  _globals['_ACKFENCEREQUEST']._serialized_end=1330
-  _globals['_ACKFENCERESPONSE']._serialized_start=1332
-  _globals['_ACKFENCERESPONSE']._serialized_end=1395
-  _globals['_DELETECONSUMERREQUEST']._serialized_start=1397
-  _globals['_DELETECONSUMERREQUEST']._serialized_end=1452
-  _globals['_DELETECONSUMERRESPONSE']._serialized_start=1454
-  _globals['_DELETECONSUMERRESPONSE']._serialized_end=1478
-  _globals['_FENCESERVICE']._serialized_start=1481
-  _globals['_FENCESERVICE']._serialized_end=2204
+  _globals['_CREATEFENCEREQUEST']._serialized_start=147
+  _globals['_CREATEFENCEREQUEST']._serialized_end=222
+  _globals['_CREATEFENCERESPONSE']._serialized_start=224
+  _globals['_CREATEFENCERESPONSE']._serialized_end=279
+  _globals['_REPLACEFENCEREQUEST']._serialized_start=281
+  _globals['_REPLACEFENCEREQUEST']._serialized_end=357
+  _globals['_REPLACEFENCERESPONSE']._serialized_start=359
+  _globals['_REPLACEFENCERESPONSE']._serialized_end=415
+  _globals['_DELETEFENCEREQUEST']._serialized_start=417
+  _globals['_DELETEFENCEREQUEST']._serialized_end=451
+  _globals['_DELETEFENCERESPONSE']._serialized_start=453
+  _globals['_DELETEFENCERESPONSE']._serialized_end=474
+  _globals['_GETFENCEREQUEST']._serialized_start=476
+  _globals['_GETFENCEREQUEST']._serialized_end=507
+  _globals['_GETFENCERESPONSE']._serialized_start=509
+  _globals['_GETFENCERESPONSE']._serialized_end=561
+  _globals['_LISTFENCESREQUEST']._serialized_start=563
+  _globals['_LISTFENCESREQUEST']._serialized_end=637
+  _globals['_LISTFENCESRESPONSE']._serialized_start=639
+  _globals['_LISTFENCESRESPONSE']._serialized_end=719
+  _globals['_READINSIDEREQUEST']._serialized_start=721
+  _globals['_READINSIDEREQUEST']._serialized_end=754
+  _globals['_READINSIDERESPONSE']._serialized_start=756
+  _globals['_READINSIDERESPONSE']._serialized_end=839
+  _globals['_WATCHFENCEREQUEST']._serialized_start=842
+  _globals['_WATCHFENCEREQUEST']._serialized_end=1069
+  _globals['_WATCHFENCERESPONSE']._serialized_start=1072
+  _globals['_WATCHFENCERESPONSE']._serialized_end=1220
+  _globals['_LOSTEVENTS']._serialized_start=1222
+  _globals['_LOSTEVENTS']._serialized_end=1281
+  _globals['_ACKFENCEREQUEST']._serialized_start=1283
+  _globals['_ACKFENCEREQUEST']._serialized_end=1363
+  _globals['_ACKFENCERESPONSE']._serialized_start=1365
+  _globals['_ACKFENCERESPONSE']._serialized_end=1428
+  _globals['_DELETECONSUMERREQUEST']._serialized_start=1430
+  _globals['_DELETECONSUMERREQUEST']._serialized_end=1485
+  _globals['_DELETECONSUMERRESPONSE']._serialized_start=1487
+  _globals['_DELETECONSUMERRESPONSE']._serialized_end=1511
+  _globals['_FENCEEVENTSBETWEENREQUEST']._serialized_start=1514
+  _globals['_FENCEEVENTSBETWEENREQUEST']._serialized_end=1746
+  _globals['_FENCEEVENTSBETWEENRESPONSE']._serialized_start=1748
+  _globals['_FENCEEVENTSBETWEENRESPONSE']._serialized_end=1816
+  _globals['_FENCESERVICE']._serialized_start=1819
+  _globals['_FENCESERVICE']._serialized_end=2645
 # @@protoc_insertion_point(module_scope)

@@ -2,6 +2,7 @@ import datetime
 
 from dynhull_proto.v1 import fence_pb2 as _fence_pb2
 from google.protobuf import duration_pb2 as _duration_pb2
+from google.protobuf import timestamp_pb2 as _timestamp_pb2
 from google.protobuf.internal import containers as _containers
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
@@ -163,3 +164,23 @@ class DeleteConsumerRequest(_message.Message):
 class DeleteConsumerResponse(_message.Message):
     __slots__ = ()
     def __init__(self) -> None: ...
+
+class FenceEventsBetweenRequest(_message.Message):
+    __slots__ = ("config", "start_revision", "start_time", "end_revision", "end_time")
+    CONFIG_FIELD_NUMBER: _ClassVar[int]
+    START_REVISION_FIELD_NUMBER: _ClassVar[int]
+    START_TIME_FIELD_NUMBER: _ClassVar[int]
+    END_REVISION_FIELD_NUMBER: _ClassVar[int]
+    END_TIME_FIELD_NUMBER: _ClassVar[int]
+    config: _fence_pb2.FenceConfig
+    start_revision: int
+    start_time: _timestamp_pb2.Timestamp
+    end_revision: int
+    end_time: _timestamp_pb2.Timestamp
+    def __init__(self, config: _Optional[_Union[_fence_pb2.FenceConfig, _Mapping]] = ..., start_revision: _Optional[int] = ..., start_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end_revision: _Optional[int] = ..., end_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+
+class FenceEventsBetweenResponse(_message.Message):
+    __slots__ = ("events",)
+    EVENTS_FIELD_NUMBER: _ClassVar[int]
+    events: _containers.RepeatedCompositeFieldContainer[_fence_pb2.FenceEvent]
+    def __init__(self, events: _Optional[_Iterable[_Union[_fence_pb2.FenceEvent, _Mapping]]] = ...) -> None: ...

@@ -69,6 +69,18 @@ class FenceServiceStub:
     """
     DeleteConsumer: _grpc.UnaryUnaryMultiCallable[_fence_service_pb2.DeleteConsumerRequest, _fence_service_pb2.DeleteConsumerResponse]
     """Deletes a consumer: what it has not acknowledged no longer counts as its backlog."""
+    FenceEventsBetween: _grpc.UnaryStreamMultiCallable[_fence_service_pb2.FenceEventsBetweenRequest, _fence_service_pb2.FenceEventsBetweenResponse]
+    """Sends the events that a fence with these settings would have made over the past, and ends with OK. There is no such
+    fence, and none is created. A caller with a token needs the permission "past" for the hulls that the settings name.
+
+    The hulls are rebuilt as of the start, where the fence would have been created, and then each batch is applied and
+    compared as when it came. The time of an event is that of the commit of its batch; for what time has made, dwell and
+    min_dwell, when it was due. Batches to two hulls that were committed together count as one change of both, the first to
+    one with the first to the other, and so on.
+
+    OUT_OF_RANGE with REVISION_FORGOTTEN if the server does not keep a part of that past, or it has not come.
+    FAILED_PRECONDITION for hulls over shards, for a subject_prefix, and where a geographic hull was recentred meanwhile.
+    """
 
 @_typing.type_check_only
 class FenceServiceAsyncStub(FenceServiceStub):
@@ -111,6 +123,18 @@ class FenceServiceAsyncStub(FenceServiceStub):
     """
     DeleteConsumer: _aio.UnaryUnaryMultiCallable[_fence_service_pb2.DeleteConsumerRequest, _fence_service_pb2.DeleteConsumerResponse]  # type: ignore[assignment]
     """Deletes a consumer: what it has not acknowledged no longer counts as its backlog."""
+    FenceEventsBetween: _aio.UnaryStreamMultiCallable[_fence_service_pb2.FenceEventsBetweenRequest, _fence_service_pb2.FenceEventsBetweenResponse]  # type: ignore[assignment]
+    """Sends the events that a fence with these settings would have made over the past, and ends with OK. There is no such
+    fence, and none is created. A caller with a token needs the permission "past" for the hulls that the settings name.
+
+    The hulls are rebuilt as of the start, where the fence would have been created, and then each batch is applied and
+    compared as when it came. The time of an event is that of the commit of its batch; for what time has made, dwell and
+    min_dwell, when it was due. Batches to two hulls that were committed together count as one change of both, the first to
+    one with the first to the other, and so on.
+
+    OUT_OF_RANGE with REVISION_FORGOTTEN if the server does not keep a part of that past, or it has not come.
+    FAILED_PRECONDITION for hulls over shards, for a subject_prefix, and where a geographic hull was recentred meanwhile.
+    """
 
 class FenceServiceServicer(metaclass=_abc_1.ABCMeta):
     """Fences: exact events when subjects enter and leave areas, whichever side moves. Errors are as in HullService; a resource
@@ -204,5 +228,23 @@ class FenceServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_fence_service_pb2.DeleteConsumerResponse, _abc.Awaitable[_fence_service_pb2.DeleteConsumerResponse]]:
         """Deletes a consumer: what it has not acknowledged no longer counts as its backlog."""
+
+    @_abc_1.abstractmethod
+    def FenceEventsBetween(
+        self,
+        request: _fence_service_pb2.FenceEventsBetweenRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_fence_service_pb2.FenceEventsBetweenResponse], _abc.AsyncIterator[_fence_service_pb2.FenceEventsBetweenResponse]]:
+        """Sends the events that a fence with these settings would have made over the past, and ends with OK. There is no such
+        fence, and none is created. A caller with a token needs the permission "past" for the hulls that the settings name.
+
+        The hulls are rebuilt as of the start, where the fence would have been created, and then each batch is applied and
+        compared as when it came. The time of an event is that of the commit of its batch; for what time has made, dwell and
+        min_dwell, when it was due. Batches to two hulls that were committed together count as one change of both, the first to
+        one with the first to the other, and so on.
+
+        OUT_OF_RANGE with REVISION_FORGOTTEN if the server does not keep a part of that past, or it has not come.
+        FAILED_PRECONDITION for hulls over shards, for a subject_prefix, and where a geographic hull was recentred meanwhile.
+        """
 
 def add_FenceServiceServicer_to_server(servicer: FenceServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

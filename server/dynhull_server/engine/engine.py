@@ -14,6 +14,7 @@ from .fences import Fences
 from .housekeeping import Housekeeping
 from .hulls import Hulls
 from .loading import Loader
+from .past_fences import PastFences
 from .positions import incarnation_of
 from .series import LOOK_SECONDS
 from .shard_store import ShardStore
@@ -37,6 +38,7 @@ class Engine:
         driver: drives the core.
         hulls: the hulls.
         fences: the fences.
+        past_fences: what fences would have made of the past.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class Engine:
         self.driver = Driver(limits, storage, supervisor, machine)
         self.fences = Fences(self.driver, storage)
         self.hulls = Hulls(self.driver, storage, self.fences, divisions)
+        self.past_fences = PastFences(self.driver, self.hulls, storage, self.fences)
         self._storage = storage
         self._divisions = divisions
         self._loader = Loader(self.driver, storage)

@@ -177,14 +177,14 @@ class Fences:
     async def create(self, name: str, config: FenceConfig, *, gives_center: bool = True) -> LiveFence:
         """Create a fence, or raise the error that refuses it; `gives_center` as in CreateFence."""
         driver = self._driver
-        checked = await self._checked(config)
+        checked = await self.checked(config)
         rows = self._rows(config)
         request = CreateFence(Waiter(), name, driver.time(), config, driver.birth(), checked, gives_center, rows=rows)
         return self.live(await driver.ask(request))
 
     async def replace(self, name: str, config: FenceConfig) -> LiveFence:
         """Replace the area and the settings of a fence, or raise the error that refuses it."""
-        checked = await self._checked(config)
+        checked = await self.checked(config)
         request = ReplaceFence(Waiter(), name, self._driver.time(), config, checked, rows=self._rows(config))
         return self.live(await self._driver.ask(request))
 
@@ -216,7 +216,7 @@ class Fences:
                 if fence.ended:
                     del self._live[fence]
 
-    async def _checked(self, config: FenceConfig) -> CheckedArea | None:
+    async def checked(self, config: FenceConfig) -> CheckedArea | None:
         """The polygons of an area, checked while other requests run; None for other areas.
 
         On the globe they are checked about the centre that the subjects have now, or get; if that moves, once more.

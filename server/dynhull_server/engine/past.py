@@ -80,9 +80,9 @@ class PastHulls:
         number, newest = live.number, live.counts.revision
         if revision is None:
             await self._settled(time, field)
-            found: Moment | None = await self._ask(live.name, partial(self._past.moment, number, time))
+            found: Moment | None = await self.ask(live.name, partial(self._past.moment, number, time))
             if found is None:
-                oldest = await self._ask(live.name, partial(self._past.oldest_moment, number, timed=True))
+                oldest = await self.ask(live.name, partial(self._past.oldest_moment, number, timed=True))
                 at = None if oldest.committed is None else oldest.committed.time
                 raise MomentForgottenError(time, oldest.revision, at, live.counts.revision, f"{field}time")
             return found
@@ -94,7 +94,7 @@ class PastHulls:
     async def oldest(self, live: LiveHull) -> Moment:
         """The oldest revision of a hull that can be read, or raise HullUnsuitableError if it has no past."""
         self._require_past(live)
-        oldest: Moment = await self._ask(live.name, partial(self._past.oldest_moment, live.number))
+        oldest: Moment = await self.ask(live.name, partial(self._past.oldest_moment, live.number))
         return oldest
 
     @asynccontextmanager
@@ -125,7 +125,7 @@ class PastHulls:
             RevisionForgottenError: they are not kept any more.
         """
         try:
-            found: list[Record] = await self._ask(live.name, partial(self._past.batches, live.number, after, until))
+            found: list[Record] = await self.ask(live.name, partial(self._past.batches, live.number, after, until))
         except NotStoredError:
             oldest = await self.oldest(live)
             if oldest.revision > after:
@@ -149,7 +149,7 @@ class PastHulls:
         if rebuilt is None:
             rebuilt = await self._begin(hull, revision)
         while rebuilt.state.counts.revision < revision:
-            await self._ask(hull.name, partial(self._step, rebuilt, revision))
+            await self.ask(hull.name, partial(self._step, rebuilt, revision))
         return rebuilt
 
     async def _begin(self, hull: Hull, revision: int) -> _Rebuilt:
@@ -164,7 +164,7 @@ class PastHulls:
             state = state_of(self._driver.limits, hull.row.settings, kept, self._driver.machine.clock.monotonic())
             return _Rebuilt(hull, state, rows)
 
-        rebuilt: _Rebuilt = await self._ask(hull.name, begin)
+        rebuilt: _Rebuilt = await self.ask(hull.name, begin)
         return rebuilt
 
     def _step(self, rebuilt: _Rebuilt, revision: int) -> None:
@@ -216,7 +216,8 @@ class PastHulls:
         if time >= self._driver.published.time:
             await self._driver.settled()
 
-    async def _ask(self, name: str, function: Callable[[], Any]) -> Any:
+    async def ask(self, name: str, function: Callable[[], Any]) -> Any:
+        """The value of a function of the past of a hull, or the refusal of who cannot be told."""
         try:
             return await self._driver.rebuild(function)
         except KeyError:

@@ -49,7 +49,10 @@ def decode_consumer(consumer: str) -> str:
 
 
 def decode_fence(
-    request: fence_service_pb2.CreateFenceRequest | fence_service_pb2.ReplaceFenceRequest, most_corners: int
+    request: fence_service_pb2.CreateFenceRequest
+    | fence_service_pb2.ReplaceFenceRequest
+    | fence_service_pb2.FenceEventsBetweenRequest,
+    most_corners: int,
 ) -> FenceConfig:
     """The settings of a fence, whose area has at most that many corners."""
     if not request.HasField("config"):

@@ -15,7 +15,6 @@ from .decode import (
     decode_max_vertices,
     decode_rate,
 )
-from .decode_batch import decode_timestamp
 from .decode_settings import decode_duration
 
 # Times as fast as it was: a year in half a minute.
@@ -46,14 +45,3 @@ def decode_pace(request: pb.ReplayRequest) -> Pace:
         decode_rate(request.max_events_per_second),
         decode_interval(request),
     )
-
-
-def decode_end(request: pb.ReplayRequest, end: str) -> tuple[int | None, int] | None:
-    """The revision, or the time, at one end of a replay: `start` or `end`. None where the request does not say."""
-    match request.WhichOneof(end):
-        case None:
-            return None
-        case chosen if chosen.endswith("_time"):
-            return None, decode_timestamp(getattr(request, chosen), chosen)
-        case chosen:
-            return getattr(request, chosen), 0

@@ -5,6 +5,7 @@ from contextlib import aclosing
 from dynhull_proto.v1 import fence_service_pb2 as pb
 
 from ..engine.fences import Fences, LiveFence
+from ..engine.past_fences import PastFences
 from ..engine.watch_fence import watch_fence
 from ..state.errors import FenceReplacedError, SequenceAheadError
 from ..state.fences.model.config import FenceConfig
@@ -12,8 +13,10 @@ from ..state.fences.model.records import Consumer, Members
 from . import decode
 from .calls import Call
 from .decode_fence import decode_consumer, decode_fence, decode_fence_name, decode_start
-from .encode_fence import encode_consumer, encode_fence, encode_members, encode_sent
+from .decode_moment import decode_span
+from .encode_fence import encode_consumer, encode_fence, encode_fence_event, encode_members, encode_sent
 from .metrics import Metrics
+from .places import Places
 
 # The number of keys in a part of ReadInside.
 KEYS_A_PART = 65_536
@@ -24,13 +27,26 @@ class FenceService:
 
     Args:
         fences: the fences.
+        past_fences: what fences would have made of the past.
+        pasts: limits the reads of the past at a time.
         metrics: counts the work.
         max_corners: the largest number of corners of an area.
         max_watch_lag: the seconds that a watcher may take to receive a response.
     """
 
-    def __init__(self, fences: Fences, metrics: Metrics, *, max_corners: int, max_watch_lag: float) -> None:
+    def __init__(
+        self,
+        fences: Fences,
+        past_fences: PastFences,
+        pasts: Places,
+        metrics: Metrics,
+        *,
+        max_corners: int,
+        max_watch_lag: float,
+    ) -> None:
         self._fences = fences
+        self._past_fences = past_fences
+        self._pasts = pasts
         self._metrics = metrics
         self._max_corners = max_corners
         self._max_watch_lag = max_watch_lag
@@ -128,6 +144,25 @@ class FenceService:
         fence = self._read(call, request.name)
         await fence.drop_consumer(decode_consumer(request.consumer))
         return pb.DeleteConsumerResponse()
+
+    async def FenceEventsBetween(self, request: pb.FenceEventsBetweenRequest, call: Call) -> None:
+        config = decode_fence(request, self._max_corners)
+        call.access.require_past(config.subjects)
+        if config.area_hull is not None:
+            call.access.require_past(config.area_hull)
+        start, end = decode_span(request)
+        with self._pasts.take(call.owner), self._metrics.watcher() as watcher:
+            async with aclosing(self._past_fences.events(config, start, end)) as found:
+                while True:
+                    with call.cutoff():
+                        events = await anext(found, None)
+                    if events is None:
+                        return
+                    call.require_entitled()
+                    message = pb.FenceEventsBetweenResponse(events=map(encode_fence_event, events))
+                    del events
+                    with self._metrics.sending(watcher, "fence"):
+                        await call.write_within(self._max_watch_lag, message)
 
     def _read(self, call: Call, name: str) -> LiveFence:
         name = decode_fence_name(name)

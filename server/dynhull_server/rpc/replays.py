@@ -11,7 +11,8 @@ from ..engine.steps import Run
 from ..state.errors import HullReplacedError
 from . import decode, encode
 from .calls import Call
-from .decode_replay import decode_end, decode_pace, decode_view
+from .decode_moment import decode_end
+from .decode_replay import decode_pace, decode_view
 from .places import Places
 
 

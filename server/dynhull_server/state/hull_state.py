@@ -136,6 +136,16 @@ class HullState:
         self._stand_at(Kept(records=list(records)))
         self.torn = False
 
+    def repeat(self, record: Record) -> None:
+        """Apply the next revision again, as when it was made. Producers do not matter."""
+        changes = self.hull.changes
+        self.torn = True
+        self.contents.replay((record,))
+        self._follow_center()
+        self._applied(len(self.hull), _cause_of(record), hull_changed=self.hull.changes != changes)
+        self.committed = record.committed
+        self.torn = False
+
     def apply(
         self,
         write: Write,
@@ -379,16 +389,18 @@ def key_array(hull: AnyKeyedHull, keys: Sequence[str | int | None]) -> VertexKey
 
 
 def _last_cause(kept: Kept) -> Cause | None:
-    if not kept.records:
-        return None
-    last = kept.records[-1]
-    if last.cause is not None:
-        return last.cause
-    if last.shares is not None:
-        return "expiry" if last.shares.expiry else "batch"
-    if last.center is not None and not len(last.rows):
+    return _cause_of(kept.records[-1]) if kept.records else None
+
+
+def _cause_of(record: Record) -> Cause:
+    """What made a revision, by its rows where formats before 11 did not say."""
+    if record.cause is not None:
+        return record.cause
+    if record.shares is not None:
+        return "expiry" if record.shares.expiry else "batch"
+    if record.center is not None and not len(record.rows):
         return "recenter"
-    return "expiry" if isinstance(last.rows, Expiry) else "batch"
+    return "expiry" if isinstance(record.rows, Expiry) else "batch"
 
 
 def _last_sequences(kept: Kept) -> dict[str, int]:

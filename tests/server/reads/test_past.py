@@ -392,6 +392,8 @@ def test_the_past_needs_a_permission_of_its_own_and_has_limits(tmp_path):
 
 def test_a_server_in_memory_has_no_past(address, name):
     with HullClient(address) as client:
-        client.create_hull(name)
+        client.create_hull(name, keyed="str")
         with pytest.raises(HullUnsuitableError, match="has no past"):
             client.at(name, 0)
+        with pytest.raises(HullUnsuitableError, match="has no past"):
+            next(client.fence_events_between(name, name))

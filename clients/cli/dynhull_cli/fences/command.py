@@ -1,12 +1,23 @@
 """`dynhull fences`: all its commands."""
 
 from ..groups import group
+from .between import between
 from .following import ack, watch
 from .reading import delete, inside, list_fences, show
 from .settings import create, replace
 
 
-@group(create=create, list=list_fences, show=show, inside=inside, watch=watch, ack=ack, replace=replace, delete=delete)
+@group(
+    create=create,
+    list=list_fences,
+    show=show,
+    inside=inside,
+    watch=watch,
+    ack=ack,
+    between=between,
+    replace=replace,
+    delete=delete,
+)
 def fences() -> None:
     """Create fences, and follow who enters and leaves them.
 

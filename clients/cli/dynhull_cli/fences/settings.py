@@ -43,7 +43,7 @@ OtherHull = Annotated[
 ]
 
 
-def _compared(
+def compared(
     area: Area = None,
     polygon: PolygonText = None,
     circle: CircleNumbers = None,
@@ -71,7 +71,7 @@ def _compared(
 
 
 @connected
-@choosing(_compared, settings_options(FenceSettings))
+@choosing(compared, settings_options(FenceSettings))
 def create(
     client: "HullClient",
     name: FenceName,
@@ -97,7 +97,7 @@ def create(
 
 
 @connected
-@choosing(_compared, settings_options(FenceSettings, creating=False))
+@choosing(compared, settings_options(FenceSettings, creating=False))
 def replace(client: "HullClient", name: FenceName, chosen: dict[str, Any], as_json: AsJson = False) -> None:
     """Replace the area and all settings of a fence. The subjects must stay the same.
 

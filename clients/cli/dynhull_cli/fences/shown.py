@@ -26,6 +26,8 @@ def event_members(event: FenceEvent) -> dict[str, Any]:
     """An event as members of JSON: those that it has."""
     found = members(event) | {"cause": sorted(event.cause), "after": None}
     found["inside"] = event.inside if event.type in LISTS else None
+    if not event.fence:  # after the fact
+        found |= {"fence": None, "uid": None}
     return {name: value for name, value in found.items() if value or (value is not None and name in MAY_BE_EMPTY)}
 
 

@@ -123,3 +123,11 @@ OF_FENCE = (
     'data: {"type":"enter","sequence":2,"fence":"yard","uid":"beb1f1fb68d6cfdb","cause":["subject_appeared"],'
     '"hull":"fleet","key":"LH400","revision":1,"position":[0.0,0.0],"time":"2026-01-31T12:00:00Z"}\n\n'
 )
+OF_PAST_FENCE = (
+    "retry: 1000\n\n"
+    'event: snapshot\ndata: {"type":"snapshot","sequence":1,"cause":["fence_created"],"inside":[],'
+    '"time":"2026-01-31T12:00:00Z"}\n\n'
+    'event: enter\ndata: {"type":"enter","sequence":2,"cause":["subject_appeared"],'
+    '"hull":"fleet","key":"LH400","revision":2,"position":[0.0,0.0],"distance":0.0,"time":"2026-01-31T12:00:01Z"}\n\n'
+    'event: complete\ndata: {"events":2}\n\n'
+)

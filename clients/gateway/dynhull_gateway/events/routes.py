@@ -10,8 +10,12 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from pydantic import Field
 
 from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
+from dynhull_surface.as_of import moment_of
 
+from .. import examples, schemas
+from ..bodies import JsonRoute
 from ..callers import Caller, address_of, token_of
+from ..fences import arguments_of
 from ..problems import ProblemError
 from ..schemas import LARGEST, NAME, FencePath, HullPath, Prefix
 from . import documents
@@ -20,10 +24,11 @@ from .fence_events import Reading
 from .fence_events import events as fence_events
 from .many import ManyFeed, ManyView
 from .messages import parted, position_of, resumed
+from .past_fence import PastEvents
 from .stream import EventStream
 from .texts import Form, View
 
-router = APIRouter(tags=["events"])
+router = APIRouter(tags=["events"], route_class=JsonRoute)
 
 LastEventId = Annotated[
     str | None, Header(alias="Last-Event-ID", max_length=300, description="The id of the last event that was received.")
@@ -203,6 +208,29 @@ async def follow_fence(
     state = request.app.state
     texts = fence_events(client, reading, state.settings.keepalive_seconds)
     return EventStream(texts, state.health, state.figures)
+
+
+@router.post(
+    "/fences/between",
+    response_class=Described,
+    responses=events(documents.OF_PAST_FENCE),
+)
+async def fence_events_between(
+    request: Request, client: Caller, fence: Annotated[schemas.PastFence, schemas.body(examples.PAST_FENCES)]
+) -> Response:
+    """The events that a fence with these settings would have made between two moments, each named by its type.
+
+    No fence is created. The data is JSON, as described by the schema FenceEvent, without `fence` and `uid`; events have
+    no ids, and the same request has the same answer. "complete" comes after the last event, with their number, and
+    "problem", a Problem, in its place.
+    """
+    admit(request)
+    state = request.app.state
+    given = arguments_of(fence)
+    given |= {name: None if given[name] is None else moment_of(given[name]) for name in ("start", "end")}
+    past = PastEvents(client.fence_events_between(**given))
+    await past.begin(PATIENCE_SECONDS)
+    return EventStream(past.texts(state.settings.keepalive_seconds), state.health, state.figures)
 
 
 async def _require_keys(client: AsyncHullClient, name: str) -> None:

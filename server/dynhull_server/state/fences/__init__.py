@@ -9,7 +9,8 @@ index/      who is inside: the keys of a hull as subjects, areas laid over them,
 events/     events as columns, from crossings to numbered blocks; the recent ones; whether they follow from each other
 trip/       the part of a trip: comparisons, requests to create, replace and delete, consumers, deadlines, delayed
             events, and the leg at one fence
+past        a fence after the fact: the events that it would have made of revisions that are applied again
 recovery/   fences as the storage has them, after a start and a failed commit; sides computed again for the scrub
 
-Beside types, each folder uses only those above it.
+Beside types, each folder uses only those above it; `past` uses those of live fences.
 """

@@ -13,7 +13,7 @@ from ...batch import Applied
 from ...contents.keyed import Keyed
 from ...contents.live import AnyKeyedHull
 from ...hull import Hull
-from ...records import KeyRows, Record
+from ...records import Expiry, KeyRows, Record
 from ..model.records import Cause, Key
 
 
@@ -74,6 +74,13 @@ def of_expiry(hull: Hull) -> KeysChanged:
     contents = hull.state.contents
     ended = contents.ended if isinstance(contents, Keyed) else ()
     return KeysChanged(None, frozenset(ended), _limited(hull))
+
+
+def of_record(hull: Hull, record: Record, expired: AbstractSet[Key] = frozenset()) -> KeysChanged:
+    """What a revision that was applied again has done to keys; `expired` are those of an expiry that it counts with."""
+    if isinstance(record.rows, Expiry):
+        return of_expiry(hull)
+    return KeysChanged(record.rows if isinstance(record.rows, KeyRows) else None, expired, _limited(hull))
 
 
 def _limited(hull: Hull) -> bool:

@@ -12,7 +12,7 @@ from ...leg import Leg
 from ...requests import Request
 from ..events.block import AppendEvents, EventBlock, block_of, joined
 from ..events.sequences import Told
-from ..index.keys_changed import of_batch, of_expiry
+from ..index.keys_changed import KeysChanged, of_batch, of_expiry
 from ..index.line import Line
 from ..index.subjects import Subjects
 from ..model.records import Cause, KeptFence, Key
@@ -52,8 +52,8 @@ class FencePart:
     __slots__ = ("_comparison", "_definition", "_ended", "_ground", "creates", "events", "examined", "structural")
 
     def __init__(self, ground: Ground, requests: Sequence[Request]) -> None:
-        self.structural = isinstance(requests[0], STRUCTURAL)
-        self.creates = len(requests) if isinstance(requests[0], CreateFence) else 0
+        self.structural = bool(requests) and isinstance(requests[0], STRUCTURAL)
+        self.creates = len(requests) if requests and isinstance(requests[0], CreateFence) else 0
         self.events: EventBlock | None = None
         self.examined: list[int] = []
         self._ground = ground
@@ -134,6 +134,11 @@ class FencePart:
             if not each.duplicate
         }
         self._comparison.compare(hulls, now, None, changed)
+
+    def repeated(self, changed: Mapping[Hull, KeysChanged], now: int, *, expiry: bool) -> None:
+        """Make the events of revisions that were applied again; `expiry` where they are points that have left."""
+        found = {hull.name: each for hull, each in changed.items()}
+        self._comparison.compare(list(changed), now, EXPIRY if expiry else None, found)
 
     def require_free(self, name: str) -> None:
         """Raise HullFencedError if a fence depends on the hull, other than by a prefix."""

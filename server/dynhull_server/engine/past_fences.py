@@ -1,0 +1,246 @@
+"""Fences after the fact: hulls are rebuilt as of a moment, and the batches after it are compared as when they came."""
+
+from collections import deque
+from collections.abc import AsyncGenerator
+from functools import partial
+
+from ..state.errors import HullNotFoundError, HullUnsuitableError, RevisionForgottenError
+from ..state.fences.model.config import FenceConfig
+from ..state.fences.model.records import FenceEvent
+from ..state.fences.past import PastFence, changes_of
+from ..state.hull import Hull
+from ..state.records import CommitStamp, Record
+from ..storage.past import Moment, Past
+from ..storage.port import DamagedError
+from .driver import Driver
+from .fences import Fences
+from .hulls import Hulls
+from .watch_fence import EVENTS_TOGETHER
+
+# Rows of batches that one step applies, about: some milliseconds.
+STEP_ROWS = 4096
+
+# A moment as it is asked for: a revision of the hull of the subjects; or None, and a time in microseconds since 1970.
+When = tuple[int | None, int]
+
+
+class _Batches:
+    """The batches of one hull after a revision, read some at a time.
+
+    Args:
+        past: keeps them.
+        hull: the hull, rebuilt as of that revision.
+        until: the last one that counts.
+    """
+
+    def __init__(self, past: Past, hull: Hull, until: int) -> None:
+        self.hull = hull
+        self._past = past
+        self._until = until
+        self._read: deque[Record] = deque()
+        self._after = hull.state.counts.revision
+
+    def commit(self) -> CommitStamp | None:
+        """The commit of the next batch; None after the last. Reads the disk."""
+        if not self._read and self._after < self._until:
+            self._read.extend(self._next())
+            self._after = self._read[-1].revision
+        if not self._read:
+            return None
+        record = self._read[0]
+        if record.committed is None:
+            raise _without_time(self.hull.name, record.revision)
+        return record.committed
+
+    def take(self) -> Record:
+        """The next batch, once `commit` has found it."""
+        return self._read.popleft()
+
+    def catch_up(self, number: int) -> None:
+        """Apply the batches up to a commit. They are few."""
+        while (commit := self.commit()) is not None and commit.number <= number:
+            self.hull.state.repeat(self.take())
+        self.hull.counts = self.hull.state.counts
+
+    def _next(self) -> list[Record]:
+        number, after = self.hull.row.number, self._after
+        try:
+            return self._past.batches(number, after, self._until)
+        except DamagedError:
+            oldest = self._past.oldest_moment(number)
+            if after >= oldest.revision:
+                raise
+            time = None if oldest.committed is None else oldest.committed.time
+            raise RevisionForgottenError(after + 1, oldest.revision, self._until, time, "start_revision") from None
+
+
+class _Run:
+    """A fence, and the batches that it has still to compare.
+
+    Args:
+        fence: the fence.
+        batches: those of its hulls; of that of the subjects first.
+        until: the time up to which time passes after the last batch; None for none.
+        leads: whether the last batch of the subjects is the end.
+    """
+
+    def __init__(self, fence: PastFence, batches: list[_Batches], until: int | None, *, leads: bool) -> None:
+        self._fence = fence
+        self._batches = batches
+        self._until = until
+        self._leads = leads
+        self.over = False
+
+    def step(self) -> list[FenceEvent]:
+        """The next events, if some come soon."""
+        fence, rows, made = self._fence, 0, self._fence.take()
+        while rows < STEP_ROWS and len(made) < EVENTS_TOGETHER:
+            coming = [(first.number, each) for each in self._batches if (first := each.commit()) is not None]
+            if not coming or (self._leads and self._batches[0].commit() is None):
+                if self._until is not None:
+                    fence.pass_time(self._until)
+                self.over = True
+                return made + fence.take()
+            number = min(number for number, _ in coming)
+            commit: dict[Hull, list[Record]] = {}
+            for each in (each for its, each in coming if its == number):
+                time = _take(each, number, commit.setdefault(each.hull, []))
+            fence.pass_time(time)
+            for change in changes_of(commit):
+                fence.repeat(change, time)
+            rows += sum(1 + len(record.rows) for records in commit.values() for record in records)
+            made += fence.take()
+        return made
+
+
+def _take(batches: _Batches, number: int, records: list[Record]) -> int:
+    """Take the batches of a commit. Returns its time."""
+    time = 0
+    while (commit := batches.commit()) is not None and commit.number == number:
+        time = commit.time
+        records.append(batches.take())
+    return time
+
+
+class PastFences:
+    """The events that fences would have made.
+
+    Args:
+        driver: has the threads.
+        hulls: the hulls.
+        past: keeps their batches.
+        fences: checks areas.
+    """
+
+    def __init__(self, driver: Driver, hulls: Hulls, past: Past, fences: Fences) -> None:
+        self._driver = driver
+        self._hulls = hulls
+        self._pasts = hulls.pasts
+        self._past = past
+        self._fences = fences
+
+    async def events(
+        self, config: FenceConfig, start: When | None, end: When | None
+    ) -> AsyncGenerator[list[FenceEvent], None]:
+        """The events between two moments, some at a time; at first none, once the fence is there.
+
+        Args:
+            config: the settings of the fence.
+            start: when it is created; None for the oldest revision that is kept.
+            end: when it ends; None for now.
+
+        Raises:
+            RefusedError: a fence with these settings would have been refused then, or a moment is not kept any more.
+        """
+        run, hulls = await self._begin(config, start, end)
+        yield []
+        while not run.over:
+            for hull in hulls:
+                if hull.ended:
+                    raise HullNotFoundError(hull.name)
+            made = deque(await self._pasts.ask(hulls[0].name, run.step))
+            while made:
+                yield [made.popleft() for _ in range(min(len(made), EVENTS_TOGETHER))]
+
+    async def _begin(self, config: FenceConfig, start: When | None, end: When | None) -> tuple[_Run, list[Hull]]:
+        if config.kind == "prefix":
+            reason = "is a prefix, and a fence after the fact compares one hull"
+            raise HullUnsuitableError(config.subjects, reason, field="config.subject_prefix")
+        names = dict.fromkeys((config.subjects, config.area_hull or config.subjects))
+        hulls = [self._driver.core.get(name) for name in names]
+        checked = await self._fences.checked(config)
+        lasts, until = await self._end(hulls, end)
+        began, own = await self._start(hulls, start)
+        if lasts[0] < own[0].counts.revision:
+            reason = f"was at revision {lasts[0]} at the end, before the start, {own[0].counts.revision}"
+            raise HullUnsuitableError(config.subjects, reason, field="end")
+        batches = [_Batches(self._past, hull, last) for hull, last in zip(own, lasts, strict=True)]
+        leads = end is not None and end[0] is not None
+
+        def begin() -> _Run:
+            commit = _commit_of(own[0])
+            if began is None:
+                for each in batches[1:]:
+                    each.catch_up(commit.number)
+            fence = PastFence(config, own, commit.time if began is None else began, checked)
+            return _Run(fence, batches, until, leads=leads)
+
+        return await self._pasts.ask(config.subjects, begin), hulls
+
+    async def _start(self, hulls: list[Hull], start: When | None) -> tuple[int | None, list[Hull]]:
+        """The time at which it begins, and the hulls as they were then.
+
+        None in place of the time if it begins at a revision: then the other hull is as it was at that or before.
+        """
+        if start is None:
+            start = await self._oldest(hulls)
+        first = await self._as_of(hulls[0], await self._moment(hulls[0], start, "start"))
+        if start[0] is None:
+            moments = [await self._moment(hull, start, "start") for hull in hulls[1:]]
+            return start[1], [first, *[await self._as_of(*each) for each in zip(hulls[1:], moments, strict=True)]]
+        time = _commit_of(first).time
+        others = []
+        for hull in hulls[1:]:
+            await self._moment(hull, (None, time), "start")  # it was there
+            before = await self._pasts.ask(hull.name, partial(self._past.moment, hull.row.number, time - 1))
+            oldest = partial(self._past.oldest_moment, hull.row.number)
+            others.append(await self._as_of(hull, before or await self._pasts.ask(hull.name, oldest)))
+        return None, [first, *others]
+
+    async def _end(self, hulls: list[Hull], end: When | None) -> tuple[list[int], int | None]:
+        """The last revision that counts of each hull, and the time that passes after it; None for none."""
+        if end is not None and end[0] is None:
+            return [(await self._moment(hull, end, "end")).revision for hull in hulls], end[1]
+        now = self._driver.commit_time()
+        await self._driver.settled()
+        newest = [hull.counts.revision for hull in hulls]
+        if end is None:
+            return newest, now
+        return [(await self._moment(hulls[0], end, "end")).revision, *newest[1:]], None
+
+    async def _oldest(self, hulls: list[Hull]) -> When:
+        """The oldest moment at which all hulls are kept."""
+        found = [
+            await self._pasts.ask(hull.name, partial(self._past.oldest_moment, hull.row.number, timed=True))
+            for hull in hulls
+        ]
+        if len(found) == 1:
+            return found[0].revision, 0
+        return None, max(0 if each.committed is None else each.committed.time for each in found)
+
+    async def _moment(self, hull: Hull, when: When, field: str) -> Moment:
+        return await self._pasts.moment(self._hulls.of(hull), *when, f"{field}_")
+
+    async def _as_of(self, hull: Hull, moment: Moment) -> Hull:
+        return Hull(hull.row, await self._pasts.own(hull, moment.revision))
+
+
+def _commit_of(hull: Hull) -> CommitStamp:
+    """The commit of a hull that was rebuilt."""
+    if hull.state.committed is None:
+        raise _without_time(hull.name, hull.state.counts.revision)
+    return hull.state.committed
+
+
+def _without_time(name: str, revision: int) -> HullUnsuitableError:
+    return HullUnsuitableError(name, f"has revision {revision} of an earlier version, without a time: begin after it")
