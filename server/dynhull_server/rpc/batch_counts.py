@@ -44,9 +44,10 @@ class BatchCounts:
         self._rows["late"] += applied.late
         self._rows["skipped"] += applied.skipped
         self._rows["clamped"] += applied.clamped
-        self._quarantined["held"] += len(applied.held)
-        self._quarantined["released"] += applied.released
-        self._quarantined["dropped"] += applied.dropped
+        if applied.held or applied.released or applied.dropped:
+            self._quarantined["held"] += len(applied.held)
+            self._quarantined["released"] += applied.released
+            self._quarantined["dropped"] += applied.dropped
 
     def refused(self) -> None:
         """Count a refused batch."""

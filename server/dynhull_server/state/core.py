@@ -57,13 +57,10 @@ from .queues import Queue, Queues, names_of
 from .records import DEFAULT, Append, HullRow, Kept, Record
 from .registry import Registry
 from .requests import (
-    CreateHull,
-    DeleteHull,
     Expire,
-    Follow,
+    HullRequest,
     ReadHull,
     ReadTogether,
-    Recenter,
     Request,
     Together,
     WriteBatch,
@@ -123,15 +120,10 @@ class Core:
         self._undecided = 0
         self._stopping = False
         self._handlers: dict[type, Callable[[Any, list[Effect]], None]] = {
-            WriteBatch: self._asked,
+            **dict.fromkeys((WriteBatch, *get_args(HullRequest)), self._asked),
             Arrived: self._arrived,
             WriteTogether: self._asked_together,
-            ReadHull: self._asked,
             ReadTogether: self._asked_together,
-            CreateHull: self._asked,
-            DeleteHull: self._asked,
-            Recenter: self._asked,
-            Follow: self._asked,
             **dict.fromkeys(get_args(AnyFenceRequest), self._asked_of_fence),
             Gone: self._gone,
             Computed: self._computed,
@@ -238,11 +230,7 @@ class Core:
 
     # Requests
 
-    def _asked(
-        self,
-        request: CreateHull | DeleteHull | Expire | Follow | ReadHull | Recenter | WriteBatch,
-        effects: list[Effect],
-    ) -> None:
+    def _asked(self, request: HullRequest | WriteBatch, effects: list[Effect]) -> None:
         queue = self._queues.of(request.name)
         hull = queue.hull
         if hull is not None and hull.divided and isinstance(request, DIVIDED):

@@ -184,6 +184,10 @@ class Expire(Request):
         return self.hull.name
 
 
+# Requests to one hull other than its batches.
+HullRequest = CreateHull | DeleteHull | Recenter | ReadHull | Follow | Expire
+
+
 @dataclass(slots=True, eq=False)
 class Stream:
     """Batches of one caller to one hull, applied in the order of their requests.

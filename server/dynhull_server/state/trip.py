@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, assert_never
 
 from .batch import Applied, Batch, KeyedBatch
 from .changes import Change
@@ -19,6 +19,7 @@ from .requests import (
     DeleteHull,
     Expire,
     Follow,
+    HullRequest,
     ReadHull,
     ReadTogether,
     Recenter,
@@ -140,7 +141,8 @@ class Trip:
         if isinstance(request, AnyFenceRequest):
             assert self.fences is not None  # only the fences' room makes trips of them
             return self.fences.do(request)
-        leg = self.legs[request.name]  # type: ignore[attr-defined]
+        assert isinstance(request, HullRequest)  # batches and what names several hulls are run elsewhere
+        leg = self.legs[request.name]
         match request:
             case ReadHull():
                 return _read(request, leg)
@@ -159,7 +161,7 @@ class Trip:
                 self._delete(request, leg)
                 return None
             case _:
-                raise AssertionError(f"not a request: {request}")
+                assert_never(request)
 
     def _delete(self, request: DeleteHull, leg: Leg) -> None:
         if self.fences is not None:
