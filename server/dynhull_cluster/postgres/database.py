@@ -14,6 +14,7 @@ import psycopg
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 from dynhull_server.storage.databases import POSTGRESQL, kind_of
+from dynhull_server.storage.opening import closed_on_error
 from dynhull_server.storage.port import FormatError, StorageError
 from dynhull_server.storage.rows.tables import UnreadableError
 
@@ -116,7 +117,7 @@ class Database:
             raise self._refused(error) from error
         with self._adding:
             self._open.add(connection)
-        try:
+        with closed_on_error(connection):
             if connection.info.server_version < OLDEST_VERSION * 10_000:
                 version = connection.info.parameter_status("server_version")
                 raise FormatError(f"{self} is of PostgreSQL {version}: {OLDEST_VERSION} or newer is needed")
@@ -127,9 +128,6 @@ class Database:
             with as_storage_errors():
                 for statement in _newer_settings(connection):
                     connection.execute(statement)
-        except BaseException:
-            connection.close()
-            raise
         return connection
 
     def _refused(self, error: psycopg.Error) -> StorageError:

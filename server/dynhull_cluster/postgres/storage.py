@@ -21,6 +21,7 @@ from dynhull_server.state.changes import Change
 from dynhull_server.state.errors import words, words_for_callers
 from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.durability import Durability
+from dynhull_server.storage.opening import closed_on_error
 from dynhull_server.storage.port import (
     DamagedError,
     NotCommittedError,
@@ -183,14 +184,10 @@ class PostgresStorage(RowStorage):
     def _prepared(self) -> Connection:
         """A connection to the database, whose tables are there, and in the present format."""
         connection = self._database.connect("dynhull start")
-        try:
-            with as_storage_errors(), connection.transaction():
-                hold(connection, self._database)
-                prepare(connection, self._database, self._partitions)
-                begin_anew_if_copied(connection, self._database, self._partitions)
-        except BaseException:
-            connection.close()
-            raise
+        with closed_on_error(connection), as_storage_errors(), connection.transaction():
+            hold(connection, self._database)
+            prepare(connection, self._database, self._partitions)
+            begin_anew_if_copied(connection, self._database, self._partitions)
         return connection
 
     def close(self) -> None:
@@ -291,13 +288,9 @@ class PostgresStorage(RowStorage):
 
     def _connect_writer(self, name: str) -> Connection:
         connection = self._database.connect(name)
-        try:
-            with as_storage_errors():
-                connection.execute(f"SET synchronous_commit = {SYNCHRONOUS[self._durability]}".encode())
-                connection.execute(f"SET idle_in_transaction_session_timeout = '{IDLE_SECONDS}s'".encode())
-        except BaseException:
-            connection.close()
-            raise
+        with closed_on_error(connection), as_storage_errors():
+            connection.execute(f"SET synchronous_commit = {SYNCHRONOUS[self._durability]}".encode())
+            connection.execute(f"SET idle_in_transaction_session_timeout = '{IDLE_SECONDS}s'".encode())
         return connection
 
     def _disconnect(self) -> None:

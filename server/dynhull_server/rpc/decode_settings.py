@@ -11,13 +11,12 @@ from dynhull_proto.v1 import hull_pb2
 from ..state.admission import GREATEST_TIME
 from ..state.frames import off_globe
 from ..state.records import FOREVER, Center, Clock, Frame, HullSettings, Identity, QuarantineRules, Window
+from . import encode
 from .decode import LARGEST_INTEGER, InvalidFieldError
 
 IDENTITIES: dict[int, Identity] = {
     hull_pb2.IDENTITY_UNSPECIFIED: "multiset",
-    hull_pb2.IDENTITY_MULTISET: "multiset",
-    hull_pb2.IDENTITY_STRING_KEYS: "str",
-    hull_pb2.IDENTITY_INTEGER_KEYS: "int",
+    **{number: identity for identity, number in encode.IDENTITIES.items()},
 }
 CLOCKS: dict[int, Clock] = {
     hull_pb2.CLOCK_UNSPECIFIED: "server",
@@ -26,8 +25,7 @@ CLOCKS: dict[int, Clock] = {
 }
 FRAMES: dict[int, Frame] = {
     hull_pb2.FRAME_UNSPECIFIED: "plane",
-    hull_pb2.FRAME_PLANE: "plane",
-    hull_pb2.FRAME_GEOGRAPHIC: "geographic",
+    **{number: frame for frame, number in encode.FRAMES.items()},
 }
 MICROSECONDS = 1_000_000
 NANOSECONDS = 1_000  # in a microsecond

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from pathlib import Path
 
+from ..opening import closed_on_error
 from ..port import DamagedError, FormatError, LockedError, StorageError
 from ..rows.tables import UnreadableError
 from ..rows.totals import Totals, totals_from
@@ -80,18 +81,15 @@ class Folder:
         The size of its cache is set here, because that in the header could be damaged.
         """
         connection = self.disk.connect(self.database, access)
-        try:
-            if lock_ms is not None:
-                connection.execute(f"PRAGMA busy_timeout = {lock_ms}")
-            connection.execute(f"PRAGMA cache_size = -{CACHE_KILOBYTES}")
-            connection.execute("PRAGMA cell_size_check = ON")
-            connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
-        except UnicodeDecodeError as error:  # SQLite's message quotes a damaged schema
-            connection.close()
-            raise sqlite3.DatabaseError("malformed database schema") from error
-        except BaseException:
-            connection.close()
-            raise
+        with closed_on_error(connection):
+            try:
+                if lock_ms is not None:
+                    connection.execute(f"PRAGMA busy_timeout = {lock_ms}")
+                connection.execute(f"PRAGMA cache_size = -{CACHE_KILOBYTES}")
+                connection.execute("PRAGMA cell_size_check = ON")
+                connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
+            except UnicodeDecodeError as error:  # SQLite's message quotes a damaged schema
+                raise sqlite3.DatabaseError("malformed database schema") from error
         return connection
 
     def check_log(self) -> tuple[list[str], Totals | None]:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from threading import Condition
 from typing import TYPE_CHECKING, Any
 
+from ..opening import closed_on_error
 from ..rows.tables import FORMAT, UnreadableError
 
 if TYPE_CHECKING:
@@ -84,12 +85,9 @@ class Readers:
         self._connect = connect
         self._returned = Condition()
         self._idle: list[sqlite3.Connection] = []
-        try:
+        with closed_on_error(self):
             for _ in range(KEPT_OPEN):
                 self._idle.append(connect())
-        except BaseException:
-            self.close()
-            raise
 
     @contextmanager
     def lend(self) -> Iterator[sqlite3.Connection]:

@@ -19,6 +19,7 @@ from ...state.changes import Change
 from ...state.errors import words
 from ...state.records import CommitStamp
 from ..durability import Durability
+from ..opening import closed_on_error
 from ..port import DamagedError, LockedError, NotCommittedError, Progress, StorageError, StorageStep, StoredContents
 from ..refusals import Meaning
 from ..rows.examine import Findings
@@ -330,26 +331,20 @@ class SQLiteStorage(RowStorage):
 
     def _connect_writer(self) -> sqlite3.Connection:
         connection = self._folder.connect(OpenMode.WRITE)
-        try:
+        with closed_on_error(connection):
             connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA wal_autocheckpoint = 0")
             connection.execute(f"PRAGMA journal_size_limit = {LONGEST_LOG_BYTES}")
             connection.execute("PRAGMA secure_delete = OFF")
             self._set_synchronous(connection)
-        except BaseException:
-            connection.close()
-            raise
         return connection
 
     def _connect_reader(self) -> sqlite3.Connection:
         """A connection that has read once, so that its files are open."""
         connection = self._folder.connect(OpenMode.READ)
-        try:
+        with closed_on_error(connection):
             connection.execute("SELECT id FROM totals").fetchone()
-        except BaseException:
-            connection.close()
-            raise
         return connection
 
     def _set_synchronous(self, connection: sqlite3.Connection) -> None:
