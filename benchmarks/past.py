@@ -1,0 +1,259 @@
+"""What the past costs and how fast it is read: `python benchmarks/past.py [--scale 1] [--repeat 3] [--folder .]`.
+
+A fleet of keyed vehicles makes small steps. Parts, all of them unless `--parts` names some:
+
+* writers: batches of one move that are acknowledged, with a history on and off, in turn.
+* bytes: what a move takes in segments, one and a thousand a batch, of positions with seven decimals and of full
+  doubles; the states beside the segments are apart.
+* as-of: a hull with a million points as it was a million batches of one move after the last state, from the journal and
+  later from segments, each time the first read of this hull since the start; and again 200 batches later, five times.
+* memory: the resident memory of a server while 100 million moves become the past: the most in the second half, beside
+  the most in the first quarter.
+* replay: a day of 5,000 vehicles that report every ten seconds, as fast as it is read.
+
+Client and server share the machine. `--scale 0.01` is over in a minute. The folder should lie on the disk that counts.
+"""
+
+import argparse
+import asyncio
+import itertools
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import grpc
+import numpy as np
+
+import server
+from dynhull.keys import PackedKeys
+from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
+from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+
+COMMAND = ["-m", "dynhull_server", "--port", "0", "--scrub-cpu", "0", "--log-level", "warning"]
+MANY, DAY, VEHICLES, REPORTED = 10**6, 8640, 5000, 10**8
+LOADED = 8192
+NEAR = 1000
+MOVES = 2**18  # of a run of writers, and of what is weighed
+PARTS = ("writers", "bytes", "as-of", "memory", "replay")
+
+
+@dataclass
+class Served:
+    """A server of its own."""
+
+    process: subprocess.Popen[str]
+    address: str
+    stub: HullServiceStub
+
+    @property
+    def megabytes(self) -> float:
+        """Its resident memory."""
+        pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@contextmanager
+def serving(folder: Path, *options: str) -> Iterator[Served]:
+    with subprocess.Popen(
+        [sys.executable, *COMMAND, "--data", str(folder), *options], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        try:
+            address = process.stdout.readline().split()[-1]
+            with grpc.insecure_channel(address, options=server.OPTIONS) as channel:
+                yield Served(process, address, HullServiceStub(channel))
+        finally:
+            process.terminate()
+
+
+class Fleet:
+    """Vehicles that make small steps."""
+
+    def __init__(self, size: int, decimals: int | None = 7) -> None:
+        self.random = np.random.default_rng(size)
+        self.places = self.random.uniform([-10, 40], [10, 60], (size, 2))
+        self.names = [f"vehicle {number:07}" for number in range(size)]
+        self.decimals = decimals
+
+    def batch(self, who: np.ndarray) -> bytes:
+        """A message with one batch: these vehicles move."""
+        self.places[who] += self.random.normal(0, 1e-4, (len(who), 2))
+        places = self.places[who] if self.decimals is None else np.round(self.places[who], self.decimals)
+        packed = PackedKeys.pack([self.names[each] for each in who.tolist()])
+        keys = points_pb2.Keys(lengths=packed.lengths, text=packed.data)
+        batch = batch_pb2.Batch(puts=batch_pb2.Puts(keys=keys, points=server.packed(places)))
+        return pb.StreamRequest(batches=[pb.NumberedBatch(batch=batch)]).SerializeToString()
+
+    def all(self, size: int) -> list[bytes]:
+        """Messages that move every vehicle once, so many at a time."""
+        everyone = np.arange(len(self.names))
+        return [self.batch(everyone[first : first + size]) for first in range(0, len(everyone), size)]
+
+    def some(self, batches: int, size: int = 1) -> list[bytes]:
+        """Messages that move some vehicles each."""
+        return [self.batch(self.random.choice(len(self.names), size, replace=False)) for _ in range(batches)]
+
+
+def create(served: Served, name: str, *, history: bool = True) -> None:
+    config = hull_pb2.HullConfig(identity=hull_pb2.IDENTITY_STRING_KEYS)
+    if history:
+        config.history.SetInParent()
+    served.stub.CreateHull(pb.CreateHullRequest(name=name, config=config))
+
+
+def write(served: Served, name: str, messages: list[bytes]) -> float:
+    """Batches a second, acknowledged."""
+    return asyncio.run(server.together(served.address, name, messages))
+
+
+def told(what: str) -> None:
+    print(f"{time.strftime('%H:%M:%S')} {what}", file=sys.stderr, flush=True)
+
+
+def write_until_filed(served: Served, name: str, moves: int, messages: list[bytes]) -> None:
+    """Write these again and again, until segments have so many moves: snapshots come once a second at most."""
+    while (found := served.stub.GetHistory(pb.GetHistoryRequest(name=name)).moves) < moves:
+        told(f"{found:,} of {moves:,} moves are in segments")
+        write(served, name, messages)
+        time.sleep(1)
+
+
+def writers(folder: Path, scale: float, repeat: int) -> Iterator[str]:
+    """With a history of, of without one."""
+    messages = Fleet(VEHICLES).some(int(MOVES * scale))
+    rates: dict[bool, list[float]] = {True: [], False: []}
+    options = "--snapshot-points", str(max(VEHICLES, len(messages) // 10))  # segments are written meanwhile
+    for number, history in itertools.product(range(repeat), (True, False)):
+        with serving(folder / f"writers {number} {history}", *options) as served:
+            create(served, "fleet", history=history)
+            rates[history].append(write(served, "fleet", messages))
+        told(f"writers: {rates[history][-1]:,.0f} batches/s {'with' if history else 'without'} a history")
+    on, off = median(rates[True]), median(rates[False])
+    yield f"writers with a history, of {off:,.0f} batches/s without | >= 0.97 | {on / off:.3f}"
+
+
+def weighed(folder: Path, scale: float, _: int) -> Iterator[str]:
+    """What a move takes."""
+    for decimals, most in ((7, "10 (aim 6)"), (None, "16")):
+        for size, many in ((1, "one move a batch"), (1000, "1,000 moves a batch")):
+            fleet, moves = Fleet(VEHICLES, decimals), int(MOVES * scale)
+            place = folder / f"bytes {decimals} {size}"
+            with serving(place, "--snapshot-points", str(moves // 2)) as served:
+                create(served, "fleet")
+                write_until_filed(served, "fleet", moves, fleet.some(moves // size, size))
+                found = served.stub.GetHistory(pb.GetHistoryRequest(name="fleet"))
+                size_of = {
+                    kind: sum(each.stat().st_size for each in place.rglob(f"*.{kind}.parquet")) / found.moves
+                    for kind in ("batches", "state")
+                }
+            what = "full doubles" if decimals is None else f"{decimals} decimals"
+            yield f"bytes a move, {what}, {many}; states: {size_of['state']:.1f} | <= {most} | {size_of['batches']:.2f}"
+            told(f"bytes: {size_of['batches']:.2f} {what}, {many}")
+
+
+def as_of(folder: Path, scale: float, repeat: int) -> Iterator[str]:
+    """Seconds until a hull is there as it was, and until it is there some batches later."""
+    many = int(MANY * scale)
+    fleet = Fleet(many)
+    options = "--snapshot-points", str(min(many, 100_000))
+    with serving(folder / "as-of", *options) as served:
+        for name in ("small", "large"):
+            create(served, name)
+        write(served, "small", Fleet(10).some(10))
+        write(served, "large", fleet.all(LOADED))
+        loaded = revision_of(served, "large")
+        time.sleep(3)  # the snapshot of these
+        write(served, "large", fleet.some(many - NEAR))
+        last = revision_of(served, "large")
+        told(f"as-of: {last - loaded:,} batches since the state at revision {loaded}")
+    yield from looked_up(folder / "as-of", last - NEAR, repeat, options, "in the journal")
+    with serving(folder / "as-of", *options) as served:
+        write_until_filed(served, "large", 2 * many, fleet.some(many))
+    yield from looked_up(folder / "as-of", last - NEAR, repeat, options, "in segments")
+
+
+def looked_up(folder: Path, revision: int, repeat: int, options: tuple[str, ...], where: str) -> Iterator[str]:
+    cold, near = [], []
+    for _ in range(repeat):
+        with serving(folder, *options) as served:
+            read_as_of(served, "small", 5)  # what reads is loaded
+            time.sleep(2)
+            cold.append(read_as_of(served, "large", revision))
+            near += [read_as_of(served, "large", revision + step) for step in range(NEAR // 5, NEAR + 1, NEAR // 5)]
+        told(f"as-of, {where}: {cold[-1]:.3f} s, then {median(near) * 1000:.1f} ms")
+    yield f"AS OF, batches {where}, cold, s | <= 0.6 | {median(cold):.3f}"
+    yield f"AS OF, batches {where}, {NEAR // 5} later, ms | <= 5 | {median(near) * 1000:.1f}"
+
+
+def read_as_of(served: Served, name: str, revision: int) -> float:
+    begun = time.perf_counter()
+    served.stub.GetHull(pb.GetHullRequest(name=name, at_revision=revision))
+    return time.perf_counter() - begun
+
+
+def revision_of(served: Served, name: str) -> int:
+    return int(served.stub.GetHull(pb.GetHullRequest(name=name)).hull.revision)
+
+
+def memory(folder: Path, scale: float, _: int) -> Iterator[str]:
+    """Megabytes by which a server has grown."""
+    fleet = Fleet(VEHICLES)
+    messages = [message for _ in range(20) for message in fleet.all(VEHICLES)]
+    rounds = max(16, int(REPORTED * scale) // (VEHICLES * len(messages)))
+    used = []
+    with serving(folder / "memory") as served:
+        create(served, "fleet")
+        for number in range(rounds):
+            write(served, "fleet", messages)
+            used.append(served.megabytes)
+            if number % 20 == 0:
+                told(f"memory: {(number + 1) * len(messages) * VEHICLES:,} moves, {used[-1]:.0f} MB")
+    early, late = max(used[: max(2, rounds // 4)]), max(used[rounds // 2 :])
+    moves = rounds * len(messages) * VEHICLES
+    yield f"memory after {moves:,} moves, of {early:.0f} MB after a quarter, MB | +- 50 | {late - early:+.0f}"
+
+
+def replay(folder: Path, scale: float, _: int) -> Iterator[str]:
+    """Seconds until every revision of a day has been read."""
+    reports = max(int(DAY * scale), 10)
+    fleet = Fleet(VEHICLES)
+    with serving(folder / "replay") as served:
+        create(served, "fleet")
+        for first in range(0, reports, 100):
+            write(served, "fleet", [each for _ in range(min(100, reports - first)) for each in fleet.all(VEHICLES)])
+            told(f"replay: {min(first + 100, reports):,} of {reports:,} reports are written")
+        begun = time.perf_counter()
+        request = pb.ReplayRequest(name="fleet", start_revision=0)
+        seen = sum(1 for _ in served.stub.Replay(request))
+        took = time.perf_counter() - begun
+    assert seen >= reports
+    yield f"replay of {reports:,} reports of {VEHICLES:,} vehicles, s | <= {15 * scale:g} | {took:.1f}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="What the past costs and how fast it is read.")
+    parser.add_argument("--folder", type=Path, default=Path(), help="where to put the data (default: here)")
+    parser.add_argument("--scale", type=float, default=1.0, help="part of all sizes (default 1)")
+    parser.add_argument("--repeat", type=int, default=3, help="rounds; medians are printed (default 3)")
+    parser.add_argument("--parts", nargs="*", default=PARTS, choices=PARTS, help="which parts (default: all)")
+    options = parser.parse_args()
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    works = dict(zip(PARTS, (writers, weighed, as_of, memory, replay), strict=True))
+    print(f"| at scale {options.scale:g}, load {os.getloadavg()[0]:.1f} | aim | found |")
+    print("| --- | --- | ---: |", flush=True)
+    for part in options.parts:
+        with tempfile.TemporaryDirectory(dir=options.folder) as folder:
+            for row in works[part](Path(folder), options.scale, options.repeat):
+                print(f"| {row} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
