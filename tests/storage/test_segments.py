@@ -382,6 +382,25 @@ def test_positions_of_few_decimals_take_few_bytes():
         assert len(to_parquet(columns_of(records, "str"), {})) / 50_000 < most
 
 
+def test_a_move_that_is_a_batch_of_its_own_takes_few_bytes_too():
+    """Fifty of them share a commit, whose number and time each row has."""
+    rng = np.random.default_rng(0)
+    points, keys = (
+        rng.uniform([-10, 40], [10, 60], (100, 2)),
+        [PackedKeys.pack([f"vehicle {i:05}"]) for i in range(100)],
+    )
+    none, times = PackedKeys.pack([]), BEGIN + np.cumsum(rng.integers(800, 3000, 400))
+    for decimals, most in ((7, 8), (None, 14.3)):
+        records = []
+        for revision in range(1, 16_001):
+            who = int(rng.integers(100))
+            points[who] += rng.normal(0, 1e-4, 2)
+            place = points[who : who + 1].copy() if decimals is None else np.round(points[who : who + 1], decimals)
+            commit = CommitStamp(revision // 50, int(times[revision // 50]))
+            records.append(Record(revision, KeyRows(keys[who], place, none), cause="batch", committed=commit))
+        assert len(to_parquet(columns_of(records, "str"), {})) / len(records) < most
+
+
 def test_a_copy_has_the_past_or_says_that_it_has_not(tmp_path):
     fleet = Fleet(tmp_path, archive=Archive(tmp_path / "data" / "history")).fill()
     records = fleet.records

@@ -30,10 +30,27 @@ EXACT = 2**53  # below that every whole number is a double
 SAMPLE = 1000
 LEVEL = 9
 GROUP_ROWS = 2**17
-WORDS = ("cause", "kind", "op", "key")
+# The columns as other programs see them.
+ORDER = (
+    "revision",
+    "commit",
+    "committed",
+    "cause",
+    "kind",
+    "op",
+    "key",
+    "x",
+    "y",
+    "event_time",
+    "expire_time",
+    "detail",
+    "clock",
+    "row",
+)
+WORDS: tuple[str, ...] = ("cause", "kind", "op", "key")
 # Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
-SPLIT = ("revision", "commit", "row", "x", "y")
-SHARED = 4  # rows of a batch, on average, from which on the times of commits are among the others
+SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
+SHARED = 4  # rows of a commit, on average, from which on its time is an index into those of all
 
 
 def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"") -> bytes:
@@ -61,18 +78,23 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
         "clock": _time(columns.clock, NO_TIME),
         "row": pa.array(columns.place.astype(np.int32)),
     }
-    fields = [pa.field(name, column.type) for name, column in columns_of_table.items()]
+    fields = {name: pa.field(name, column.type) for name, column in columns_of_table.items()}
     there = ~np.isnan(columns.points[:, 0])
-    alone = len(np.unique(columns.revision)) * SHARED > len(columns)
+    commits = np.count_nonzero(np.diff(columns.committed)) + 1
+    words, split = WORDS, SPLIT
+    if commits * SHARED <= len(columns):
+        words += ("committed",)
+    else:
+        split += ("committed",)
     for place, name in enumerate("xy"):
         values, scale = _scaled(np.ascontiguousarray(columns.points[:, place]), there)
         metadata = None if scale is None else {SCALE: str(scale).encode()}
         columns_of_table[name] = values
-        fields.insert(7 + place, pa.field(name, values.type, metadata=metadata))
+        fields[name] = pa.field(name, values.type, metadata=metadata)
     told = {f"dynhull.{name}": value for name, value in about.items()}
     head = {FORMAT: str(VERSION).encode(), b"dynhull.identity": columns.identity.encode()} | told
-    schema = pa.schema(fields, {**head, STATE: state} if state else head)
-    table = pa.table([columns_of_table[field.name] for field in fields], schema=schema)
+    schema = pa.schema([fields[name] for name in ORDER], {**head, STATE: state} if state else head)
+    table = pa.table([columns_of_table[name] for name in ORDER], schema=schema)
     table = table.sort_by([("key", "ascending"), ("revision", "ascending"), ("row", "ascending")])
     sink = pa.BufferOutputStream()
     pq.write_table(
@@ -80,8 +102,8 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
         sink,
         compression="zstd",
         compression_level=LEVEL,
-        use_dictionary=list(WORDS),
-        column_encoding=dict.fromkeys((*SPLIT, *(["committed"] if alone else [])), "BYTE_STREAM_SPLIT"),
+        use_dictionary=list(words),
+        column_encoding=dict.fromkeys(split, "BYTE_STREAM_SPLIT"),
         row_group_size=GROUP_ROWS,
         write_page_checksum=True,
         write_page_index=True,
