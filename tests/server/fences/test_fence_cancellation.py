@@ -24,6 +24,7 @@ from dynhull_server.engine.watch_fence import watch_fence
 from dynhull_server.rpc.access import EVERYTHING, Rights
 from dynhull_server.rpc.fence_service import FenceService
 from dynhull_server.rpc.metrics import Metrics
+from dynhull_server.rpc.places import Places
 from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig
 from dynhull_server.state.fences.model.records import EventType
@@ -119,6 +120,7 @@ class Caller:
     """A call of the service whose client is slow: each message takes a turn of the loop."""
 
     access = Rights(EVERYTHING)
+    owner = "somebody"
 
     def __init__(self) -> None:
         self.sent: list[Any] = []
@@ -136,7 +138,9 @@ class Caller:
 
 async def served(engine: Engine, method: str, request: Any) -> Any:
     """The answer of the service, or what it has sent."""
-    service, caller = FenceService(engine.fences, Metrics(), max_corners=100, max_watch_lag=PATIENCE), Caller()
+    pasts = Places("max_past_reads", 1, 1)
+    service = FenceService(engine.fences, engine.past_fences, pasts, Metrics(), max_corners=100, max_watch_lag=PATIENCE)
+    caller = Caller()
     answer = await getattr(service, method)(request, caller)
     return caller.sent if answer is None else answer
 
@@ -158,6 +162,7 @@ SERVED: dict[str, tuple[str, Any]] = {
     "get": ("GetFence", fs.GetFenceRequest(name="fence")),
     "list": ("ListFences", fs.ListFencesRequest()),
     "inside": ("ReadInside", fs.ReadInsideRequest(name="fence")),
+    "between": ("FenceEventsBetween", fs.FenceEventsBetweenRequest(config=SETTINGS)),
     "acknowledge": ("AckFence", fs.AckFenceRequest(name="fence", consumer="mail", sequence=1)),
     "drop consumer": ("DeleteConsumer", fs.DeleteConsumerRequest(name="fence", consumer="mail")),
 }
