@@ -124,6 +124,7 @@ FOLLOWED_ELSEWHERE = {
     "--consumer": "test_fences.py: test_the_life_of_a_fence",
     "--ack": "test_fences.py: test_the_life_of_a_fence",
     "--day": "test_demo.py: test_hours_of_flights",
+    **dict.fromkeys(("--json", "--csv", "--geojson"), "test_past.py: test_faces_of_a_track"),
     **dict.fromkeys(
         ("--max-speed", "--max-growth", "--confirmations", "--off", "--all"),
         "test_quarantine.py: test_held_positions_are_listed_released_and_dropped",

@@ -109,6 +109,7 @@ EXPORTED = [
     "SubjectsInside",
     "Supported",
     "Tangents",
+    "Track",
     "UnauthenticatedError",
     "UnavailableError",
     "Verification",

@@ -21,7 +21,7 @@ ELSEWHERE = {"tutorial", "how-to/brokers", "how-to/serve"}  # their commands hav
 PIECES = "reference/sdk"  # of programs: they begin with a client that is there
 
 ENDING = (
-    "create|put|insert|remove|delete|load|verify|query|replay|measure|separate|phases|frontier|"
+    "create|put|insert|remove|delete|load|verify|query|replay|track|measure|separate|phases|frontier|"
     "fences (create|show|inside|between)"
 )
 COMMAND = re.compile(rf"(?P<given>(printf|echo) [^|]*\| )?dynhull (?P<arguments>({ENDING}) [^|]*)")

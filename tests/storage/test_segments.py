@@ -31,6 +31,7 @@ from dynhull_server.state.records import (
     QuarantineRules,
     Record,
 )
+from dynhull_server.storage.of_keys import batches_of_keys, contents_of_keys
 from dynhull_server.storage.port import NEWEST, DamagedError
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments.archive import BATCHES, Archive
@@ -124,6 +125,23 @@ def require_all(storage, records):
         assert storage.moment(1, record.committed.time - 1).revision == record.revision - 2
 
 
+def require_all_of_keys(storage, records):
+    """What the batches do to some keys is what they do to all, without the others; and so is each state."""
+    for wanted in (KEYS[:1], KEYS[2:5], ["nobody"]):
+        keys = PackedKeys.pack(wanted)
+        for after in (0, 1, len(records) // 2):
+            found, at = [], after
+            while at < len(records):
+                some, last = storage.key_batches(1, keys, at, len(records))
+                assert at < last
+                found += some
+                at = last
+            same(found, list(batches_of_keys(records[after:], set(wanted))))
+            kept = storage.key_state(1, keys, after)
+            assert kept.revision == storage.state(1, after).revision
+            same(kept.contents, contents_of_keys(storage.state(1, after).contents, set(wanted)))
+
+
 @pytest.fixture(params=["folder", "postgresql"])
 def fleet(request, tmp_path):
     make = None
@@ -141,6 +159,7 @@ def test_the_past_is_read_from_segments_and_the_journal(fleet):
     assert fleet.storage.oldest(1) > 20  # the journal has forgotten it
     for _ in range(2):
         require_all(fleet.storage, fleet.records)
+        require_all_of_keys(fleet.storage, fleet.records)
         fleet.storage.close()
         fleet.storage = fleet.make()
         assert fleet.storage.open(no_progress).notes == []

@@ -67,6 +67,7 @@ def reads(client: sdk.HullClient) -> None:
     assert_type(client.verify("a"), sdk.Verification)
     assert_type(client.pipeline(batch_reads=2), sdk.Pipeline)
     assert_type(client.watch("a", copy=sdk.HullCopy()), sdk.Watch)
+    assert_type(client.track("a", ["x"], every=60), dict[str | int, sdk.Track])
     assert_type(client.replay("a", 1, "2026-11-24T16:00Z", speed=60, copy=sdk.HullCopy()), sdk.Replay)
     assert_type(client.watch_many("a/", contents="outline", max_rate=2), sdk.ManyWatch)
     assert_type(sdk.HullCopies()["a"], sdk.HullCopy)

@@ -38,7 +38,7 @@ PANELS = {
         "quarantine",
         "history",
     ),
-    "Questions": ("query", "watch", "replay", "top", "measure", "separate", "phases", "frontier", "verify"),
+    "Questions": ("query", "watch", "replay", "track", "top", "measure", "separate", "phases", "frontier", "verify"),
     "Fences": ("fences", "relay"),
     "Server": ("serve", "cluster", "config", "token", "gateway", "dashboard", "bench"),
     "Data folders": ("backup", "restore", "check", "export", "move"),

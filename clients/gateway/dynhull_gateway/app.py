@@ -13,7 +13,7 @@ from starlette.routing import Route
 import dynhull_client
 from dynhull_client import AsyncHullClient
 
-from . import fences, handlers, health, hulls, people, points, questions, uploads
+from . import fences, handlers, health, hulls, people, points, questions, tracks, uploads
 from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
 from .events import replays
@@ -72,7 +72,9 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()
-    routers = [module.router for module in (hulls, points, uploads, fences, questions, events, replays, maps, health)]
+    routers = [
+        module.router for module in (hulls, points, uploads, fences, questions, tracks, events, replays, maps, health)
+    ]
     for router in routers:
         app.include_router(router)
     app.openapi = partial(_description, app)  # type: ignore[method-assign]  # the framework's way to have one's own

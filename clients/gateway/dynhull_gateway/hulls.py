@@ -59,14 +59,14 @@ async def get_hull(
     """The vertices with their keys, the size and the measures of a hull."""
     hull = await (await as_of(client, name, at)).get_hull(min_revision=min_revision)
     vary = {"Vary": "Accept"}
-    if f == "geojson" or (f is None and _prefers_geojson(request)):
+    if f == "geojson" or (f is None and prefers_geojson(request)):
         shown = schemas.Feature.model_validate(feature(hull)).model_dump_json()
         return Response(shown, headers=vary, media_type=GEOJSON)
     response.headers.update(vary)
     return schemas.Hull.model_validate(hull)
 
 
-def _prefers_geojson(request: Request) -> bool:
+def prefers_geojson(request: Request) -> bool:
     """Whether the header Accept names GeoJSON, and JSON not before it (RFC 9110, 12.5.1)."""
     weights = {}
     for each in request.headers.get("accept", "").lower().split(","):

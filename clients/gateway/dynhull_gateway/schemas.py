@@ -491,6 +491,22 @@ class Positions(Response):
     times: Times | None
 
 
+class KeyTrack(Response):
+    """The way of a key: when it came to each place, and the revision. A place of nulls says that it left the hull."""
+
+    key: str | int
+    times: list[str | None] = Field(description="When each was committed; the first is the start.")
+    points: Rows
+    revisions: list[int]
+    event_times: list[str | None] | None = Field(description="What was sent with the positions; null for none at all.")
+
+
+class Tracks(Response):
+    """The ways of keys, in the order in which they are asked for."""
+
+    tracks: list[KeyTrack]
+
+
 class Entities(Response):
     """All keys of a hull at one revision, ascending, with their positions; times as for `Positions`."""
 

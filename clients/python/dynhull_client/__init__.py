@@ -66,6 +66,7 @@ from ._pipeline import Pipeline
 from ._quarantine_messages import HeldPosition, Quarantine
 from ._series import Series
 from ._sync_past import Past
+from ._tracks import Track
 from ._uses import Efficient, Measured, Phases, Separation
 from ._watch import FenceEvents, FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
@@ -136,6 +137,7 @@ __all__ = [
     "SubjectsInside",
     "Supported",
     "Tangents",
+    "Track",
     "Verification",
     "Watch",
     "Window",

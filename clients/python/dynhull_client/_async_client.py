@@ -14,6 +14,7 @@ from . import _past as earlier
 from . import _quarantine as quarantine
 from . import _replay as playing
 from . import _series as kept
+from . import _tracks as ways
 from . import _uses as uses
 from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
@@ -121,6 +122,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     influence = _answering(peeling.influence)
     get_measures = _answering(uses.get_measures)
     series = _answering(kept.series)
+    track = _answering(ways.track)
     at = _past(earlier.at)
     separate = _answering(uses.separate)
     phase_diagram = _answering(uses.phase_diagram)

@@ -1277,6 +1277,40 @@ class ReplayResponse(_message.Message):
     event: WatchResponse
     def __init__(self, event: _Optional[_Union[WatchResponse, _Mapping]] = ...) -> None: ...
 
+class TrackRequest(_message.Message):
+    __slots__ = ("name", "start_revision", "start_time", "end_revision", "end_time", "keys", "every", "encoding")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    START_REVISION_FIELD_NUMBER: _ClassVar[int]
+    START_TIME_FIELD_NUMBER: _ClassVar[int]
+    END_REVISION_FIELD_NUMBER: _ClassVar[int]
+    END_TIME_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    EVERY_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    start_revision: int
+    start_time: _timestamp_pb2.Timestamp
+    end_revision: int
+    end_time: _timestamp_pb2.Timestamp
+    keys: _points_pb2.Keys
+    every: _duration_pb2.Duration
+    encoding: _points_pb2.PointEncoding
+    def __init__(self, name: _Optional[str] = ..., start_revision: _Optional[int] = ..., start_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end_revision: _Optional[int] = ..., end_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., every: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
+
+class TrackResponse(_message.Message):
+    __slots__ = ("key_indices", "times", "positions", "event_times", "revisions")
+    KEY_INDICES_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    POSITIONS_FIELD_NUMBER: _ClassVar[int]
+    EVENT_TIMES_FIELD_NUMBER: _ClassVar[int]
+    REVISIONS_FIELD_NUMBER: _ClassVar[int]
+    key_indices: _containers.RepeatedScalarFieldContainer[int]
+    times: _points_pb2.Times
+    positions: _points_pb2.Points
+    event_times: _points_pb2.Times
+    revisions: _containers.RepeatedScalarFieldContainer[int]
+    def __init__(self, key_indices: _Optional[_Iterable[int]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., event_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., revisions: _Optional[_Iterable[int]] = ...) -> None: ...
+
 class HullSnapshot(_message.Message):
     __slots__ = ("vertices", "uid", "vertex_keys")
     VERTICES_FIELD_NUMBER: _ClassVar[int]

@@ -217,6 +217,11 @@ class HullServiceStub:
     are used. OUT_OF_RANGE, reason REVISION_FORGOTTEN, if revisions between these moments are not kept any more, also where
     they are dropped before the replay has come to them.
     """
+    Track: _grpc.UnaryStreamMultiCallable[_hull_service_pb2.TrackRequest, _hull_service_pb2.TrackResponse]
+    """Sends the ways of keys from one moment to another one: where each was at the start, and then its positions in order. It
+    needs the permission "past", where tokens are used. What is held in quarantine is no part of them. FAILED_PRECONDITION
+    if the hull is not keyed, is over shards, or has a window of a number of points. OUT_OF_RANGE as in Replay.
+    """
     Verify: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
     which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
@@ -411,6 +416,11 @@ class HullServiceAsyncStub(HullServiceStub):
     was, or faster, or as fast as they are read. Ends after the last revision. It needs the permission "past", where tokens
     are used. OUT_OF_RANGE, reason REVISION_FORGOTTEN, if revisions between these moments are not kept any more, also where
     they are dropped before the replay has come to them.
+    """
+    Track: _aio.UnaryStreamMultiCallable[_hull_service_pb2.TrackRequest, _hull_service_pb2.TrackResponse]  # type: ignore[assignment]
+    """Sends the ways of keys from one moment to another one: where each was at the start, and then its positions in order. It
+    needs the permission "past", where tokens are used. What is held in quarantine is no part of them. FAILED_PRECONDITION
+    if the hull is not keyed, is over shards, or has a window of a number of points. OUT_OF_RANGE as in Replay.
     """
     Verify: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]  # type: ignore[assignment]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
@@ -819,6 +829,17 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         was, or faster, or as fast as they are read. Ends after the last revision. It needs the permission "past", where tokens
         are used. OUT_OF_RANGE, reason REVISION_FORGOTTEN, if revisions between these moments are not kept any more, also where
         they are dropped before the replay has come to them.
+        """
+
+    @_abc_1.abstractmethod
+    def Track(
+        self,
+        request: _hull_service_pb2.TrackRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_hull_service_pb2.TrackResponse], _abc.AsyncIterator[_hull_service_pb2.TrackResponse]]:
+        """Sends the ways of keys from one moment to another one: where each was at the start, and then its positions in order. It
+        needs the permission "past", where tokens are used. What is held in quarantine is no part of them. FAILED_PRECONDITION
+        if the hull is not keyed, is over shards, or has a window of a number of points. OUT_OF_RANGE as in Replay.
         """
 
     @_abc_1.abstractmethod

@@ -21,8 +21,9 @@ from ..state.errors import (
 from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
-from ..state.records import CommitStamp, Record
+from ..state.records import CommitStamp, Keys, Record
 from ..state.root_state import state_of
+from ..state.tracks import Moves, Tracker
 from ..storage.past import Moment, Past, created
 from .divided_hull import DividedHull
 from .driver import Driver
@@ -124,14 +125,52 @@ class PastHulls:
         Raises:
             RevisionForgottenError: they are not kept any more.
         """
+        found: list[Record] = await self._onwards(live, after, partial(self._past.batches, live.number, after, until))
+        return found
+
+    async def tracker(self, live: LiveHull, keys: Keys, revision: int) -> Tracker:
+        """What follows some keys of a hull, from a state not after a revision up to that revision.
+
+        Raises:
+            LimitExceededError: it would take too many rows.
+            RevisionForgottenError: what it takes is not kept any more.
+        """
+
+        def begin() -> tuple[Tracker, int]:
+            kept = self._past.key_state(live.number, keys, revision)
+            return Tracker(live.settings, keys, kept), kept.revision
+
+        tracker, at = await self._onwards(live, revision, begin)
+        while at < revision:
+            at, _ = await self.track(live, keys, tracker, at, revision)
+        found: Tracker = tracker
+        return found
+
+    async def track(
+        self, live: LiveHull, keys: Keys, tracker: Tracker, after: int, until: int, rows: int = 0
+    ) -> tuple[int, Moves]:
+        """Follow them through some batches after a revision. Returns the last revision of these, and the moves.
+
+        `rows` is the number of rows that the reader had so far.
+        """
+
+        def step() -> tuple[int, Moves]:
+            records, last = self._past.key_batches(live.number, keys, after, until)
+            self._require_room(rows + sum(1 + len(each.rows) for each in records))
+            return last, tracker.moves(records)
+
+        found: tuple[int, Moves] = await self._onwards(live, after, step)
+        return found
+
+    async def _onwards(self, live: LiveHull, after: int, read: Callable[[], Any]) -> Any:
+        """Read what follows a revision, or raise RevisionForgottenError if it is not kept any more."""
         try:
-            found: list[Record] = await self.ask(live.name, partial(self._past.batches, live.number, after, until))
+            return await self.ask(live.name, read)
         except NotStoredError:
             oldest = await self.oldest(live)
             if oldest.revision > after:
                 raise _forgotten(live, after + 1, oldest, "start_revision") from None
             raise
-        return found
 
     async def follow(self, state: HullState, records: Sequence[Record]) -> None:
         """Apply batches to a state that the caller has for himself."""

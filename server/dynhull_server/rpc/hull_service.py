@@ -40,6 +40,7 @@ from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .replays import Replays
 from .status import ANSWERED
+from .tracks import Tracks
 from .vertex_pages import VertexPages, page_token
 from .writing import (
     MOST_IN_A_MESSAGE,
@@ -86,6 +87,7 @@ class HullService:
         self._hulls = hulls
         self._pasts = pasts
         self._replays = Replays(hulls, replays, driver.aside, max_watch_lag)
+        self._tracks = Tracks(hulls, pasts, max_watch_lag)
         self._driver = driver
         self._aside = driver.aside
         self._metrics = metrics
@@ -539,6 +541,11 @@ class HullService:
         hull = self._read(call, request.name)
         call.access.require_past(hull.name)
         await self._replays.send(request, hull, call)
+
+    async def Track(self, request: pb.TrackRequest, call: Call) -> None:
+        hull = self._read(call, request.name)
+        call.access.require_past(hull.name)
+        await self._tracks.send(request, hull, call)
 
     async def WatchMany(self, request: pb.WatchManyRequest, call: Call) -> None:
         choice = decode.decode_many(request)

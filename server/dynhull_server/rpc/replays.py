@@ -6,9 +6,11 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
+from ..engine.past import PastHulls
 from ..engine.replay import replay
 from ..engine.steps import Run
 from ..state.errors import HullReplacedError
+from ..storage.past import Moment
 from . import decode, encode
 from .calls import Call
 from .decode_moment import decode_end
@@ -66,19 +68,27 @@ class Replays:
 
     async def _ends(self, request: pb.ReplayRequest, live: LiveHull) -> tuple[int, int]:
         """The first revision and the last one."""
-        pasts = self._hulls.pasts
-        newest = live.counts.revision
-        if request.HasField("resume"):
-            if request.resume.uid != live.uid:
-                raise HullReplacedError(live.name, live.uid)
-            first = (await pasts.moment(live, request.resume.revision, 0, "resume.")).revision
-        elif (start := decode_end(request, "start")) is not None:
-            first = (await pasts.moment(live, *start, "start_")).revision
-        else:
-            first = (await pasts.oldest(live)).revision
-        end = decode_end(request, "end")
-        last = newest if end is None else (await pasts.moment(live, *end, "end_")).revision
-        if last < first:
-            problem = f"is before the start, which is revision {first}"
-            raise decode.InvalidFieldError(request.WhichOneof("end") or "start", f"revision {last}", problem)
-        return first, last
+        if not request.HasField("resume"):
+            first, last = await ends(request, live, self._hulls.pasts)
+            return first.revision, last
+        if request.resume.uid != live.uid:
+            raise HullReplacedError(live.name, live.uid)
+        first = await self._hulls.pasts.moment(live, request.resume.revision, 0, "resume.")
+        return first.revision, await last_of(request, live, self._hulls.pasts, first.revision)
+
+
+async def ends(request: pb.ReplayRequest | pb.TrackRequest, live: LiveHull, pasts: PastHulls) -> tuple[Moment, int]:
+    """The first moment of a request about a part of the past, and the last revision."""
+    start = decode_end(request, "start")
+    first = await (pasts.oldest(live) if start is None else pasts.moment(live, *start, "start_"))
+    return first, await last_of(request, live, pasts, first.revision)
+
+
+async def last_of(request: pb.ReplayRequest | pb.TrackRequest, live: LiveHull, pasts: PastHulls, first: int) -> int:
+    """The last revision, which is not before the first one."""
+    end = decode_end(request, "end")
+    last = live.counts.revision if end is None else (await pasts.moment(live, *end, "end_")).revision
+    if last < first:
+        problem = f"is before the start, which is revision {first}"
+        raise decode.InvalidFieldError(request.WhichOneof("end") or "start", f"revision {last}", problem)
+    return last

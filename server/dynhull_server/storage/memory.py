@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Lock
 
+from dynhull.keys import key_list
+
 from ..state.changes import Change
 from ..state.fences.events.block import AppendEvents
 from ..state.fences.model.records import (
@@ -18,7 +20,8 @@ from ..state.fences.model.records import (
     PutConsumer,
     PutDelays,
 )
-from ..state.records import Append, CommitStamp, Create, Delete, HullRow, Kept, Record
+from ..state.records import Append, CommitStamp, Create, Delete, HullRow, Kept, Keys, Record
+from .of_keys import batches_of_keys, contents_of_keys
 from .past import Moment, StoredHistory, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 
@@ -169,6 +172,16 @@ class MemoryStorage:
     def gathered(self, number: int, after: int, until: int) -> list[Record]:
         """The batches themselves."""
         return self.batches(number, after, until)
+
+    def key_state(self, number: int, keys: Keys, until: int) -> Kept:
+        """The newest snapshot, with the points of some keys alone."""
+        kept = self.state(number, until)
+        return replace(kept, contents=contents_of_keys(kept.contents, set(key_list(keys))))
+
+    def key_batches(self, number: int, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
+        """What some of the batches after a revision do to some keys."""
+        records = self.batches(number, after, until)
+        return list(batches_of_keys(records, set(key_list(keys)))), records[-1].revision
 
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""

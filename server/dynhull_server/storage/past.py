@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..state.records import CommitStamp, HullRow, Kept, Record
+from ..state.records import CommitStamp, HullRow, Kept, Keys, Record
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +75,15 @@ class Past(Protocol):
 
         Each has the revision of the last batch that it stands for, and of a key that several of these move the last
         place alone. It does not say who has numbered them.
+        """
+
+    def key_state(self, number: int, keys: Keys, until: int) -> Kept:
+        """The newest state that is kept of a revision not after `until`, with the points of some keys alone."""
+
+    def key_batches(self, number: int, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
+        """What some of the batches after a revision do to some keys, and the last revision of these batches.
+
+        Batches are left out that do nothing to them. What is held out of the hull is, too.
         """
 
     def history(self, number: int) -> StoredHistory:

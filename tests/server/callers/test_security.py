@@ -78,6 +78,7 @@ EVERY_CALL = {
     "SetHistory": lambda stub, name: stub.SetHistory(pb.SetHistoryRequest(name=name)),
     "GetSeries": lambda stub, name: stub.GetSeries(pb.GetSeriesRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
+    "Track": lambda stub, name: next(stub.Track(pb.TrackRequest(name=name))),
     "Replay": lambda stub, name: next(stub.Replay(pb.ReplayRequest(name=name))),
     "WatchMany": lambda stub, name: next(stub.WatchMany(pb.WatchManyRequest(names=[name]))),
     "GetLayers": lambda stub, name: stub.GetLayers(pb.GetLayersRequest(name=name, layer_count=1)),

@@ -92,6 +92,10 @@ def answers(hull, keyed):
     return [repr(each) for each in found]
 
 
+def plain(key):
+    return key if isinstance(key, str) else int(key)
+
+
 class Live:
     """The reading methods of a client for one hull."""
 
@@ -357,6 +361,77 @@ def test_faces_of_a_replay(served):
     assert asyncio.run(streamed("/hulls/nobody/replay"))[0] == 404
 
 
+def position_at(track, revision):
+    """Where a key was at a revision, as its track has it."""
+    return track.points[int(np.searchsorted(track.revisions, revision, side="right")) - 1].tolist()
+
+
+@pytest.mark.parametrize("name", [name for name, settings in KINDS.items() if "keyed" in settings])
+def test_a_track_is_where_a_key_was_at_each_revision(served, name):
+    address, seen = served
+    last = max(seen[name])
+    with HullClient(address) as client:
+        keys = list(map(plain, client.at(name, last).entities().keys))[:5]
+        first = sorted(seen[name])[3]
+        tracks = client.track(name, [*keys, *keys[:1]], first, last)
+        assert list(tracks) == keys
+        for revision in range(first, last + 1):
+            found = client.at(name, revision).positions(keys).positions
+            for key, expected in zip(keys, found.tolist(), strict=True):
+                if tracks[key].revisions[0] <= revision:
+                    assert repr(position_at(tracks[key], revision)) == repr(expected)
+                else:
+                    assert np.isnan(expected).all()
+        begun = seen[name][first][1]
+        for times, points in client.track(name, keys, begun, seen[name][last][1], every=1000).values():
+            assert len(times) == len(points) <= 2
+        whole = client.track(name, keys)
+        assert [repr(position_at(whole[key], last)) for key in keys] == [
+            repr(position_at(tracks[key], last)) for key in keys
+        ]
+        assert any(track.event_times is not None for track in whole.values()) == name.startswith("recent")
+
+
+def test_faces_of_a_track(served):
+    address, seen = served
+    last = max(seen["keyed"])
+
+    async def streamed(path, **headers):
+        async with AsyncHullClient(address) as client:
+            return await called(application(client, Settings()), path, **headers)
+
+    async def tracked():
+        async with AsyncHullClient(address) as client:
+            return await client.track("keyed", ["k1", "k2", "nobody"], 0, last)
+
+    tracks = asyncio.run(tracked())
+    assert len(tracks["nobody"]) == 0
+    options = "--from", 0, "--to", last, "--address", address
+    lines = dynhull("track", "keyed", "k1", "k2", *options).stdout.splitlines()
+    assert [line.split("\t")[0] for line in lines] == ["k1"] * len(tracks["k1"]) + ["k2"] * len(tracks["k2"])
+    shown = [json.loads(line) for line in dynhull("track", "keyed", "k1", *options, "--json").stdout.splitlines()]
+    assert [each["revision"] for each in shown] == tracks["k1"].revisions.tolist()
+    times = [datetime.fromisoformat(each["time"]) for each in shown]
+    assert [round(time.timestamp() * 1e6) for time in times] == tracks["k1"].times.tolist()
+    heading, *rows = dynhull("track", "keyed", "k1", *options, "--csv").stdout.splitlines()
+    assert (heading, len(rows)) == ("key,time,x,y,revision,event_time", len(shown))
+    (way,) = json.loads(dynhull("track", "keyed", "k1", *options, "--geojson").stdout)["features"]
+    geometry = way["geometry"]
+    lines = [geometry["coordinates"]] if geometry["type"] == "LineString" else geometry["coordinates"]
+    assert sum(len(line) for line in lines) >= sum(each["position"] is not None for each in shown)
+    path = f"/hulls/keyed/tracks?key=k1&key=k2&from=0&to={last}"
+    status, body = asyncio.run(streamed(path))
+    (first, _) = json.loads(body)["tracks"]
+    assert (status, first["revisions"]) == (200, tracks["k1"].revisions.tolist())
+    for asked in ({"accept": "application/geo+json"}, {}):
+        found = asyncio.run(streamed(path + ("" if asked else "&f=geojson"), **asked))[1]
+        assert json.loads(found)["features"][0] == way
+    assert asyncio.run(streamed("/hulls/numbered/tracks?key=k1"))[0] == 400
+    assert json.loads(asyncio.run(streamed("/hulls/numbered/tracks?key=99"))[1])["tracks"][0]["key"] == 99
+    assert asyncio.run(streamed("/hulls/plain/tracks?key=99"))[0] == 409
+    assert dynhull("track", "plain", "a", "--csv", "--json", "--address", address).exit_code != 0
+
+
 def test_the_past_needs_a_permission_of_its_own_and_has_limits(tmp_path):
     tokens = tmp_path / "tokens.toml"
     lines = [
@@ -375,6 +450,8 @@ def test_the_past_needs_a_permission_of_its_own_and_has_limits(tmp_path):
                 client.with_token(token).at(name, 1)
             with pytest.raises(PermissionDeniedError, match="read the past of"):
                 list(client.with_token(token).replay(name))
+            with pytest.raises(PermissionDeniedError, match="read the past of"):
+                client.with_token(token).track(name, ["k1"])
         assert client.with_token("then").at("a", 1).count(XY).counts.tolist() == [1] * len(XY)
         with pytest.raises(LimitExceededError, match="max_past_rows"):
             client.with_token("then").at("a", 2)

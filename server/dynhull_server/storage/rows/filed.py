@@ -2,16 +2,20 @@
 
 from collections import OrderedDict
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
-from ...state.records import CommitStamp, Kept, Record
+from dynhull.keys import key_list
+
+from ...state.records import CommitStamp, Kept, Keys, Record
+from ..of_keys import batches_of_keys
 from ..past import Moment, created
 from ..port import DamagedError
 from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.columns import Batches, contents_of
 from ..segments.gathered import gathered
-from ..segments.parquet import from_parquet
+from ..segments.parquet import from_parquet, keys_from_parquet
 from .chunks import state_from
 from .ledger import HullRows
 from .past_rows import STEP_POINTS
@@ -64,10 +68,7 @@ class Filed:
 
     def state(self, hull: HullRows, until: int) -> Kept:
         """The newest state that lies beside a segment and is not after a revision."""
-        begins = [each for each in _usable(hull) if each.begins and each.first - 1 <= until]
-        if not begins:
-            raise _not_kept(hull, until)
-        segment = begins[-1]
+        segment = _begins(hull, until)
         return Kept() if segment.first == 1 else read_state(self._archive, segment)
 
     def batches(self, hull: HullRows, after: int, until: int) -> list[Record]:
@@ -79,16 +80,28 @@ class Filed:
         batches = self._batches(_segment(hull, after + 1))
         return _some(gathered(batches, hull.row.settings, after, until))
 
+    def key_state(self, hull: HullRows, keys: Keys, until: int) -> Kept:
+        """The newest state that lies beside a segment, with the points of some keys alone."""
+        segment = _begins(hull, until)
+        return Kept() if segment.first == 1 else read_state(self._archive, segment, keys)
+
+    def key_batches(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
+        """What the batches of one segment do to some keys, from a revision on."""
+        segment = _segment(hull, after + 1)
+        name, facts = segment.file + BATCHES, segment.facts
+        with naming_revisions(segment):
+            columns, _, _ = keys_from_parquet(self._archive.read(name, facts.bytes, facts.digest), name, keys)
+        last = min(until, segment.last)
+        return list(batches_of_keys(Batches(columns).between(after, last), set(key_list(keys)))), last
+
     def _batches(self, segment: StoredSegment) -> Batches:
         with self._turn:
             batches = self._open.get(segment.file)
             if batches is not None:
                 self._open.move_to_end(segment.file)
                 return batches
-        try:
+        with naming_revisions(segment):
             batches = read_batches(self._archive, segment)
-        except DamagedError as error:
-            raise DamagedError(f"revisions {segment.first} to {segment.last} cannot be read: {error}") from error
         with self._turn:
             self._open[segment.file] = batches
             while len(self._open) > KEPT_OPEN:
@@ -105,13 +118,34 @@ def read_batches(archive: Archive, segment: StoredSegment) -> Batches:
     return Batches(columns)
 
 
-def read_state(archive: Archive, segment: StoredSegment) -> Kept:
-    """The state beside a segment. Raises DamagedError, which names the file, or StorageError."""
+def read_state(archive: Archive, segment: StoredSegment, keys: Keys | None = None) -> Kept:
+    """The state beside a segment, with some keys alone if they are given.
+
+    Raises DamagedError, which names the file, or StorageError.
+    """
     name, facts = segment.file + STATE, segment.facts
-    columns, about, told = from_parquet(archive.read(name, facts.state_bytes, facts.state_digest), name)
+    content = archive.read(name, facts.state_bytes, facts.state_digest)
+    columns, about, told = from_parquet(content, name) if keys is None else keys_from_parquet(content, name, keys)
     kept, _ = state_from(told)
     contents = contents_of(columns, times=about["times"] == "True", deadlines=about["deadlines"] == "True")
     return replace(kept, revision=segment.first - 1, contents=contents)
+
+
+@contextmanager
+def naming_revisions(segment: StoredSegment) -> Iterator[None]:
+    """An error about the file of a segment says which revisions are in it."""
+    try:
+        yield
+    except DamagedError as error:
+        raise DamagedError(f"revisions {segment.first} to {segment.last} cannot be read: {error}") from error
+
+
+def _begins(hull: HullRows, until: int) -> StoredSegment:
+    """The last segment beside which there is a state that is not after a revision."""
+    begins = [each for each in _usable(hull) if each.begins and each.first - 1 <= until]
+    if not begins:
+        raise _not_kept(hull, until)
+    return begins[-1]
 
 
 def _usable(hull: HullRows) -> list[StoredSegment]:

@@ -8,10 +8,13 @@ from dataclasses import replace
 from threading import Lock
 from typing import Protocol, TypeVar
 
+from dynhull.keys import key_list
+
 from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
-from ...state.records import CommitStamp, HullRow, Kept, Record
+from ...state.records import CommitStamp, HullRow, Kept, Keys, Record
+from ..of_keys import batches_of_keys, contents_of_keys
 from ..past import Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from ..segments.archive import NEEDS, Archive, is_installed
@@ -180,6 +183,22 @@ class RowStorage(ABC):
             if self._filed is not None and after < hull.oldest:
                 return self._filed.gathered(hull, after, until)
             return gathered_after(reader, hull, after, until)
+
+    def key_state(self, number: int, keys: Keys, until: int) -> Kept:
+        """The newest snapshot, with the points of some keys alone."""
+        with self._of_hull(number) as (reader, hull):
+            if self._filed is not None and until < hull.oldest:
+                return self._filed.key_state(hull, keys, until)
+            kept = state_until(reader, hull, until)
+            return replace(kept, contents=contents_of_keys(kept.contents, set(key_list(keys))))
+
+    def key_batches(self, number: int, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
+        """What some of the batches after a revision do to some keys."""
+        with self._of_hull(number) as (reader, hull):
+            if self._filed is not None and after < hull.oldest:
+                return self._filed.key_batches(hull, keys, after, until)
+            records = batches_after(reader, hull, after, until)
+            return list(batches_of_keys(records, set(key_list(keys)))), records[-1].revision
 
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
         """A reader, and the rows of a hull as of the same moment; KeyError if no hull has that number."""

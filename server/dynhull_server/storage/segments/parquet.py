@@ -7,11 +7,12 @@ way of one key is one read, and so that numbers differ little from those before 
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynhull.keys import PackedKeys
+from dynhull.keys import PackedKeys, key_list
 
 from ...state.records import FOREVER, NO_TIME, Identity
 from ..port import DamagedError
@@ -20,6 +21,7 @@ from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
 if TYPE_CHECKING:
     import numpy.typing as npt
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
     from dynhull.keys import Keys
 
@@ -130,6 +132,42 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
         return _columns(_in_order(table), found), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def keys_from_parquet(data: bytes, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
+    """The same with the rows of some keys, and of none, alone: no more is decompressed than the groups that have these.
+
+    Raises:
+        DamagedError: it is no file of ours, or of a newer version.
+    """
+    import pyarrow as pa
+    import pyarrow.compute as pc
+    import pyarrow.parquet as pq
+
+    try:
+        wanted = pa.array(sorted(key_list(keys)), pa.string() if isinstance(keys, PackedKeys) else pa.uint64())
+        file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True)
+        found = file.schema_arrow.metadata or {}
+        groups = [place for place in range(file.num_row_groups) if _may_have(file.metadata.row_group(place), wanted)]
+        table = file.read_row_groups(groups)
+        key = table.column("key")
+        table = table.filter(pc.or_(pc.is_in(key, value_set=wanted), pc.is_null(key)))
+        table = table.sort_by([("revision", "ascending"), ("row", "ascending")]).combine_chunks()
+        return _columns(table, found), _about(found), found.get(STATE, b"")
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def _may_have(group: pq.RowGroupMetaData, wanted: pa.Array) -> bool:
+    """Whether a group of rows, which lie by key, may have one with these keys, which are in order, or with none."""
+    places = range(group.num_columns)
+    column = next(group.column(place) for place in places if group.column(place).path_in_schema == "key")
+    statistics = column.statistics
+    if statistics is None or not statistics.has_min_max or statistics.null_count:
+        return True
+    values = wanted.to_pylist()
+    after = bisect_left(values, statistics.min)
+    return after < len(values) and values[after] <= statistics.max
 
 
 def _about(found: dict[bytes, bytes]) -> dict[str, str]:
