@@ -24,6 +24,8 @@ TITLES = {
     "hull": "Hulls: messages",
     "fence_service": "Fences: calls",
     "fence": "Fences: messages",
+    "alarm_service": "Alarms: calls",
+    "alarm": "Alarms: messages",
     "points": "Points",
     "batch": "Batches",
 }

@@ -3,6 +3,8 @@
 import pytest
 
 from dynhull_proto.v1 import (
+    alarm_pb2,
+    alarm_service_pb2,
     batch_pb2,
     fence_pb2,
     fence_service_pb2,
@@ -11,7 +13,19 @@ from dynhull_proto.v1 import (
     points_pb2,
 )
 
-FILES = [each.DESCRIPTOR for each in (batch_pb2, fence_pb2, fence_service_pb2, hull_pb2, hull_service_pb2, points_pb2)]
+FILES = [
+    each.DESCRIPTOR
+    for each in (
+        alarm_pb2,
+        alarm_service_pb2,
+        batch_pb2,
+        fence_pb2,
+        fence_service_pb2,
+        hull_pb2,
+        hull_service_pb2,
+        points_pb2,
+    )
+]
 
 
 @pytest.mark.parametrize("file", FILES, ids=[file.name for file in FILES])
