@@ -14,7 +14,12 @@ BLOCK = 2**16  # vertices at a time: their products stay in the cache
 
 def area(vertices: Points) -> float:
     """The exact area, rounded once; inf if it is beyond every double. O(h)."""
-    return rounded(_moments(vertices, centre=False)[0] / 2)
+    return rounded(doubled_area(vertices) / 2)
+
+
+def doubled_area(vertices: Points) -> Fraction:
+    """Twice the exact area. O(h)."""
+    return _moments(vertices, centre=False)[0]
 
 
 def perimeter(vertices: Points) -> float:

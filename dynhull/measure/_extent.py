@@ -1,5 +1,6 @@
 """The extent of a hull: bounds, diameter, width."""
 
+from fractions import Fraction
 from math import nan
 
 import numpy as np
@@ -22,13 +23,18 @@ def diameter(vertices: Points) -> float:
 
     Rotating calipers: one of the two is farthest from an edge at the other, or next to that. O(h log h).
     """
+    return root(squared_diameter(vertices))
+
+
+def squared_diameter(vertices: Points) -> Fraction:
+    """The exact square of the diameter. O(h log h)."""
     if len(vertices) < 2:
-        return 0.0
+        return Fraction(0)
     a, b = edges(vertices)
     far = extremes(a, b, LEFT, vertices)
     after = (far + 1) % len(vertices)  # equally far if there is a parallel edge
     p, q = np.concatenate([a, b, a, b]), vertices[np.concatenate([far, far, after, after])]
-    return root(-least(_negative_squared_length, p, q)[0])
+    return -least(_negative_squared_length, p, q)[0]
 
 
 def width(vertices: Points) -> float:
@@ -36,10 +42,15 @@ def width(vertices: Points) -> float:
 
     Houle and Toussaint, "Computing the width of a set" (1988): one of the lines passes through an edge. O(h log h).
     """
+    return root(squared_width(vertices))
+
+
+def squared_width(vertices: Points) -> Fraction:
+    """The exact square of the width. O(h log h)."""
     if len(vertices) < 3:
-        return 0.0
+        return Fraction(0)
     a, b = edges(vertices)
-    return root(least(squared_height, a, b, vertices[extremes(a, b, LEFT, vertices)])[0])
+    return least(squared_height, a, b, vertices[extremes(a, b, LEFT, vertices)])[0]
 
 
 def _negative_squared_length(p: Integers, q: Integers) -> tuple[Integers, Integers, Integers]:

@@ -55,6 +55,13 @@ def summary(vertices: Points) -> Summary:
     )
 
 
+def extent_of_few(vertices: Points) -> tuple[int, Fraction, Fraction]:
+    """The squared diameter and width of up to 64 vertices, in squares of the unit that comes with them."""
+    corners, unit = _integers(vertices)
+    longest, (height, length) = _calipers(corners)
+    return longest, Fraction(height, length), unit
+
+
 def _integers(vertices: Points) -> tuple[list[Corner], Fraction]:
     """The corners as integers, and the power of two by which they are the coordinates."""
     parts = [(frexp(x), frexp(y)) for x, y in vertices.tolist()]

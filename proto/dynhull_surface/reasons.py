@@ -87,7 +87,21 @@ class Reason(NamedTuple):
 
 
 REASONS: Mapping[str, Reason] = {
-    "CONSUMER_NOT_FOUND": Reason(Code.NOT_FOUND, "ConsumerNotFoundError", "The fence has no consumer of that name."),
+    "ALARM_EXISTS": Reason(Code.ALREADY_EXISTS, "AlarmExistsError", "There is already an alarm of that name."),
+    "ALARM_NOT_FOUND": Reason(Code.NOT_FOUND, "AlarmNotFoundError", "There is no alarm of that name."),
+    "ALARM_NOT_RAISED": Reason(
+        Code.FAILED_PRECONDITION,
+        "AlarmNotRaisedError",
+        "The alarm is not raised for the hull: nobody can acknowledge it.",
+    ),
+    "ALARM_REPLACED": Reason(
+        Code.OUT_OF_RANGE,
+        "AlarmReplacedError",
+        "The alarm was restored from a backup, or deleted and created again; its sequences are others.",
+    ),
+    "CONSUMER_NOT_FOUND": Reason(
+        Code.NOT_FOUND, "ConsumerNotFoundError", "The fence or alarm has no consumer of that name."
+    ),
     "DISK_FULL": Reason(
         Code.RESOURCE_EXHAUSTED, "LimitExceededError", "The server's disk is full; nothing was applied.", http=507
     ),
@@ -107,7 +121,9 @@ REASONS: Mapping[str, Reason] = {
     ),
     "HULL_EXISTS": Reason(Code.ALREADY_EXISTS, "HullExistsError", "There is already a hull of that name."),
     "HULL_FENCED": Reason(
-        Code.FAILED_PRECONDITION, "HullFencedError", "The hull cannot be deleted before the fence that names it."
+        Code.FAILED_PRECONDITION,
+        "HullFencedError",
+        "The hull cannot be deleted before the fence or alarm that names it.",
     ),
     "HULL_NOT_FOUND": Reason(Code.NOT_FOUND, "HullNotFoundError", "There is no hull of that name."),
     "HULL_REPLACED": Reason(

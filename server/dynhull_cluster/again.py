@@ -7,12 +7,12 @@ from google.rpc.error_details_pb2 import ErrorInfo
 from google.rpc.status_pb2 import Status
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_server.rpc.methods import DESCRIPTOR, FENCES, FINISHED, LISTS
+from dynhull_server.rpc.methods import DESCRIPTOR, FINISHED, LISTS, OWN_SERVICES
 from dynhull_surface.reasons import NOT_BEGUN
 
 READS = {
     f"/{service.full_name}/{method.name}"
-    for service in (DESCRIPTOR, FENCES)
+    for service in OWN_SERVICES
     for method in service.methods
     if method.name not in FINISHED - LISTS and (not method.client_streaming or method.name == "Query")
 }

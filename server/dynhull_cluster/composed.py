@@ -9,13 +9,14 @@ from collections.abc import Awaitable, Callable, Iterable
 from functools import partial
 from typing import Any
 
-from dynhull_proto.v1 import fence_service_pb2, hull_pb2
+from dynhull_proto.v1 import alarm_service_pb2, fence_service_pb2, hull_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc import answers, decode
 from dynhull_server.rpc.access import Rights
 from dynhull_server.rpc.calls import Call, Work
+from dynhull_server.rpc.decode_alarm import decode_alarm, decode_alarm_name
 from dynhull_server.rpc.decode_fence import decode_fence, decode_fence_name
-from dynhull_server.rpc.methods import DESCRIPTOR, FENCES
+from dynhull_server.rpc.methods import ALARMS, DESCRIPTOR, FENCES
 from dynhull_server.rpc.status import HullsApartError
 from dynhull_server.state.errors import HullEmptyError, HullUnsuitableError
 from dynhull_server.state.fences.model.config import FenceConfig
@@ -25,8 +26,15 @@ from .merged_query import MergedQuery
 from .relay import Relay, Route
 from .worker_link import WorkerLink
 
-HULLS, FENCE_CALLS = f"/{DESCRIPTOR.full_name}", f"/{FENCES.full_name}"
+HULLS, FENCE_CALLS, ALARM_CALLS = (f"/{each.full_name}" for each in (DESCRIPTOR, FENCES, ALARMS))
 BETWEEN = f"{FENCE_CALLS}/FenceEventsBetween"
+# The methods that list what a field of their answers has.
+LISTS = {
+    "hulls": f"{HULLS}/ListHulls",
+    "fences": f"{FENCE_CALLS}/ListFences",
+    "alarms": f"{ALARM_CALLS}/ListAlarms",
+}
+PREFIX_PROBLEM = 'with several workers, a prefix has a "/": names have a worker in common if they agree before it'
 # The fields of a request that name hulls or fences, and the names.
 Names = Callable[[Any], Iterable[tuple[str, str]]]
 # Raises PermissionDeniedError if a request may not have this name in this field.
@@ -53,6 +61,9 @@ class Composed:
             f"{FENCE_CALLS}/ListFences": partial(
                 self._list, fence_service_pb2.ListFencesRequest, fence_service_pb2.ListFencesResponse, "fences"
             ),
+            f"{ALARM_CALLS}/ListAlarms": partial(
+                self._list, alarm_service_pb2.ListAlarmsRequest, alarm_service_pb2.ListAlarmsResponse, "alarms"
+            ),
             f"{HULLS}/Separate": self._separate,
             f"{HULLS}/Query": self._query,
             BETWEEN: partial(self._between, partial(_names_of_past_fence, max_corners)),
@@ -67,6 +78,9 @@ class Composed:
             f"{HULLS}/Distance": partial(self._common_link, pb.DistanceRequest, names_with_keys, _require_read),
             f"{FENCE_CALLS}/CreateFence": create,
             f"{FENCE_CALLS}/ReplaceFence": replace,
+            f"{ALARM_CALLS}/CreateAlarm": partial(
+                self._common_link, alarm_service_pb2.CreateAlarmRequest, _names_of_alarm, _require_of_fence
+            ),
         }
 
     def _common_link(self, kind: Any, names: Names, require: Require, message: bytes, call: Call) -> WorkerLink:
@@ -91,7 +105,7 @@ class Composed:
 
     async def _list(self, request: Any, response: Any, field: str, call: Call) -> bytes:
         """One page of all workers, by name."""
-        method = f"{HULLS}/ListHulls" if field == "hulls" else f"{FENCE_CALLS}/ListFences"
+        method = LISTS[field]
         with call.cutoff():
             message = await call.receive()
         call.finish()
@@ -204,8 +218,7 @@ def _names_of_fence(max_corners: int, request: Any) -> Iterable[tuple[str, str]]
     config = decode_fence(request, max_corners)
     yield "name", decode_fence_name(request.name)
     if config.kind == "prefix" and "/" not in config.subjects:
-        problem = 'with several workers, a prefix has a "/": names have a worker in common if they agree before it'
-        raise decode.InvalidFieldError("config.subject_prefix", config.subjects, problem)
+        raise decode.InvalidFieldError("config.subject_prefix", config.subjects, PREFIX_PROBLEM)
     yield from _hulls_of(request, config)
 
 
@@ -218,6 +231,15 @@ def _hulls_of(request: Any, config: FenceConfig) -> Iterable[tuple[str, str]]:
     yield f"config.{request.config.WhichOneof('subjects')}", config.subjects
     if config.area_hull is not None:
         yield "config.hull_area.name", config.area_hull
+
+
+def _names_of_alarm(request: alarm_service_pb2.CreateAlarmRequest) -> Iterable[tuple[str, str]]:
+    """The names of an alarm and of its hull, or of the prefix of its hulls, which has to have a whole first part."""
+    config = decode_alarm(request)
+    yield "name", decode_alarm_name(request.name)
+    if config.kind == "prefix" and "/" not in config.subjects:
+        raise decode.InvalidFieldError("rule.prefix", config.subjects, PREFIX_PROBLEM)
+    yield f"rule.{request.rule.WhichOneof('hulls')}", config.subjects
 
 
 def _counts(hull: hull_pb2.Hull) -> Counts:

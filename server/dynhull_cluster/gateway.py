@@ -19,9 +19,8 @@ from dynhull_server.rpc.calls import Calls, Work
 from dynhull_server.rpc.health import Health
 from dynhull_server.rpc.many import ManyQuotas
 from dynhull_server.rpc.methods import (
-    DESCRIPTOR,
-    FENCES,
     FINISHED,
+    OWN_SERVICES,
     UnknownMethods,
     health_handlers,
     reflection_handlers,
@@ -102,8 +101,7 @@ class Gateway:
             OSError: it cannot listen.
         """
         handlers = (
-            self._handlers(DESCRIPTOR),
-            self._handlers(FENCES),
+            *(self._handlers(service) for service in OWN_SERVICES),
             health_handlers(self._health, self._calls),
             reflection_handlers(self._calls),
             UnknownMethods(self._calls),

@@ -23,6 +23,7 @@ from .entrance import Entrance, PublicEntrance, grpc_server, tls_context
 from .failure import text_of
 from .listening import listening_error
 from .rpc.access import LOOK_SECONDS, TokenFile
+from .rpc.alarm_service import AlarmService
 from .rpc.calls import Calls
 from .rpc.fence_service import FenceService
 from .rpc.health import Health
@@ -30,9 +31,9 @@ from .rpc.hull_families import HullFamilies
 from .rpc.hull_service import HullService
 from .rpc.many import ManyQuotas
 from .rpc.methods import (
-    DESCRIPTOR,
-    FENCES,
+    OWN_SERVICES,
     UnknownMethods,
+    alarm_handlers,
     fence_handlers,
     health_handlers,
     hull_handlers,
@@ -48,7 +49,7 @@ from .state.limits import FenceLimits, Limits
 from .storage.durability import Durability
 from .storage.port import FollowedStorage, Progress, Storage, StorageError
 
-SERVICES = DESCRIPTOR.full_name, FENCES.full_name
+SERVICES = tuple(service.full_name for service in OWN_SERVICES)
 # SERVING until the scrub finds a hull that differs from Chan's algorithm, or a fence that differs from a recomputation.
 SCRUB = "dynhull.v1.scrub"
 
@@ -107,6 +108,8 @@ class Server:
             max_past_rows=settings.max_past_rows,
             fences=FenceLimits(
                 max_fences=settings.max_fences,
+                max_alarms=settings.max_alarms,
+                max_alarm_hulls=settings.max_alarm_hulls,
                 max_fence_consumers=settings.max_fence_consumers,
                 max_fence_events=settings.max_fence_events,
                 max_fence_event_age=settings.max_fence_event_age,
@@ -207,9 +210,11 @@ class Server:
             max_corners=self._settings.max_fence_corners,
             max_watch_lag=self._settings.max_watch_lag,
         )
+        alarms = AlarmService(self._engine.alarms, self._metrics, max_watch_lag=self._settings.max_watch_lag)
         handlers = (
             hull_handlers(service, self._calls),
             fence_handlers(fences, self._calls),
+            alarm_handlers(alarms, self._calls),
             health_handlers(self._health, self._calls),
             reflection_handlers(self._calls),
             UnknownMethods(self._calls),

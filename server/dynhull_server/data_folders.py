@@ -12,6 +12,7 @@ from .exporting import exported, require_format, write_export
 from .exports import in_parts
 from .failure import code_of, fail, text_of
 from .progress import progress_bar
+from .state.alarms.rule import is_alarm, unmarked
 from .state.contents import replayed
 from .state.contents.joining import joined
 from .storage.port import DamagedError, StorageError
@@ -71,7 +72,9 @@ def _check_part(data: Path, history: Path | None) -> bool:
         typer.echo(f"{hull.name}: {hull.summary}: {'whole' if hull.whole else 'DAMAGED'}")
     for fence in report.fences:
         state = "WRONG" if fence.faults else "whole"
-        typer.echo(f"fence {fence.name}: {fence.last:,} events, {fence.inside:,} inside: {state}")
+        of_alarm = is_alarm(fence.name)
+        what, inside = ("alarm", "raised") if of_alarm else ("fence", "inside")
+        typer.echo(f"{what} {unmarked(fence.name)}: {fence.last:,} events, {fence.inside:,} {inside}: {state}")
     wrong = [str(fault) for fence in report.fences for fault in fence.faults]
     for problem in [*report.notes, *report.fatal, *wrong]:
         typer.echo(problem, err=True)

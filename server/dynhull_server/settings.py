@@ -189,8 +189,14 @@ class Settings(BaseModel):
     max_replays_per_caller: int = Field(8, ge=1, description="The same per token, or without tokens per address.")
 
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
+    max_alarms: int = Field(100_000, ge=1, description="Largest number of alarms.")
+    max_alarm_hulls: int = Field(
+        1_000_000, ge=1, description="Largest number of hulls that alarms watch, each counted once for each alarm."
+    )
     max_fence_corners: int = Field(100_000, ge=3, description="Largest number of corners of the area of a fence.")
-    max_fence_consumers: int = Field(1_000, ge=1, description="Largest number of durable consumers of a fence.")
+    max_fence_consumers: int = Field(
+        1_000, ge=1, description="Largest number of durable consumers of a fence or alarm."
+    )
     max_fence_events: int = Field(
         1_000_000, ge=1, description="Number of events of a fence to keep, at most; older ones are dropped."
     )

@@ -112,6 +112,7 @@ FOLLOWED_ELSEWHERE = {
     "--history": "test_history.py: the past that a hull keeps",
     "--history-bytes": "test_history.py: the past that a hull keeps",
     "--help": "test_main.py: test_help_lists_the_commands",
+    "--hull": "test_alarms.py: test_a_bad_condition_names_the_option",
     "--prefix": "test_commands.py: test_watch_of_many",
     "--speed": "test_demo.py: test_the_flights_live_until_ctrl_c",
     "--id": "test_table.py: the columns of the demo",

@@ -18,8 +18,17 @@ from dynhull_client import AsyncHullClient, HullClient, HullCopy, Located, Measu
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4], [1, 1]]
 EXPORTED = [
+    "Alarm",
+    "AlarmEvent",
+    "AlarmExistsError",
+    "AlarmNotFoundError",
+    "AlarmNotRaisedError",
+    "AlarmReplacedError",
+    "AlarmStatus",
+    "AlarmWatch",
     "Applied",
     "AsyncFenceEvents",
+    "AsyncAlarmWatch",
     "AsyncFenceWatch",
     "AsyncHullClient",
     "AsyncPast",

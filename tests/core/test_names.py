@@ -29,7 +29,7 @@ PACKAGES = {
     "dynhull.measure": {
         *("area", "bounds", "centroid", "diameter", "distance", "intersect_lines"),
         *("label_point", "min_box", "min_circle", "min_perimeter_box", "perimeter", "width"),
-        *("FEW", "Summary", "summary"),
+        *("FEW", "Summary", "summary", "Compared", "compare"),
     },
     "dynhull.robust": {"depth", "nearest_points"},
     "dynhull.static": {

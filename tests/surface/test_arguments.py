@@ -8,7 +8,7 @@ import pytest
 from dynhull_client import AsyncHullClient, HullClient, InvalidRequestError, PointMissingError
 from dynhull_surface.names import NAMES, find
 
-NO_ARGUMENTS = {"config", "batch", "batch.puts"}  # messages as a whole
+NO_ARGUMENTS = {"config", "rule", "batch", "batch.puts"}  # messages as a whole
 
 
 @pytest.mark.parametrize("client", [HullClient, AsyncHullClient])

@@ -90,6 +90,17 @@ def fences(client: sdk.HullClient) -> None:
     assert_type(client.ack_fence("f", "mail", 7), sdk.FenceConsumer)
     client.delete_consumer("f", "mail")
     client.delete_fence("f")
+    alarm = client.create_alarm("f", hull="a", when="area > 3", clear="area < 2", for_="30s")
+    assert_type(alarm, sdk.Alarm)
+    assert_type(alarm.for_, timedelta | None)
+    assert_type(client.get_alarm("f").statuses, tuple[sdk.AlarmStatus, ...])
+    assert_type(client.list_alarms(), Iterator[sdk.Alarm])
+    assert_type(client.watch_alarm("f", "mail"), sdk.AlarmWatch)
+    assert_type(client.ack_alarm("f", "mail", 7), sdk.FenceConsumer)
+    assert_type(client.acknowledge_alarm("f", "a"), sdk.AlarmStatus)
+    assert_type(client.mute_alarm("f", "a", None), sdk.AlarmStatus)
+    client.delete_alarm_consumer("f", "mail")
+    client.delete_alarm("f")
     client.create_fence("f", "b", "a", boundary="half")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
     client.replace_fence("f", "b", "a", initial="none")  # type: ignore[call-arg]  # pyright: ignore[reportCallIssue]
     client.create_fence("f", "b", "a", margin="wide")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

@@ -39,7 +39,7 @@ PANELS = {
         "history",
     ),
     "Questions": ("query", "watch", "replay", "track", "top", "measure", "separate", "phases", "frontier", "verify"),
-    "Fences": ("fences", "relay"),
+    "Fences and alarms": ("fences", "alarms", "relay"),
     "Server": ("serve", "cluster", "config", "token", "gateway", "dashboard", "bench"),
     "Data folders": ("backup", "restore", "check", "export", "move"),
     "Getting to know dynhull": ("demo", "explain"),

@@ -24,6 +24,11 @@ def fences(ctx: typer.Context, incomplete: str) -> list[str]:
     return _asked(ctx, lambda client: client.list_fences(incomplete, timeout=PATIENCE_SECONDS))
 
 
+def alarms(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Names of alarms that begin so."""
+    return _asked(ctx, lambda client: client.list_alarms(incomplete, timeout=PATIENCE_SECONDS))
+
+
 def _asked(ctx: typer.Context, ask: "Callable[[HullClient], Iterable[Any]]") -> list[str]:
     from dynhull_client import DynhullError, HullClient
 

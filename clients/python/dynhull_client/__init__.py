@@ -16,12 +16,13 @@ except ModuleNotFoundError as _missing:
     ) from None
 
 from . import _errors
+from ._alarm_messages import Alarm, AlarmEvent, AlarmStatus
 from ._areas import Circle, Polygon, Prefix
 from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
+from ._async_watch import AsyncAlarmWatch, AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._batch import Batch
 from ._client import HullClient
@@ -68,11 +69,16 @@ from ._series import Series
 from ._sync_past import Past
 from ._tracks import Track
 from ._uses import Efficient, Measured, Phases, Separation
-from ._watch import FenceEvents, FenceWatch, ManyWatch, Replay, Watch
+from ._watch import AlarmWatch, FenceEvents, FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 __all__ = [
+    "Alarm",
+    "AlarmEvent",
+    "AlarmStatus",
+    "AlarmWatch",
     "Applied",
+    "AsyncAlarmWatch",
     "AsyncFenceEvents",
     "AsyncFenceWatch",
     "AsyncHullClient",

@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator, Callable, Coroutine
 from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
+from . import _alarms as alarms
 from . import _calls as calls
 from . import _fences as fences
 from . import _fences_between as between
@@ -20,7 +21,7 @@ from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
+from ._async_watch import AsyncAlarmWatch, AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
 from ._async_writer import AsyncWriter
 from ._calls import Call, Pages
 from ._messages import HullInfo
@@ -134,9 +135,17 @@ class AsyncHullClient(Client[AsyncConnection]):
     fence_inside = _answering(fences.fence_inside)
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
+    create_alarm = _answering(alarms.create_alarm)
+    delete_alarm = _answering(alarms.delete_alarm)
+    get_alarm = _answering(alarms.get_alarm)
+    acknowledge_alarm = _answering(alarms.acknowledge_alarm)
+    mute_alarm = _answering(alarms.mute_alarm)
+    ack_alarm = _answering(alarms.ack_alarm)
+    delete_alarm_consumer = _answering(alarms.delete_alarm_consumer)
     list_hulls = _listing(calls.list_hulls)
     list_held = _listing(quarantine.list_held)
     list_fences = _listing(fences.list_fences)
+    list_alarms = _listing(alarms.list_alarms)
     ingest = opening(AsyncIngest, calls.ingest)
     pipeline = opening(AsyncPipeline, calls.pipeline)
     watch = opening(AsyncWatch, calls.watch)
@@ -144,6 +153,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     watch_many = opening(AsyncManyWatch, many.watch_many)
     watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
     fence_events_between = opening(AsyncFenceEvents, between.fence_events_between)
+    watch_alarm = opening(AsyncAlarmWatch, alarms.watch_alarm)
     writer = opening(AsyncWriter, calls.writer)
 
     def presence(self) -> AsyncIterator[bool]:

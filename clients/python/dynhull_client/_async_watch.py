@@ -1,4 +1,4 @@
-"""Following a hull or a fence with asyncio."""
+"""Following a hull, a fence or an alarm with asyncio."""
 
 import asyncio
 from collections import deque
@@ -9,6 +9,9 @@ from typing import Any, Self
 
 import grpc
 
+from ._alarm_messages import AlarmEvent
+from ._alarm_place import AlarmPlace
+from ._alarms import WatchingAlarm
 from ._async_connection import AsyncConnection, note, unless
 from ._calls import Watching
 from ._connection import client_is_closed
@@ -137,3 +140,10 @@ class AsyncFenceEvents(AsyncFollower[FenceEvent]):
 
     def __init__(self, connection: AsyncConnection, reading: ReadingBetween) -> None:
         super().__init__(connection, BetweenPlace(reading, connection.retries))
+
+
+class AsyncAlarmWatch(AsyncFollower[AlarmEvent]):
+    """`AlarmWatch` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+
+    def __init__(self, connection: AsyncConnection, watching: WatchingAlarm) -> None:
+        super().__init__(connection, AlarmPlace(watching, connection.retries))

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Concatenate, ParamSpec, Self, TypeVar
 
+from . import _alarms as alarms
 from . import _calls as calls
 from . import _fences as fences
 from . import _fences_between as between
@@ -23,7 +24,7 @@ from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
 from ._sync_past import Past
-from ._watch import FenceEvents, FenceWatch, ManyWatch, Replay, Watch
+from ._watch import AlarmWatch, FenceEvents, FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 P = ParamSpec("P")
@@ -146,9 +147,17 @@ class HullClient(Client[BlockingConnection]):
     fence_inside = _answering(fences.fence_inside)
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
+    create_alarm = _answering(alarms.create_alarm)
+    delete_alarm = _answering(alarms.delete_alarm)
+    get_alarm = _answering(alarms.get_alarm)
+    acknowledge_alarm = _answering(alarms.acknowledge_alarm)
+    mute_alarm = _answering(alarms.mute_alarm)
+    ack_alarm = _answering(alarms.ack_alarm)
+    delete_alarm_consumer = _answering(alarms.delete_alarm_consumer)
     list_hulls = _listing(calls.list_hulls)
     list_held = _listing(quarantine.list_held)
     list_fences = _listing(fences.list_fences)
+    list_alarms = _listing(alarms.list_alarms)
     ingest = opening(Ingest, calls.ingest)
     pipeline = opening(Pipeline, calls.pipeline)
     watch = opening(Watch, calls.watch)
@@ -156,6 +165,7 @@ class HullClient(Client[BlockingConnection]):
     watch_many = opening(ManyWatch, many.watch_many)
     watch_fence = opening(FenceWatch, fences.watch_fence)
     fence_events_between = opening(FenceEvents, between.fence_events_between)
+    watch_alarm = opening(AlarmWatch, alarms.watch_alarm)
     writer = opening(Writer, calls.writer)
 
     def close(self) -> None:

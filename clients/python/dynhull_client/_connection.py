@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import grpc
 
+from dynhull_proto.v1.alarm_service_pb2_grpc import AlarmServiceStub
 from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
@@ -85,7 +86,7 @@ class Connection:
 
     @property
     def stub(self) -> SimpleNamespace:
-        """The methods of both services, whose names differ."""
+        """The methods of all services, whose names differ."""
         return self._stub
 
     def with_token(self, token: str | None) -> Self:
@@ -120,7 +121,7 @@ class Connection:
             self._channel = self._grpc.insecure_channel(self.address, self._options)
         else:
             self._channel = self._grpc.secure_channel(self.address, tls, self._options)
-        stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel)
+        stubs = HullServiceStub(self._channel), FenceServiceStub(self._channel), AlarmServiceStub(self._channel)
         self._stub = SimpleNamespace(**{name: method for stub in stubs for name, method in vars(stub).items()})
 
     def _attempts(self, call: Call[Any]) -> Attempts:

@@ -14,6 +14,10 @@ from dynhull_proto.v1.hull_service_pb2 import ReadError
 from dynhull_surface.reasons import REASONS, Code
 
 __all__ = [
+    "AlarmExistsError",
+    "AlarmNotFoundError",
+    "AlarmNotRaisedError",
+    "AlarmReplacedError",
     "ConsumerNotFoundError",
     "DeadlineError",
     "DuplicateKeyError",
@@ -186,8 +190,24 @@ class FenceReplacedError(DynhullError, LookupError):
     """The fence was restored from a backup, or deleted, and another one has its name: it has other sequences."""
 
 
+class AlarmNotFoundError(DynhullError, LookupError):
+    """There is no alarm of that name."""
+
+
+class AlarmExistsError(DynhullError):
+    """There is already an alarm of that name."""
+
+
+class AlarmNotRaisedError(DynhullError, ValueError):
+    """The alarm is not raised for the hull, so that nobody can acknowledge it."""
+
+
+class AlarmReplacedError(DynhullError, LookupError):
+    """The alarm was restored from a backup, or deleted, and another one has its name: it has other sequences."""
+
+
 class SequenceAheadError(DynhullError, ValueError):
-    """A sequence is after the last event of the fence, `last`."""
+    """A sequence is after the last event of the fence or alarm, `last`."""
 
     @property
     def last(self) -> int | None:
@@ -196,16 +216,21 @@ class SequenceAheadError(DynhullError, ValueError):
 
 
 class ConsumerNotFoundError(DynhullError, LookupError):
-    """The fence has no consumer of that name."""
+    """The fence or alarm has no consumer of that name."""
 
 
 class HullFencedError(DynhullError):
-    """The hull cannot be deleted, because a fence names it; `fence` is the name of one."""
+    """The hull cannot be deleted, because a fence or an alarm names it; `fence` or `alarm` is the name of one."""
 
     @property
     def fence(self) -> str | None:
-        """The name of a fence to delete first; None if the token may not read it."""
+        """The name of a fence to delete first; None if it is an alarm, or the token may not read it."""
         return self.metadata.get("fence")
+
+    @property
+    def alarm(self) -> str | None:
+        """The name of an alarm to delete first; None if it is a fence, or the token may not read it."""
+        return self.metadata.get("alarm")
 
 
 class UnauthenticatedError(DynhullError):

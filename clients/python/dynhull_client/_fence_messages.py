@@ -39,13 +39,13 @@ FenceCause = Literal[
 ]
 
 
-def _words(names: Iterable[tuple[str, int]], prefix: str) -> dict[int, Any]:
+def words_of(names: Iterable[tuple[str, int]], prefix: str) -> dict[int, Any]:
     """The words for the numbers on the wire but 0: FENCE_EVENT_TYPE_ENTER is "enter"."""
     return {number: name.removeprefix(prefix).lower() for name, number in names if number}
 
 
-TYPES: dict[int, EventType] = _words(fence_pb2.FenceEventType.items(), "FENCE_EVENT_TYPE_")
-CAUSES: dict[int, FenceCause] = _words(fence_pb2.FenceCause.items(), "FENCE_CAUSE_")
+TYPES: dict[int, EventType] = words_of(fence_pb2.FenceEventType.items(), "FENCE_EVENT_TYPE_")
+CAUSES: dict[int, FenceCause] = words_of(fence_pb2.FenceCause.items(), "FENCE_CAUSE_")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Following a hull or a fence."""
+"""Following a hull, a fence or an alarm."""
 
 import threading
 from collections import deque
@@ -8,6 +8,9 @@ from typing import Any, Self
 
 import grpc
 
+from ._alarm_messages import AlarmEvent
+from ._alarm_place import AlarmPlace
+from ._alarms import WatchingAlarm
 from ._calls import Watching
 from ._connection import BlockingConnection
 from ._errors import DynhullError
@@ -151,3 +154,14 @@ class FenceEvents(Follower[FenceEvent]):
 
     def __init__(self, connection: BlockingConnection, reading: ReadingBetween) -> None:
         super().__init__(connection, BetweenPlace(reading, connection.retries))
+
+
+class AlarmWatch(Follower[AlarmEvent]):
+    """The events of a watched alarm, in order. Iterates until closed, or until the alarm is deleted.
+
+    Iterating blocks until the next event, reconnects as often as necessary, and raises DynhullError if the watch cannot
+    continue. A context manager, which closes it; `close` may also be called by another thread, and ends the iteration.
+    """
+
+    def __init__(self, connection: BlockingConnection, watching: WatchingAlarm) -> None:
+        super().__init__(connection, AlarmPlace(watching, connection.retries))

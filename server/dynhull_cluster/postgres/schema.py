@@ -46,6 +46,7 @@ MIGRATIONS: dict[int, Sequence[str]] = {
             "checksum bigint NOT NULL, PRIMARY KEY (partition, id))"
         ),
     ),
+    12: (),  # it had no alarms among the fences
 }
 # The number of an advisory lock, held while tables are created, migrated, or filled from a folder: "dynhull".
 PREPARING = 0x64796E68756C6C

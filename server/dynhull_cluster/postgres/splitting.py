@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from dynhull_server.state.alarms.rule import called, unmarked
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.records import HullRow
 from dynhull_server.storage.port import DamagedError, StorageError
@@ -67,17 +68,18 @@ def require_together(reader: Reader, partitions: int) -> None:
         if fence.row is not None and (reason := _why_apart(fence.name, fence.row.config, partitions)):
             names = sorted(consumers[fence.number])
             some = f" with the consumer{'s' * (len(names) > 1)} {', '.join(map(repr, names))}" if names else ""
-            apart.append(f"fence {fence.name!r}{some}: {reason}")
+            apart.append(f"{called(fence.name)}{some}: {reason}")
     if apart:
         raise FencesApartError(sorted(apart), partitions)
 
 
 def _why_apart(name: str, config: FenceConfig, partitions: int) -> str:
     """Why a fence would lie apart from its hulls; empty if it would not."""
-    own = worker_of(name, partitions)
+    own = worker_of(unmarked(name), partitions)
     if config.kind == "prefix" and "/" not in config.subjects:
         return f'hulls whose names begin with {config.subjects!r} may be in any partition: the prefix has no "/"'
-    needed = {config.subjects: "its subjects are in", config.area_hull: "its area is that of"}
+    subjects = "its subjects are in" if config.rule is None else "it watches"
+    needed = {config.subjects: subjects, config.area_hull: "its area is that of"}
     for other, what in needed.items():
         if other is not None and (there := worker_of(other, partitions)) != own:
             which = f"hulls {other}…" if config.kind == "prefix" and other == config.subjects else f"hull {other!r}"
@@ -104,7 +106,7 @@ def split_rows(connection: Connection, epoch: int, partitions: int) -> list[int]
         raise DamagedError(f"the database is damaged: {'; '.join(damage)}: start a server on it, or restore a backup")
     ledger = before.ledger
     hulls = {number: _partition_of(hull.row, partitions) for number, hull in ledger.hulls.items()}
-    fences = {number: worker_of(fence.row.name, partitions) for number, fence in ledger.fences.items()}
+    fences = {number: worker_of(unmarked(fence.row.name), partitions) for number, fence in ledger.fences.items()}
     connection.execute(CHUNKS, _moved(hulls))
     for places, tables in ((hulls, OF_HULLS), (fences, OF_FENCES)):
         for table, column in tables.items():

@@ -7,6 +7,7 @@ from ..state.core import Core
 from ..state.limits import Limits
 from ..state.records import CommitStamp
 from ..storage.port import FollowedStorage, Progress, Storage, StorageError, StoredContents
+from .alarms import Alarms
 from .division import Divisions
 from .driver import Driver
 from .fence_keeping import FenceKeeping
@@ -39,6 +40,7 @@ class Engine:
         hulls: the hulls.
         fences: the fences.
         past_fences: what fences would have made of the past.
+        alarms: the alarms.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class Engine:
     ) -> None:
         self.driver = Driver(limits, storage, supervisor, machine)
         self.fences = Fences(self.driver, storage)
+        self.alarms = Alarms(self.driver, self.fences)
         self.hulls = Hulls(self.driver, storage, self.fences, divisions)
         self.past_fences = PastFences(self.driver, self.hulls, storage, self.fences)
         self._storage = storage

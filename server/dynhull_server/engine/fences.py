@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..state.alarms.rule import MARK
 from ..state.errors import FenceNotFoundError, HullNotFoundError, NotStoredError, words_for_callers
 from ..state.fences.events.block import EventBlock
 from ..state.fences.index.checked import CheckedArea, check_polygons
@@ -33,6 +34,8 @@ from .waiter import Waiter
 T = TypeVar("T")
 # The checks of polygons at one time. Invalid ones may take long, and large reads have the same threads.
 MOST_CHECKS = 2
+# Rows of a batch that take about as long as it takes to measure a hull.
+ROWS_A_HULL = 16
 
 
 class LiveFence:
@@ -155,11 +158,8 @@ class Fences:
         self.changed: dict[Fence, None] = {}
         self.watched: dict[int, LiveFence] = {}
 
-    def __len__(self) -> int:
-        return len(self._driver.core.fences)
-
     def all(self) -> list[LiveFence]:
-        """All fences, by name."""
+        """All fences, by name, and among them the alarms."""
         return [self.live(fence) for fence in list(self._driver.core.fences.values())]
 
     def get(self, name: str) -> LiveFence:
@@ -171,7 +171,7 @@ class Fences:
 
         Only names that begin with one of the prefixes. These are sorted, and none of them begins with another.
         """
-        names, more = page_of(self._driver.core.fences, prefixes, after, size)
+        names, more = page_of(self._driver.core.fences, prefixes, after, size, but=MARK)
         return [self.get(name) for name in names], more
 
     async def create(self, name: str, config: FenceConfig, *, gives_center: bool = True) -> LiveFence:
@@ -237,7 +237,10 @@ class Fences:
         return checked
 
     def _rows(self, config: FenceConfig) -> int:
-        """The number of subjects, about."""
+        """The number of subjects, about; of an alarm, about as many rows of a batch as take as long as its hulls."""
+        if config.rule is not None and config.kind == "prefix":
+            hulls = self._driver.core.hulls.irange(config.subjects, f"{config.subjects}\U0010ffff")
+            return ROWS_A_HULL * sum(1 for _ in hulls)
         try:
             return self._driver.core.get(config.subjects).counts.points
         except HullNotFoundError:

@@ -135,7 +135,9 @@ class Hulls:
                 raise HullUnsuitableError(name, reason, field=field)
         if settings.history:
             self._require_history(name, settings)
-        hull: Hull = await self._driver.ask(CreateHull(Waiter(), name, self._driver.birth(), settings))
+        hull: Hull = await self._driver.ask(
+            CreateHull(Waiter(), name, self._driver.birth(), settings, self._driver.time())
+        )
         return self._live_hull(hull)
 
     async def delete(self, name: str) -> None:

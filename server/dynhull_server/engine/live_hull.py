@@ -15,6 +15,7 @@ from dynhull import DynamicHull, globe
 from dynhull.arrays import Checked, Points
 from dynhull.keys import PackedKeys
 
+from ..state.alarms.rule import unmarked
 from ..state.batch import NO_POINTS, Applied, KeyedBatch, Write
 from ..state.contents.keyed import KINDS
 from ..state.core import SMALL
@@ -337,7 +338,11 @@ class LiveHull:
     def fences(self, prefixes: tuple[str, ...] = ("",)) -> list[Fence]:
         """The fences that compare its keys, or it as a whole, and whose names begin with one of the prefixes."""
         line = self._driver.core.line(self.name)
-        return [] if line is None else [each for each in line.comparing(self.name) if each.name.startswith(prefixes)]
+        return (
+            []
+            if line is None
+            else [each for each in line.comparing(self.name) if unmarked(each.name).startswith(prefixes)]
+        )
 
     def _sides(self, prefixes: tuple[str, ...]) -> Sides | None:
         """What fences have about it, during a read: none is created or deleted meanwhile. None if there is no fence."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points, packed_points, plain_points
-from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2, points_pb2
+from dynhull_proto.v1 import alarm_service_pb2, fence_service_pb2, hull_service_pb2, points_pb2
 
 from ..engine.layers import MOST_LAYERS
 from ..engine.positions import Position, decode_position
@@ -97,7 +97,9 @@ def _require_prefix(prefix: str) -> None:
 
 
 def decode_page(
-    request: hull_service_pb2.ListHullsRequest | fence_service_pb2.ListFencesRequest,
+    request: hull_service_pb2.ListHullsRequest
+    | fence_service_pb2.ListFencesRequest
+    | alarm_service_pb2.ListAlarmsRequest,
 ) -> tuple[str, str, int]:
     """The prefix, the name before the page, and the size of the page."""
     _require_prefix(request.prefix)
@@ -354,7 +356,10 @@ def decode_last(request: hull_service_pb2.GetSeriesRequest) -> float | None:
 
 
 def decode_interval(
-    request: hull_service_pb2.WatchRequest | hull_service_pb2.ReplayRequest | fence_service_pb2.WatchFenceRequest,
+    request: hull_service_pb2.WatchRequest
+    | hull_service_pb2.ReplayRequest
+    | fence_service_pb2.WatchFenceRequest
+    | alarm_service_pb2.WatchAlarmRequest,
 ) -> float | None:
     """Seconds without an event before a progress mark, None for no marks."""
     if not request.HasField("progress_interval"):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
+from dynhull_proto.v1 import alarm_service_pb2, fence_pb2, fence_service_pb2, points_pb2
 
 from ..settings import NAME_CHARACTERS
 from ..state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, Initial, PolygonArea, Ring, SubjectKind
@@ -198,11 +198,11 @@ class WatchStart:
     consumer: str | None = None
 
 
-def decode_start(request: fence_service_pb2.WatchFenceRequest) -> WatchStart:
+def decode_start(request: fence_service_pb2.WatchFenceRequest | alarm_service_pb2.WatchAlarmRequest) -> WatchStart:
     """Where a watch begins; by default with the oldest event that is kept."""
     match request.WhichOneof("start"):
         case "consumer":
-            if request.conflate:
+            if isinstance(request, fence_service_pb2.WatchFenceRequest) and request.conflate:
                 raise InvalidFieldError("conflate", "true", "a consumer gets every event")
             return WatchStart(consumer=decode_consumer(request.consumer))
         case "only_new":

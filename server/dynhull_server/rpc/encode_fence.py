@@ -7,7 +7,7 @@ from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
 from ..engine.fences import LiveFence
 from ..engine.watch_fence import Sent
-from ..state.fences.model.config import CircleArea, FenceConfig, HullArea, Initial
+from ..state.fences.model.config import CircleArea, FenceConfig, HullArea, Initial, PolygonArea
 from ..state.fences.model.fence import Fence
 from ..state.fences.model.records import Consumer, EventType, FenceEvent, Members
 from ..state.records import NO_TIME
@@ -56,7 +56,7 @@ def encode_config(config: FenceConfig) -> fence_pb2.FenceConfig:
     elif isinstance(area, CircleArea):
         message.circle_area.center_x, message.circle_area.center_y = area.x, area.y
         message.circle_area.radius = area.radius
-    else:
+    elif isinstance(area, PolygonArea):
         for exterior, *holes in area.polygons:
             polygon = message.polygon_area.polygons.add(exterior=points_pb2.Points(packed=exterior))
             polygon.holes.extend(points_pb2.Points(packed=hole) for hole in holes)

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 
+from ..engine.alarms import alarms_among
 from ..engine.fences import Fences, LiveFence
 from ..engine.server_time import MICROSECONDS
+from ..state.alarms.rule import is_alarm
 from ..state.fences.model.records import EventType
 
 # The number of fences with the largest backlogs that have metrics of their own.
@@ -21,11 +23,15 @@ def fence_families(fences: Fences, now: int) -> Iterator[Metric]:
         fences: the fences.
         now: the server's clock.
     """
-    every = fences.all()
+    every = [each for each in fences.all() if not is_alarm(each.name)]
     yield GaugeMetricFamily("dynhull_fences", "Fences.", value=len(every))
     inside = sum(each.fence.inside for each in every)
     yield GaugeMetricFamily("dynhull_fence_inside", "Subjects inside of all fences.", value=inside)
-    events = CounterMetricFamily("dynhull_fence_events", "Events of fences since the start, by type.", labels=["type"])
+    events = CounterMetricFamily(
+        "dynhull_fence_events",
+        "Events of fences and alarms since the start, by type; alarms begin and cease.",
+        labels=["type"],
+    )
     for kind in EventType:
         events.add_metric([kind.name.lower()], fences.events[kind])
     yield events
@@ -46,6 +52,10 @@ def fence_families(fences: Fences, now: int) -> Iterator[Metric]:
         oldest.add_metric([each.name], _age(each, now))
         lost.add_metric([each.name], sum(consumer.lost for consumer in each.fence.consumers.values()))
     yield from (backlog, oldest, lost)
+    alarms = alarms_among(fences)
+    yield GaugeMetricFamily("dynhull_alarms", "Alarms.", value=len(alarms))
+    raised = sum(each.fence.inside for each in alarms)
+    yield GaugeMetricFamily("dynhull_alarm_raised", "Hulls for which an alarm is raised, of all alarms.", value=raised)
 
 
 def _backlog(live: LiveFence) -> int:

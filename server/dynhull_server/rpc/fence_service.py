@@ -65,7 +65,7 @@ class FenceService:
         config = decode_fence(request, self._max_corners)
         _require_hulls(call, config)
         fence = await self._fences.replace(name, config)
-        return pb.ReplaceFenceResponse(fence=encode_fence(fence, await _oldest(fence)))
+        return pb.ReplaceFenceResponse(fence=encode_fence(fence, await oldest_events(fence)))
 
     async def DeleteFence(self, request: pb.DeleteFenceRequest, call: Call) -> pb.DeleteFenceResponse:
         name = decode_fence_name(request.name)
@@ -76,13 +76,13 @@ class FenceService:
 
     async def GetFence(self, request: pb.GetFenceRequest, call: Call) -> pb.GetFenceResponse:
         fence = self._read(call, request.name)
-        return pb.GetFenceResponse(fence=encode_fence(fence, await _oldest(fence)))
+        return pb.GetFenceResponse(fence=encode_fence(fence, await oldest_events(fence)))
 
     async def ListFences(self, request: pb.ListFencesRequest, call: Call) -> pb.ListFencesResponse:
         prefix, after, size = decode.decode_page(request)
         fences, more = self._fences.page(call.access.readable(prefix), after, size)
         return pb.ListFencesResponse(
-            fences=[encode_fence(fence, await _oldest(fence)) for fence in fences],
+            fences=[encode_fence(fence, await oldest_events(fence)) for fence in fences],
             next_page_token=fences[-1].name if more else "",
         )
 
@@ -137,7 +137,7 @@ class FenceService:
         if request.sequence > decode.LARGEST_INTEGER:
             raise SequenceAheadError("sequence", request.sequence, fence.fence.last)
         consumer = await fence.acknowledge(name, request.sequence, request.uid)
-        oldest = await _oldest_of(fence, consumer)
+        oldest = await oldest_of(fence, consumer)
         return pb.AckFenceResponse(consumer=encode_consumer(fence.fence, consumer, oldest))
 
     async def DeleteConsumer(self, request: pb.DeleteConsumerRequest, call: Call) -> pb.DeleteConsumerResponse:
@@ -177,12 +177,13 @@ def _require_hulls(call: Call, config: FenceConfig) -> None:
         call.access.require_read(config.area_hull)
 
 
-async def _oldest(fence: LiveFence) -> dict[str, int]:
+async def oldest_events(fence: LiveFence) -> dict[str, int]:
     """The time of the oldest event in the backlog of each consumer that has one."""
-    times = {name: await _oldest_of(fence, consumer) for name, consumer in fence.fence.consumers.items()}
+    times = {name: await oldest_of(fence, consumer) for name, consumer in fence.fence.consumers.items()}
     return {name: time for name, time in times.items() if time is not None}
 
 
-async def _oldest_of(fence: LiveFence, consumer: Consumer) -> int | None:
+async def oldest_of(fence: LiveFence, consumer: Consumer) -> int | None:
+    """The time of the oldest event in the backlog of a consumer, None if there is none."""
     events = await fence.events(consumer.acknowledged, 1)
     return events[0].time if events else None

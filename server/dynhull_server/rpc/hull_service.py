@@ -640,7 +640,7 @@ def _naming_fences(call: Call) -> Iterator[None]:
     except HullFencedError as error:
         if error.fence is None or call.access.may_read(error.fence):
             raise
-        raise HullFencedError(error.name) from None
+        raise HullFencedError(error.name, what=error.what) from None
 
 
 def _acknowledge(sequence: int, applied: Applied, response: pb.StreamResponse | pb.NumberedResult) -> None:

@@ -15,9 +15,10 @@ from google.protobuf.message_factory import GetMessageClass
 from grpc_health.v1 import health_pb2
 from grpc_reflection.v1alpha import reflection, reflection_pb2
 
-from dynhull_proto.v1 import fence_service_pb2, hull_service_pb2
+from dynhull_proto.v1 import alarm_service_pb2, fence_service_pb2, hull_service_pb2
 
 from ..state.errors import LimitExceededError
+from .alarm_service import AlarmService
 from .calls import Call, Calls, Context, Received, Work
 from .fence_service import FenceService
 from .health import MAX_BYTES, Health
@@ -28,6 +29,9 @@ from .status import ANSWERED, MethodUnknownError
 
 DESCRIPTOR = hull_service_pb2.DESCRIPTOR.services_by_name["HullService"]
 FENCES = fence_service_pb2.DESCRIPTOR.services_by_name["FenceService"]
+ALARMS = alarm_service_pb2.DESCRIPTOR.services_by_name["AlarmService"]
+# All that serve hulls, fences and alarms.
+OWN_SERVICES = DESCRIPTOR, FENCES, ALARMS
 HEALTH = health_pb2.DESCRIPTOR.services_by_name["Health"]
 REFLECTION = reflection_pb2.DESCRIPTOR.services_by_name["ServerReflection"]
 
@@ -48,10 +52,17 @@ FINISHED = {
     "ListFences",
     "AckFence",
     "DeleteConsumer",
+    "CreateAlarm",
+    "DeleteAlarm",
+    "ListAlarms",
+    "AckAlarm",
+    "DeleteAlarmConsumer",
+    "AcknowledgeAlarm",
+    "MuteAlarm",
 }
 
 # Those of them that change nothing.
-LISTS = {"ListHulls", "ListFences"}
+LISTS = {"ListHulls", "ListFences", "ListAlarms"}
 
 # The name of all unknown methods in the counts of calls.
 UNKNOWN_METHOD = "unknown"
@@ -76,6 +87,11 @@ def fence_handlers(service: FenceService, calls: Calls) -> grpc.GenericRpcHandle
     return _own_handlers(FENCES, service, calls)
 
 
+def alarm_handlers(service: AlarmService, calls: Calls) -> grpc.GenericRpcHandler:
+    """The handlers of the alarm service."""
+    return _own_handlers(ALARMS, service, calls)
+
+
 def run_handlers(service: HullService, calls: Calls) -> dict[str, RunHandler]:
     """What answers runs of calls, by the path of their method: for what serves several calls at a time.
 
@@ -98,7 +114,7 @@ def health_handlers(health: Health, calls: Calls) -> grpc.GenericRpcHandler:
 
 def reflection_handlers(calls: Calls) -> grpc.GenericRpcHandler:
     """The handlers of reflection, which describes all services."""
-    services = [each.full_name for each in (DESCRIPTOR, FENCES, HEALTH, REFLECTION)]
+    services = [each.full_name for each in (*OWN_SERVICES, HEALTH, REFLECTION)]
     servicer = reflection.aio.ReflectionServicer(services)
 
     async def describe(call: Call) -> None:
@@ -128,7 +144,7 @@ async def _refuse_method(_: Call) -> None:
 
 
 def _own_handlers(
-    descriptor: ServiceDescriptor, service: HullService | FenceService, calls: Calls
+    descriptor: ServiceDescriptor, service: HullService | FenceService | AlarmService, calls: Calls
 ) -> grpc.GenericRpcHandler:
     works = {}
     for method in descriptor.methods:

@@ -12,6 +12,10 @@ from google.rpc.status_pb2 import Status
 from dynhull_surface.reasons import REASONS, Code
 
 from ..state.errors import (
+    AlarmExistsError,
+    AlarmNotFoundError,
+    AlarmNotRaisedError,
+    AlarmReplacedError,
     ConsumerNotFoundError,
     DiskFullError,
     FenceExistsError,
@@ -51,6 +55,7 @@ DOMAIN = "dynhull.v1"
 TOKENS_CHANGED = "TOKENS_CHANGED"
 STOPPING = "the server is shutting down"
 HULL_TYPE, FENCE_TYPE, CONSUMER_TYPE = "dynhull.v1.Hull", "dynhull.v1.Fence", "dynhull.v1.FenceConsumer"
+ALARM_TYPE = "dynhull.v1.Alarm"
 # Statuses are sent as headers, whose size is limited.
 LONGEST_VALUE = 120
 # Numbers, points and counts such as "8 bytes" are shown as they are, names without spaces too.
@@ -158,6 +163,10 @@ def _name(error: Any) -> Mapping[str, object]:
 
 
 REFUSALS: Mapping[type[Exception], Refusal] = {
+    AlarmExistsError: Refusal("ALARM_EXISTS", _name, ALARM_TYPE),
+    AlarmNotFoundError: Refusal("ALARM_NOT_FOUND", _name, ALARM_TYPE),
+    AlarmNotRaisedError: Refusal("ALARM_NOT_RAISED", lambda e: {"field": "hull", "value": e.hull}),
+    AlarmReplacedError: Refusal("ALARM_REPLACED", lambda e: {"field": "uid", "value": e.name, "uid": e.uid}),
     ConsumerNotFoundError: Refusal("CONSUMER_NOT_FOUND", _name, CONSUMER_TYPE),
     DecodeError: Refusal("MALFORMED_MESSAGE", message="these bytes are not the request's message"),
     DiskFullError: Refusal("DISK_FULL", lambda _: {"limit": "disk"}),
@@ -167,7 +176,7 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     FenceReplacedError: Refusal("FENCE_REPLACED", lambda e: {"field": "uid", "value": e.name, "uid": e.uid}),
     HullEmptyError: Refusal("HULL_EMPTY", _name),
     HullExistsError: Refusal("HULL_EXISTS", _name, HULL_TYPE),
-    HullFencedError: Refusal("HULL_FENCED", lambda e: {"value": e.name, "fence": e.fence}),
+    HullFencedError: Refusal("HULL_FENCED", lambda e: {"value": e.name, e.what: e.fence}),
     HullNotFoundError: Refusal("HULL_NOT_FOUND", _name, HULL_TYPE),
     HullReplacedError: Refusal("HULL_REPLACED", lambda e: {"field": e.field, "value": e.name, "uid": e.uid}),
     HullUnsuitableError: Refusal(

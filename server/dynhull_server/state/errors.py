@@ -359,21 +359,67 @@ class HullFencedError(RefusedError):
 
     Attributes:
         name: the name of the hull.
-        fence: the name of a fence that depends on it; None if it is not to be told.
+        fence: the name of a fence, or of an alarm, that depends on it; None if it is not to be told.
+        what: "fence" or "alarm".
     """
 
-    def __init__(self, name: str, fence: str | None = None) -> None:
-        told = "a fence that this token may not read" if fence is None else f"the fence {fence!r}"
-        super().__init__(f"{told} depends on the hull {name!r}: delete the fence first")
+    def __init__(self, name: str, fence: str | None = None, what: str = "fence") -> None:
+        told = (
+            f"a{'n' * (what == 'alarm')} {what} that this token may not read"
+            if fence is None
+            else f"the {what} {fence!r}"
+        )
+        super().__init__(f"{told} depends on the hull {name!r}: delete the {what} first")
         self.name = name
         self.fence = fence
+        self.what = what
+
+
+class AlarmNotFoundError(RefusedError):
+    """No alarm has that name."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"there is no alarm {name!r}")
+        self.name = name
+
+
+class AlarmExistsError(RefusedError):
+    """An alarm of that name already exists."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"the alarm {name!r} already exists")
+        self.name = name
+
+
+class AlarmReplacedError(RefusedError):
+    """The alarm of that name has been deleted and created again, or restored from a backup.
+
+    Attributes:
+        name: the name.
+        uid: the uid of the present alarm.
+    """
+
+    def __init__(self, name: str, uid: str) -> None:
+        super().__init__(f"the alarm {name!r} was created again, or restored from a backup: its uid is now {uid}")
+        self.name = name
+        self.uid = uid
+
+
+class AlarmNotRaisedError(RefusedError):
+    """There is nothing to acknowledge: the alarm is not raised for the hull."""
+
+    def __init__(self, name: str, hull: str) -> None:
+        super().__init__(f"the alarm {name!r} is not raised for the hull {hull!r}")
+        self.name = name
+        self.hull = hull
 
 
 class ConsumerNotFoundError(RefusedError):
-    """The fence has no consumer of that name."""
+    """The fence, or the alarm, has no consumer of that name."""
 
-    def __init__(self, fence: str, name: str) -> None:
-        super().__init__(f"the fence {fence!r} has no consumer {name!r}")
+    def __init__(self, fence: str, name: str, what: str = "fence") -> None:
+        super().__init__(f"the {what} {fence!r} has no consumer {name!r}")
+        self.fence = fence
         self.name = name
 
 

@@ -9,13 +9,17 @@ class FenceLimits:
 
     Attributes:
         max_fences: the number of fences.
-        max_fence_consumers: the number of consumers per fence.
+        max_alarms: the number of alarms.
+        max_alarm_hulls: the number of hulls that all alarms watch, one counted for each alarm.
+        max_fence_consumers: the number of consumers per fence, or alarm.
         max_fence_events: the number of events to keep per fence.
         max_fence_event_age: the seconds for which events are kept, 0 for no limit.
         fence_event_bytes: the memory for recent events of all fences, divided by their number; 64 MB at most in all.
     """
 
     max_fences: int = 100_000
+    max_alarms: int = 100_000
+    max_alarm_hulls: int = 1_000_000
     max_fence_consumers: int = 1_000
     max_fence_events: int = 1_000_000
     max_fence_event_age: float = 0.0

@@ -29,7 +29,8 @@ class Registry:
     Attributes:
         limits: the limits on the state.
         hulls: the hulls by name.
-        fences: the fences by name.
+        fences: the fences by name; alarms are among them.
+        alarms: the alarms by number.
         tallies: what is counted of these.
         recent: their recent events.
     """
@@ -42,6 +43,7 @@ class Registry:
         self.recent = RecentEvents(limits.fences.fence_event_bytes)
         self._next_number = next_number
         self._creating = self._fencing = 0
+        self.alarms: dict[int, Fence] = {}
 
     def get(self, name: str) -> Hull:
         """The hull of that name, or raise HullNotFoundError."""
@@ -68,6 +70,8 @@ class Registry:
         """Add a fence that is committed."""
         fence.join(self.tallies, self.recent)
         self.fences[fence.name] = fence
+        if fence.watched is not None:
+            self.alarms[fence.number] = fence
 
     def remove_fences(self, fences: Sequence[Fence]) -> None:
         """Remove fences that are deleted, once their last events are among the recent ones."""
@@ -76,12 +80,15 @@ class Registry:
             for fence in fences:
                 fence.part(left)
                 del self.fences[fence.name]
+                self.alarms.pop(fence.number, None)
 
     def compared(self, config: "FenceConfig") -> list[str]:
-        """The names of the hulls whose keys a fence compares."""
+        """The names of the hulls whose keys a fence compares, or which an alarm watches."""
         if config.kind != "prefix":
-            return [config.subjects] if config.kind == "hull" else []
+            return [config.subjects] if config.kind == "hull" or config.rule is not None else []
         names = [name for name in self.hulls.irange(config.subjects) if name.startswith(config.subjects)]
+        if config.rule is not None:
+            return [name for name in names if config.rule.suits(geographic=self.hulls[name].row.settings.geographic)]
         return [name for name in names if self.hulls[name].row.settings.identity != "multiset"]
 
     def reserve_hull(self) -> Reservation:
@@ -91,10 +98,17 @@ class Registry:
         self._creating += 1
         return Reservation(self._new_number(), LimitExceededError("max_hulls", most) if full else None, self.limits)
 
-    def reserve_fence(self) -> int | None:
-        """A number for a fence that may be created, None if it is too many. Give it back once that is decided."""
+    def reserve_fence(self, *, alarm: bool) -> int | None:
+        """A number for a fence or alarm that may be created, None if it is too many. Give it back later."""
         self._fencing += 1
-        return self._new_number() if len(self.fences) + self._fencing <= self.limits.fences.max_fences else None
+        there = len(self.alarms) if alarm else len(self.fences) - len(self.alarms)
+        most = self.limits.fences.max_alarms if alarm else self.limits.fences.max_fences
+        return self._new_number() if there + self._fencing <= most else None
+
+    @property
+    def watched(self) -> int:
+        """The number of hulls that alarms watch, each counted once for each alarm. O(alarms)."""
+        return sum(len(fence.watched) for fence in self.alarms.values() if fence.watched is not None)
 
     def number_of_shard(self) -> int:
         """A number for a shard that is created."""
@@ -111,17 +125,19 @@ class Registry:
         return number
 
 
-def page_of(names: "SortedDict[str, Any]", prefixes: Sequence[str], after: str, size: int) -> tuple[list[str], bool]:
+def page_of(
+    names: "SortedDict[str, Any]", prefixes: Sequence[str], after: str, size: int, *, but: str | None = None
+) -> tuple[list[str], bool]:
     """At most `size` names that follow `after` and begin with a prefix, and whether there are more.
 
-    The prefixes are sorted, and none of them begins with another.
+    The prefixes are sorted, and none of them begins with another. Names that begin with `but` are left out.
     """
     found: list[str] = []
     for prefix in prefixes:
         for name in names.irange(minimum=max(prefix, after)):
             if not name.startswith(prefix):
                 break
-            if name == after:
+            if name == after or (but is not None and name.startswith(but)):
                 continue
             if len(found) == size:
                 return found, True

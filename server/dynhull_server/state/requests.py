@@ -48,11 +48,19 @@ class Request:
 
 @dataclass(slots=True, eq=False)
 class CreateHull(Request):
-    """Create an empty hull. The result is the Hull."""
+    """Create an empty hull. The result is the Hull.
+
+    Attributes:
+        name: its name.
+        birth: its identity.
+        settings: its settings.
+        time: the server's clock, in microseconds since 1970.
+    """
 
     name: str
     birth: Birth
     settings: HullSettings = DEFAULT
+    time: int = 0
 
 
 @dataclass(slots=True, eq=False)

@@ -150,6 +150,8 @@ class Trip:
                 if leg.after is not None:
                     raise HullExistsError(leg.name)
                 leg.after = self._new_hull(request, leg)
+                if self.fences is not None:
+                    self.fences.created(leg.after, request.time)
                 return leg.after
             case Expire():
                 return self._expire(request, leg)
@@ -263,7 +265,8 @@ class Trip:
     def _recenter(self, request: Recenter, leg: Leg) -> tuple[Counts, bool]:
         hull = leg.after
         if self.fences is not None:
-            self.fences.require_free(leg.name)  # the projection of fences and subjects stays the same
+            # The projection of fences and subjects stays the same, and no measure changes without a batch.
+            self.fences.require_free(leg.name, prefixes=True)
         if hull is None:
             raise HullNotFoundError(leg.name)
         try:

@@ -164,6 +164,39 @@ def test_both_of_two_hulls_must_be_in_scope(guarded: Server) -> None:
                     fleet.separate(*pair)
 
 
+def test_alarms_need_rights_on_their_name_and_on_their_hulls(guarded: Server) -> None:
+    with HullClient(guarded.address, token=FLEET) as fleet, HullClient(guarded.address, token=ROOT) as root:
+        for name, watched, scope in (
+            ("fleet/van", {"hull": "fleet/van-1"}, "write 'fleet/van'"),
+            ("fleet/truck-a", {"hull": "plane"}, "read 'plane'"),
+            ("fleet/truck-a", {"hull": "nobody"}, "read 'nobody'"),
+            ("fleet/truck-a", {"prefix": "fle"}, "read 'fle'"),
+        ):
+            with pytest.raises(PermissionDeniedError, match=f"may not {scope}"):
+                fleet.create_alarm(name, when="count > 1", **watched)
+        root.create_alarm("fleet/all", prefix="fleet/", when="count > 1")
+        root.create_alarm("ports", prefix="port", when="count > 1")
+        fleet.create_alarm("fleet/truck-a", hull="fleet/van-1", when="count > 1")
+        assert [each.name for each in fleet.list_alarms()] == ["fleet/all", "fleet/truck-a"]
+        assert fleet.get_alarm("fleet/all").raised >= 2
+        for refused in (
+            lambda: fleet.acknowledge_alarm("fleet/all", "fleet/van-1"),
+            lambda: fleet.mute_alarm("fleet/all", "fleet/van-1", None),
+            lambda: fleet.delete_alarm("fleet/all"),
+            lambda: fleet.get_alarm("ports"),
+            lambda: fleet.ack_alarm("ports", "c", 1),
+            lambda: next(fleet.watch_alarm("ports", after=0)),
+        ):
+            with pytest.raises(PermissionDeniedError):
+                refused()
+        fleet.acknowledge_alarm("fleet/truck-a", "fleet/van-1")
+        with pytest.raises(HullFencedError) as fenced:
+            root.delete_hull("fleet/van-1")
+        assert fenced.value.alarm == "fleet/truck-a"
+        for name in ("fleet/all", "fleet/truck-a", "ports"):
+            root.delete_alarm(name)
+
+
 def test_scopes(guarded: Server) -> None:
     with HullClient(guarded.address, token=FLEET) as fleet, HullClient(guarded.address, token=ROOT) as root:
         assert fleet.get_hull("fleet/van-1").info.points == 2

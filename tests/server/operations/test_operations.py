@@ -21,12 +21,12 @@ from server_process import server_process
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
-SERVICE, FENCES = "dynhull.v1.HullService", "dynhull.v1.FenceService"
+SERVICE, FENCES, ALARMS = "dynhull.v1.HullService", "dynhull.v1.FenceService", "dynhull.v1.AlarmService"
 SERVING = health_pb2.HealthCheckResponse.SERVING
 NOT_SERVING = health_pb2.HealthCheckResponse.NOT_SERVING
 
 
-@pytest.mark.parametrize("service", ["", SERVICE, FENCES])
+@pytest.mark.parametrize("service", ["", SERVICE, FENCES, ALARMS])
 def test_health(channel: grpc.Channel, service: str) -> None:
     health = health_pb2_grpc.HealthStub(channel)
     assert health.Check(health_pb2.HealthCheckRequest(service=service)).status == SERVING
@@ -37,6 +37,7 @@ def test_reflection_is_enough_to_call(channel: grpc.Channel) -> None:
     assert set(database.get_services()) == {
         SERVICE,
         FENCES,
+        ALARMS,
         "grpc.health.v1.Health",
         "grpc.reflection.v1alpha.ServerReflection",
     }

@@ -67,11 +67,14 @@ class FenceCore:
         places = {name: self._registry.reserve_hull() for name in sorted(births) if name not in hulls}
         legs = {name: Leg(name, hulls.get(name), keeps=self._keeps, fenced=True) for name in names}
         lines = [queue.line for queue in queues if queue.line is not None]
-        ground = Ground(legs, lines, fences, numbers, self._registry.tallies, self._registry.limits.fences)
+        limits = self._registry.limits.fences
+        creates = any(isinstance(request, CreateFence) and request.config.rule is not None for request in requests)
+        room = limits.max_alarm_hulls - (self._registry.watched if creates else 0)
+        ground = Ground(legs, lines, fences, numbers, self._registry.tallies, limits, room)
         return Trip(legs, requests, now, pause, places, FencePart(ground, requests))
 
     def _reserve(self, request: CreateFence, numbers: dict[str, int]) -> None:
-        number = self._registry.reserve_fence()
+        number = self._registry.reserve_fence(alarm=request.config.rule is not None)
         if number is not None:
             numbers[request.name] = number
         if request.config.kind == "prefix" and request.name not in self._registry.fences:

@@ -10,7 +10,17 @@ from collections.abc import Iterable, Iterator
 from dynhull.keys import PackedKeys
 
 from ...state.fences.events.format import INTEGER_KEY, STRING_KEY, Mark
-from ...state.fences.model.records import Delay, EventType, FenceEvent, Inside, Key, Members, Position, Subject
+from ...state.fences.model.records import (
+    AlarmStanding,
+    Delay,
+    EventType,
+    FenceEvent,
+    Inside,
+    Key,
+    Members,
+    Position,
+    Subject,
+)
 from ...state.records import NO_TIME, Keys
 from .columns import Cursor, key_bytes, time_bytes
 from .varints import put_signed, put_text, put_unsigned, take_signed, take_text, take_unsigned
@@ -26,7 +36,8 @@ KEY_BITS = 3
 HAS_FIRST_TIME, HAS_HULL, HAS_INSIDE = 4, 8, 16
 # Of some keys inside: beside their kind, whether their times follow.
 HAS_SINCE = 4
-ENTERS = 4  # of a delay: beside the kind of its key
+ENTERS, HAS_STANDING = 4, 8  # of a delay: beside the kind of its key
+STANDING = struct.Struct("<?dqq")  # a standing: whether there was a measure before, that, and two times
 
 
 def decode_events(payload: bytes, sequence: int, own: str) -> Iterator[FenceEvent]:
@@ -95,7 +106,8 @@ def encode_delay(subject: Subject, delay: Delay) -> bytes:
     """The delay of a subject, as bytes."""
     hull, key = subject
     kind = STRING_KEY if isinstance(key, str) else INTEGER_KEY
-    out = bytearray((kind | ENTERS * delay.enters, delay.causes))
+    standing = delay.standing
+    out = bytearray((kind | ENTERS * delay.enters | HAS_STANDING * (standing is not None), delay.causes))
     put_text(out, hull)
     if isinstance(key, str):
         put_text(out, key)
@@ -103,6 +115,9 @@ def encode_delay(subject: Subject, delay: Delay) -> bytes:
         out += INTEGER.pack(key)
     put_signed(out, delay.since)
     put_unsigned(out, delay.reports)
+    if standing is not None:
+        previous = standing.previous
+        out += STANDING.pack(previous is not None, previous or 0.0, standing.acknowledged, standing.muted)
     return bytes(out)
 
 
@@ -117,9 +132,13 @@ def decode_delay(data: bytes) -> tuple[Subject, Delay]:
     else:
         (key,) = INTEGER.unpack(cursor.take(INTEGER.size))
     since, reports = take_signed(cursor), take_unsigned(cursor)
+    standing = None
+    if kind & HAS_STANDING:
+        there, previous, *times = STANDING.unpack(cursor.take(STANDING.size))
+        standing = AlarmStanding(previous if there else None, *times)
     if not cursor.at_end:
         raise ValueError("bytes follow the delay")
-    return (hull, key), Delay(kind & ENTERS != 0, since, reports, causes)
+    return (hull, key), Delay(kind & ENTERS != 0, since, reports, causes, standing)
 
 
 def put_members(out: bytearray, members: tuple[Members, ...]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...state.alarms.rule import called
 from ..port import Progress
 from .batch_rows import commit_columns, is_whole
 from .encoding import checksum, weight
@@ -320,7 +321,7 @@ class _Examination:
             }
             if lost:
                 self._findings.fatal.append(
-                    f"fence {fence.row.name!r} depends on hull {min(map(str, lost))!r}, whose newest revision is lost"
+                    f"{called(fence.row.name)} depends on hull {min(map(str, lost))!r}, whose newest revision is lost"
                 )
 
     def _judge_snapshots(self, scanned: _Scanned) -> int:

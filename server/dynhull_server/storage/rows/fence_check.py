@@ -15,7 +15,7 @@ from ...state.fences.events.order import EventOrder
 from ...state.fences.model.config import FenceConfig
 from ...state.fences.model.faults import FenceFault
 from ...state.fences.model.records import KeptFence, Key
-from ...state.fences.recovery.sides import Nearness, Side, Sides, wrong_sides
+from ...state.fences.recovery.sides import AlarmState, Nearness, Side, Sides, wrong_sides
 from ...state.records import Center, Contents
 from ..port import NEWEST
 from .fence_reading import read_runs, read_settled
@@ -74,6 +74,7 @@ class _Check:
         self._hulls = {hull.row.name: hull for hull in ledger.hulls.values() if not hull.row.settings.shards}
         self._names = sorted(self._hulls)
         self._outlines: dict[tuple[str, int], tuple[Points, Center | None]] = {}
+        self._counts: dict[str, int] = {}  # the points of hulls whose outlines are there
 
     def run(self) -> list[FenceReport]:
         fences = sorted(self._ledger.fences.values(), key=lambda fence: fence.row.name)
@@ -98,6 +99,9 @@ class _Check:
             return {config.subjects}
         first = bisect_left(self._names, config.subjects)
         begin_so = takewhile(lambda name: name.startswith(config.subjects), islice(self._names, first, None))
+        if config.rule is not None:
+            rule = config.rule
+            return {name for name in begin_so if rule.suits(geographic=self._hulls[name].row.settings.geographic)}
         return {name for name in begin_so if self._hulls[name].row.settings.identity != "multiset"}
 
     def _follow(self, fences: list[FenceRows]) -> list[_Stored]:
@@ -119,7 +123,8 @@ class _Check:
             faults += [fault for fault in newest[number].faults if fault not in faults]
             # Those with a delay are on the other side than is reported.
             sides: dict[str, list[Key]] = {}
-            for subject in inside ^ each.delays.keys():
+            delayed = each.delays.keys() if each.row.config.rule is None else set()
+            for subject in inside ^ delayed:
                 if isinstance(subject, str):
                     sides[subject] = []
                 else:
@@ -135,6 +140,12 @@ class _Check:
         for each in stored:
             config = each.kept.row.config
             area = config.area_hull
+            if config.rule is not None:
+                (vertices, _), standing = self._outline(name), each.kept.delays.get((name, ""))
+                waits, geographic = standing is not None and standing.enters, hull.row.settings.geographic
+                state = vertices, self._counts[name], geographic, name in each.sides, waits
+                found.alarms.append(AlarmState(each.report.name, config.rule, *state))
+                continue
             if config.kind == "other":
                 assert area is not None  # checked when the fence was created
                 (vertices, center), (others, _) = self._outline(area), self._outline(name)
@@ -160,6 +171,7 @@ class _Check:
             contents = replayed(read_hull(self._reader, hull, NEWEST), hull.row.settings)
             center = None if contents.globe is None else contents.globe.center
             self._outlines[name, layer] = layer_of(contents.hull, layer), center
+            self._counts[name] = len(contents.hull)
         return self._outlines[name, layer]
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...state.alarms.rule import called
 from ...state.fences.model.records import Consumer
 from .encoding import checksum, weight
 from .event_blocks import Runs, decode_runs
@@ -254,11 +255,11 @@ class FenceExamination:
         self._ledger.staged[number] = sorted(rows, key=lambda row: row.first)
         self._ledger.events.release(places, counts)
         del fence.firsts[gap:], fence.places[gap:], lasts[gap:]
-        self._found.gaps.append(f"fence {fence.row.name!r}: {text}")
+        self._found.gaps.append(f"{called(fence.row.name)}: {text}")
         self._found.repairs.append(DropStaged(number))
 
     def _blame(self, fence: FenceRows, text: str) -> None:
-        self._found.fatal.append(f"fence {fence.row.name!r}: {text}")
+        self._found.fatal.append(f"{called(fence.row.name)}: {text}")
 
 
 def _begins(number: int, first: int, stored: object) -> bool:

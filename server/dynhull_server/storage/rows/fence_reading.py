@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ...state.alarms.rule import called
 from ...state.fences.model.records import Delay, FenceEvent, Inside, KeptFence, Members, Subject
 from ...state.records import NO_TIME
 from ..port import NEWEST, DamagedError
@@ -153,4 +154,4 @@ def _delays(reader: Reader, fence: FenceRows) -> Iterator[tuple[Subject, Delay]]
 
 
 def _damaged(fence: FenceRows, words: str) -> DamagedError:
-    return DamagedError(f"fence {fence.row.name!r}: {words}: restore a backup")
+    return DamagedError(f"{called(fence.row.name)}: {words}: restore a backup")

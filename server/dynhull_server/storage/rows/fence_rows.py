@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
 
+from ...state.alarms.rule import AlarmRule
 from ...state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea
 from ...state.fences.model.records import NO_WAITS, Consumer, FenceRow, Waits
 from .encoding import checksum
@@ -91,6 +92,8 @@ def _area_as_json(area: Area) -> dict[str, Any]:
         if area.layer > 1:  # no "hull": servers that know no layers are not to take it for the hull itself
             return {"layer": area.layer, "of": area.name}
         return {"hull": area.name, "without_self": area.without_self}
+    if isinstance(area, AlarmRule):
+        return {"when": area.when, "clear": area.clear, "hold": area.hold}
     return {"circle": [area.x, area.y, area.radius]}
 
 
@@ -102,6 +105,8 @@ def _area_from_json(found: dict[str, Any]) -> Area:
         return HullArea(found["hull"], found["without_self"])
     if "layer" in found:
         return HullArea(found["of"], layer=found["layer"])
+    if "when" in found:
+        return AlarmRule(found["when"], found["clear"], found["hold"])
     return CircleArea(*found["circle"])
 
 

@@ -101,6 +101,7 @@ FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     10: ("id, name, uid, created, settings, checksum", _of_format_3),
     11: ("id, name, uid, created, settings, checksum", _of_format_3),
     12: ("id, name, uid, created, settings, checksum", _of_format_3),
+    13: ("id, name, uid, created, settings, checksum", _of_format_3),
 }
 
 

@@ -120,7 +120,7 @@ def _inside(fence: KeptFence, hulls: dict[str, HullRows]) -> Inside:
         dwelling.follow(fence.events)
     members = []
     for hull, found in members_after(fence).items():
-        if not found and row.config.kind != "other":
+        if not found and row.config.kind != "other" and row.config.rule is None:
             continue
         keys = _packed(found)
         since = None if dwelling is None else dwelling.times(hull, keys)

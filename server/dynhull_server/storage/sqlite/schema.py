@@ -169,6 +169,7 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     9: FORMAT_10,  # the number of their shards did not change
     10: FORMAT_10,
     11: FORMAT_11,
+    12: TABLES,  # it had no alarms among the fences
     FORMAT: TABLES,
 }
 

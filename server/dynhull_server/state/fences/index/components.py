@@ -49,7 +49,8 @@ def components(names: Sequence[str], fences: Iterable[Fence]) -> list[tuple[list
 def depends_on(fence: Fence) -> list[str]:
     """The names of the hulls that a fence depends on."""
     hulls = [] if fence.pair is None else [fence.pair.other.name]
-    return [*fence.subjects, *hulls, *([] if fence.area is None else [fence.area.name])]
+    watched = () if fence.watched is None else fence.watched.of
+    return [*fence.subjects, *hulls, *watched, *([] if fence.area is None else [fence.area.name])]
 
 
 def overlap(one: Fence, other: Fence) -> bool:

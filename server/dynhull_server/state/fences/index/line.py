@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from dynhull import Crossings
 from dynhull.arrays import Points
 
+from ...alarms.watched import Watched
 from ...hull import Hull
 from ..model.fence import Fence
 from ..model.records import Cause
@@ -15,6 +16,8 @@ from .subjects import Subjects, area_vertices
 
 # Finding an inner layer takes about as long as so many rows of a batch.
 PEELED = 2048
+# And to measure a hull for an alarm about as long as so many for each vertex.
+MEASURED = 4
 
 
 @dataclass(slots=True)
@@ -66,6 +69,7 @@ class Line:
         subjects: the hulls whose keys are compared, by name.
         areas: the hulls that are areas of keys, by name.
         pairs: the fences that compare a hull as a whole with another one, by the names of both.
+        alarms: the alarms at a hull, by its name.
     """
 
     def __init__(self, fences: Iterable[Fence], names: Iterable[str]) -> None:
@@ -74,6 +78,7 @@ class Line:
         self.subjects: dict[str, Subjects] = {}
         self.areas: dict[str, AreaHull] = {}
         self.pairs: dict[str, list[Fence]] = {}
+        self.alarms: dict[str, list[Fence]] = {}
         for fence in fences:
             self.add(fence)
 
@@ -81,6 +86,8 @@ class Line:
         """Add a fence that has compared the hulls as they are now."""
         self.fences[fence.name] = fence
         self.subjects.update(fence.subjects)
+        for name in () if fence.watched is None else fence.watched.of:
+            self.alarms.setdefault(name, []).append(fence)
         if fence.pair is not None:
             for hull in (fence.pair.area, fence.pair.other):
                 self.pairs.setdefault(hull.name, []).append(fence)
@@ -96,6 +103,10 @@ class Line:
         for name, subjects in fence.subjects.items():
             if not subjects.fences:
                 self.subjects.pop(name, None)  # or another of the fences that are removed has done it
+        for name in () if fence.watched is None else fence.watched.of:
+            self.alarms[name].remove(fence)
+            if not self.alarms[name]:
+                del self.alarms[name]
         if fence.pair is not None:
             for hull in (fence.pair.area, fence.pair.other):
                 self.pairs[hull.name].remove(fence)
@@ -117,10 +128,23 @@ class Line:
                 if pair.near != before:
                     yield fence, pair, (Cause.AREA if area else 0) | (Cause.MOVED if other else 0)
 
+    def watching(self, names: Iterable[str]) -> Iterator[tuple[Fence, Watched]]:
+        """The alarms at the hulls with these names."""
+        for name in names:
+            for fence in self.alarms.get(name, ()):
+                if fence.watched is not None:
+                    yield fence, fence.watched.of[name]
+
     def admit(self, hull: Hull) -> None:
-        """Compare the keys of a new hull with the areas of the fences whose prefix its name has."""
-        fences = [fence for fence in self.fences.values() if fence.row.config.kind == "prefix"]
-        fences = [fence for fence in fences if fence.row.config.compares(hull.name)]
+        """Compare the keys of a new hull with the areas of the fences whose prefix its name has, and watch it."""
+        prefixes = [fence for fence in self.fences.values() if fence.row.config.kind == "prefix"]
+        prefixes = [fence for fence in prefixes if fence.row.config.compares(hull.name)]
+        for fence in prefixes:
+            rule = fence.row.config.rule
+            if fence.watched is not None and rule is not None and rule.suits(geographic=hull.row.settings.geographic):
+                fence.watched.add(hull)
+                self.alarms.setdefault(hull.name, []).append(fence)
+        fences = [fence for fence in prefixes if fence.watched is None]
         if not fences or hull.row.settings.identity == "multiset":
             return
         require_frames(fences[0].row.config, hull, None)
@@ -136,23 +160,30 @@ class Line:
         if subjects is not None:
             for fence in subjects.fences.values():
                 fence.subjects = {each: value for each, value in fence.subjects.items() if each != name}
+        for fence in self.alarms.pop(name, ()):
+            if fence.watched is not None:
+                fence.watched.remove(name)
 
     def weight(self, name: str) -> int:
         """The number of subjects that a change of a hull may concern beside its own rows."""
-        area = self.areas.get(name)
+        area, alarms = self.areas.get(name), self.alarms.get(name)
+        measured = 0
+        if alarms and alarms[0].watched is not None:
+            measured = MEASURED * len(alarms) * alarms[0].watched.of[name].hull.vertex_count
         if area is None:
-            return 0
-        return sum(fence.subject_count for fence in area.fences.values()) + (PEELED if area.layered else 0)
+            return measured
+        return sum(fence.subject_count for fence in area.fences.values()) + (PEELED if area.layered else 0) + measured
 
     def comparing(self, name: str) -> list[Fence]:
-        """The fences that compare the keys of a hull, and those that compare it as a whole with their areas."""
+        """The fences that compare the keys of a hull, and those that compare it as a whole, alarms among them."""
         subjects = self.subjects.get(name)
         pairs = [fence for fence in self.pairs.get(name, ()) if fence.row.config.subjects == name]
+        pairs += self.alarms.get(name, ())
         return pairs if subjects is None else [*subjects.fences.values(), *pairs]
 
     def alone(self, name: str) -> Subjects | None:
         """The keys of a hull, if fences compare them and nothing else of the line depends on it."""
-        return None if name in self.areas or name in self.pairs else self.subjects.get(name)
+        return None if name in self.areas or name in self.pairs or name in self.alarms else self.subjects.get(name)
 
     def area_revisions(self) -> dict[str, int]:
         """The revisions of the hulls that are areas of keys, by name."""

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from ...alarms.rule import AlarmRule
+
 Initial = Literal["snapshot", "events", "none"]
 SubjectKind = Literal["hull", "prefix", "other"]
 CORNER_BYTES = 16
@@ -37,7 +39,8 @@ class CircleArea:
     radius: float
 
 
-Area = HullArea | PolygonArea | CircleArea
+# With an AlarmRule the fence is an alarm, and nobody is compared with an area.
+Area = HullArea | PolygonArea | CircleArea | AlarmRule
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +50,7 @@ class FenceConfig:
     Attributes:
         area: what subjects are compared with.
         kind: who is compared: the keys of a hull ("hull"), those of all keyed hulls with a prefix ("prefix"), or a hull
-            as a whole ("other").
+            as a whole ("other"). Of an alarm, a hull as a whole ("other") or all with a prefix.
         subjects: the name of the hull, or the prefix.
         closed: whether the boundary belongs to the area.
         margin: how far outside of the area a subject that is inside has to be to leave.
@@ -76,6 +79,11 @@ class FenceConfig:
     max_event_age: int = 0
 
     @property
+    def rule(self) -> AlarmRule | None:
+        """The rule of an alarm, None for a fence."""
+        return self.area if isinstance(self.area, AlarmRule) else None
+
+    @property
     def delays(self) -> bool:
         """Whether a change of side becomes an event only later."""
         return bool(self.confirmations or self.min_dwell)
@@ -99,9 +107,9 @@ class FenceConfig:
         return sum(map(len, rings)) // CORNER_BYTES
 
     def compares(self, name: str) -> bool:
-        """Whether the keys of a hull of that name are subjects."""
+        """Whether the keys of a hull of that name are subjects, or those of an alarm the hull as a whole."""
         return (
-            name == self.subjects if self.kind == "hull" else self.kind == "prefix" and name.startswith(self.subjects)
+            name.startswith(self.subjects) if self.kind == "prefix" else self.kind == "hull" and name == self.subjects
         )
 
     def concerns(self, name: str) -> bool:

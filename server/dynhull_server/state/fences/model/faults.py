@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from ...alarms.rule import called
 from ..model.records import Key
 
 
@@ -28,5 +29,5 @@ class FenceFault(NamedTuple):
         hull = f"hull {self.hull!r}" if self.hull else ""
         subject = hull if self.key is None else f"key {self.key!r} of {hull}"
         event = f"event {self.sequence}" if self.sequence else ""
-        where = ", ".join(filter(None, (f"fence {self.fence!r}", subject, event)))
+        where = ", ".join(filter(None, (called(self.fence), subject, event)))
         return f"{where}: expected {self.expected}, found {self.found}"

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from dynhull.keys import key_list
 
+from ...alarms.watched import WatchedHulls
 from ...records import NO_TIME, Keys
 from .delays import Delays
 from .dwell import Dwelling, dwelling_after
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from ..events.recent import RecentEvents
     from ..index.pair import Pair
     from ..index.subjects import Subjects
+
+
+MICROSECONDS = 10**6
 
 
 class FenceCount:
@@ -44,6 +48,7 @@ class Fence:
         area: the hull that is its area, or None.
         subjects: the hulls whose keys it compares, by name; replaced as a whole where it changes.
         pair: the two hulls that it compares as wholes, or None.
+        watched: the hulls of an alarm, as of the last request; None for a fence.
         last: the sequence of the last committed event, 0 before the first.
         first: the sequence of the oldest event that is kept; last + 1 if none is.
         time: the time of the last event, NO_TIME before the first.
@@ -70,6 +75,8 @@ class Fence:
         self.area: Hull | None = None
         self.subjects: dict[str, Subjects] = {}
         self.pair: Pair | None = None
+        rule = row.config.rule
+        self.watched = None if rule is None else WatchedHulls(rule, int(row.created * MICROSECONDS))
         self.first = 1
         self.time = NO_TIME
         self.consumers: dict[str, Consumer] = {}
@@ -119,12 +126,14 @@ class Fence:
             times.append(self.dwelling.first + self.row.config.dwell)
         if self.delays is not None and self.delays.first is not None:
             times.append(self.delays.first + self.row.config.min_dwell)
+        if self.watched is not None and (due := self.watched.first_due) is not None:
+            times.append(due)
         return min(times, default=None)
 
     @property
     def waiting(self) -> int:
         """The number of subjects that wait for a time."""
-        return (0 if self.dwelling is None else len(self.dwelling)) + (0 if self.delays is None else len(self.delays))
+        return sum(len(each) for each in (self.dwelling, self.delays, self.watched) if each is not None)
 
     def keys_inside(self, subjects: "Subjects") -> Keys:
         """The keys of a hull that are inside, ascending, as its events say."""
@@ -136,6 +145,9 @@ class Fence:
         """Count the subjects that are inside."""
         if self.pair is not None:
             self.inside = int(self.pair.near)
+            return
+        if self.watched is not None:
+            self.inside = len(self.watched.raised)
             return
         self.inside = sum(each.index.count(self.number) for each in self.subjects.values())
         if self.delays is not None:

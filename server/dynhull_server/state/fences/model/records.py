@@ -52,20 +52,39 @@ class Members(NamedTuple):
     since: Times | None = None
 
 
-class Delay(NamedTuple):
-    """A change of side that is no event yet.
+class AlarmStanding(NamedTuple):
+    """What else an alarm has about a hull.
 
     Attributes:
-        enters: whether the subject is on the side of the area, though it is reported outside; or the opposite.
-        since: when it changed its side, in microseconds since 1970 by the server's clock.
+        previous: the measure before the condition began to hold; None where there was none.
+        acknowledged: when somebody has acknowledged the alarm, NO_TIME for nobody.
+        muted: until when it is muted, NO_TIME for not at all.
+    """
+
+    previous: float | None = None
+    acknowledged: int = NO_TIME
+    muted: int = NO_TIME
+
+
+class Delay(NamedTuple):
+    """A change of side that is no event yet. Or what an alarm has about a hull, whose key is then empty.
+
+    Attributes:
+        enters: whether the subject is on the side of the area, though it is reported outside; or the opposite. Of an
+            alarm, whether the condition holds, but not yet for long enough.
+        since: when it changed its side, in microseconds since 1970 by the server's clock. Of an alarm, since when the
+            condition holds, NO_TIME if it does not.
         reports: the number of its reports since then, that one included if it was its own; 0 where they do not count.
+            Of an alarm, the revision with which the condition began to hold.
         causes: why it changed its side.
+        standing: of an alarm, what else is known.
     """
 
     enters: bool
     since: int
     reports: int
     causes: int
+    standing: AlarmStanding | None = None
 
 
 class Origin(NamedTuple):

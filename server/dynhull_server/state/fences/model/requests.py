@@ -127,8 +127,32 @@ class PassTime(FenceRequest):
     fence: "Fence"
 
 
+@dataclass(slots=True, eq=False)
+class AcknowledgeAlarm(FenceRequest):
+    """Take note that somebody takes care of an alarm that is raised for a hull. The result is its AlarmStatus there."""
+
+    hull: str
+
+
+@dataclass(slots=True, eq=False)
+class MuteAlarm(FenceRequest):
+    """Mute an alarm for a hull until a time, in microseconds since 1970. The result is its AlarmStatus there."""
+
+    hull: str
+    until: int
+
+
 # Requests that change which hulls share a queue, or what they are compared with.
 STRUCTURAL = (CreateFence, ReplaceFence, DeleteFence)
 AnyFenceRequest = (
-    CreateFence | ReplaceFence | DeleteFence | ReadFence | Acknowledge | DeleteConsumer | TrimEvents | PassTime
+    CreateFence
+    | ReplaceFence
+    | DeleteFence
+    | ReadFence
+    | Acknowledge
+    | DeleteConsumer
+    | TrimEvents
+    | PassTime
+    | AcknowledgeAlarm
+    | MuteAlarm
 )

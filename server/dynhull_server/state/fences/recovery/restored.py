@@ -81,6 +81,12 @@ def bring_back(kept: Sequence[KeptFence], registry: Registry) -> list[Fence]:
         if config.kind == "other" and fence.area is not None:
             fence.pair = Pair(fence.area, registry.get(config.subjects), config.near)
             fence.pair.look()
+        if fence.watched is not None:
+            for name in registry.compared(config):
+                fence.watched.add(registry.get(name))
+            watch_again(fence, each)
+            fences.append(fence)
+            continue
         for name in registry.compared(config):
             if name not in subjects:
                 subjects[name] = Subjects(registry.get(name))
@@ -89,9 +95,16 @@ def bring_back(kept: Sequence[KeptFence], registry: Registry) -> list[Fence]:
         fences.append(fence)
     adopt(restore(subjects.values(), {}, {each.row.number: each for each in kept}), subjects)
     for fence in fences:
-        if fence.pair is not None:
+        if fence.pair is not None or fence.watched is not None:
             fence.count_inside()
     return fences
+
+
+def watch_again(fence: Fence, kept: KeptFence) -> None:
+    """Give the hulls of an alarm what the storage has of them."""
+    if fence.watched is not None:
+        fence.watched.restore(members_after(kept), kept.delays)
+        fence.time = max(fence.time, fence.watched.newest)
 
 
 def adopt(restored: Restored, subjects: Mapping[str, Subjects]) -> None:

@@ -8,7 +8,7 @@ from ...trip import Trip
 from ..index.pair import Pair
 from ..model.records import KeptFence
 from ..trip.part import FencePart
-from .restored import Restored, adopt, restore
+from .restored import Restored, adopt, restore, watch_again
 
 
 def reading(
@@ -44,5 +44,9 @@ def give_back(part: FencePart, restored: Restored, registry: Registry) -> None:
         if fence.pair is not None and fence.area is not None:
             fence.pair = Pair(fence.area, fence.pair.other, fence.row.config.near)
             fence.pair.look()
+            fence.count_inside()
+        if fence.watched is not None:
+            fence.watched = fence.watched.renewed()
+            watch_again(fence, kept)
             fence.count_inside()
     adopt(restored, part.touched())

@@ -12,6 +12,9 @@ from dynhull.globe import Gnomonic
 from dynhull.keys import Keys, key_list
 from dynhull.range_search import RangeSearch
 
+from ...alarms.conditions import Condition
+from ...alarms.rule import AlarmRule
+from ...alarms.values import sign_of
 from ...records import Center, Contents
 from ..events.order import one_by_one
 from ..index.globe import outline, projected, rings_of
@@ -58,6 +61,37 @@ class Nearness:
     near: bool
 
 
+@dataclass(frozen=True, slots=True)
+class AlarmState:
+    """Whether an alarm is raised for a hull, or waits, and what its rule is about."""
+
+    alarm: str
+    rule: AlarmRule
+    vertices: Points
+    points: int
+    geographic: bool
+    raised: bool
+    waits: bool
+
+    def fault(self, hull: str) -> FenceFault | None:
+        """What is wrong, None for nothing. Between the two bounds the state depends on the way; silence is of time."""
+        rule = self.rule
+        if rule.silence:
+            return None
+        if self.raised:
+            return FenceFault(self.alarm, hull, None, 0, "cleared", "raised") if self._holds(rule.clears) else None
+        holds = self._holds(rule.raises)
+        if holds != self.waits if rule.hold else holds:
+            expected = "not" if not holds else "to wait" if rule.hold else "raised"
+            return FenceFault(self.alarm, hull, None, 0, expected, "waiting" if self.waits else "not raised")
+        return None
+
+    def _holds(self, condition: Condition) -> bool:
+        if self.rule.of_points:
+            return condition.holds((self.points > condition.limit) - (self.points < condition.limit))
+        return condition.holds(sign_of(self.vertices, condition, geographic=self.geographic))
+
+
 @dataclass(slots=True)
 class Sides:
     """What fences have about one hull at one moment.
@@ -68,6 +102,7 @@ class Sides:
         center: the centre of a geographic hull; None for a plane.
         sides: the fences that compare its keys.
         pairs: the fences that compare it as a whole.
+        alarms: the alarms at it.
     """
 
     hull: str
@@ -75,10 +110,11 @@ class Sides:
     center: Center | None = None
     sides: list[Side] = field(default_factory=list)
     pairs: list[Nearness] = field(default_factory=list)
+    alarms: list[AlarmState] = field(default_factory=list)
 
     def __len__(self) -> int:
         """The number of fences."""
-        return len(self.sides) + len(self.pairs)
+        return len(self.sides) + len(self.pairs) + len(self.alarms)
 
 
 def sides_of(name: str, fences: Iterable[Fence]) -> Sides:
@@ -89,6 +125,12 @@ def sides_of(name: str, fences: Iterable[Fence]) -> Sides:
         if pair is not None:
             vertices = pair.area.state.vertices(), pair.other.state.vertices()
             found.pairs.append(Nearness(fence.name, config.near, *vertices, pair.area.state.center, pair.near))
+            continue
+        if fence.watched is not None and config.rule is not None:
+            watched = fence.watched.of[name]
+            state = watched.hull.state
+            seen = state.vertices(), state.counts.points, watched.hull.row.settings.geographic
+            found.alarms.append(AlarmState(fence.name, config.rule, *seen, watched.raised, watched.waits))
             continue
         subjects = fence.subjects[name]
         if found.contents is None:
@@ -109,6 +151,10 @@ def wrong_sides(found: Sides) -> Iterator[FenceFault]:
         near, _ = nearness(pair.area, pair.other, pair.limit, pair.center)
         if near != pair.near:
             yield FenceFault(pair.fence, found.hull, None, 0, _distance(near), _distance(pair.near))
+    for alarm in found.alarms:
+        fault = alarm.fault(found.hull)
+        if fault is not None:
+            yield fault
     if not found.sides or found.contents is None:
         return
     frame = None if found.center is None else Gnomonic(found.center)

@@ -22,6 +22,7 @@ from ..index.transfers import carry, known_to
 from ..model.fence import Fence
 from ..model.records import Cause, Key, Origin
 from ..model.tallies import Column, Tallies
+from .alarms import look as alarm_at
 from .delayed import NO_ROWS, delay, take_over
 from .leg import NOBODY, FenceLeg
 
@@ -41,6 +42,7 @@ class Ground:
         numbers: the numbers of new fences, by name; those without one are too many.
         tallies: what is counted of fences, as of the last commit.
         limits: the limits on fences.
+        room: how many more hulls alarms may watch, if it creates any.
     """
 
     hulls: Mapping[str, Leg]
@@ -49,6 +51,7 @@ class Ground:
     numbers: Mapping[str, int]
     tallies: Tallies
     limits: FenceLimits
+    room: int = 0
 
 
 class Comparison:
@@ -117,6 +120,9 @@ class Comparison:
                     self.cross(subjects, crossings, areas, swap, now, changed.get(name), carried.get(name, NOBODY))
                 for fence, pair, causes in line.paired(hulls):
                     self.leg(fence).paired(pair, causes, now)
+                for fence, watched in line.watching(hull.name for hull in hulls) if line.alarms else ():
+                    if watched.touched(now):
+                        alarm_at(self.leg(fence), watched, Cause.EXPIRED if swap is EXPIRY else Cause.MOVED, now)
         except BaseException:  # an index may have lost crossings
             self.tear(hulls)
             raise

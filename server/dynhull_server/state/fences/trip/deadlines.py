@@ -3,6 +3,7 @@
 from ..model.fence import Fence
 from ..model.records import Cause, EventType, Key, Subject
 from ..model.requests import PassTime
+from .alarms import pass_time as raise_by_time
 from .comparison import Comparison
 from .delayed import end_some
 
@@ -20,6 +21,9 @@ def pass_time(request: PassTime, fence: Fence, comparison: Comparison) -> None:
     for hull, found in sorted(ripe.items()):
         comparison.applied = True
         end_some(comparison.leg(fence), fence.subjects[hull], found, Cause.TIME, request.time)
+    for watched in () if fence.watched is None else fence.watched.take(request.time, MOST_DUE):
+        comparison.applied = True
+        raise_by_time(comparison.leg(fence), watched, request.time)
     made = comparison.legs.get(fence.number)
     # The events of this trip come after those that `dwelling` knows.
     changed = set() if made is None else {event.former for event in made.events if event.key is not None}

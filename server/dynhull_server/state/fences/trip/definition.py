@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from ...alarms.rule import AlarmRule
 from ...errors import FenceExistsError, HullNotFoundError, HullUnsuitableError, InvalidFenceError, LimitExceededError
 from ...hull import Hull
 from ..events.sequences import Swap
@@ -15,6 +16,7 @@ from ..model.delays import Delays
 from ..model.fence import Fence
 from ..model.records import NO_WAITS, Cause, EventType, FenceRow, Inside, Waits
 from ..model.requests import CreateFence, DeleteFence, ReplaceFence
+from .alarms import look, watched_hulls
 from .comparison import Comparison, Ground
 from .delayed import end_all
 from .leg import FenceLeg, members
@@ -37,13 +39,13 @@ class Definition:
         left: the requests that are left for a later trip, because the fences before them have many subjects inside.
     """
 
-    __slots__ = ("_comparison", "_ground", "_inside", "left")
+    __slots__ = ("_comparison", "_ground", "_inside", "_watching", "left")
 
     def __init__(self, ground: Ground, comparison: Comparison) -> None:
         self.left: list[CreateFence] = []
         self._ground = ground
         self._comparison = comparison
-        self._inside = 0
+        self._inside = self._watching = 0
 
     def create(self, request: CreateFence) -> Fence | None:
         """Create a fence; None if that is left for a later trip."""
@@ -54,8 +56,12 @@ class Definition:
         if ground.fences[request.name] is not None:
             raise FenceExistsError(request.name)
         number = ground.numbers.get(request.name)
+        if number is None and config.rule is not None:
+            raise LimitExceededError("max_alarms", ground.limits.max_alarms)
         if number is None:
             raise LimitExceededError("max_fences", ground.limits.max_fences)
+        if config.rule is not None:
+            return self._create_alarm(request, number, config.rule)
         waits = _waits(config, 0, request.time)
         fence = Fence(FenceRow(number, request.name, request.birth.uid, request.birth.created, config, waits))
         fence.area = self._area(config)
@@ -86,6 +92,33 @@ class Definition:
         else:
             leg.inside = Inside(0, tuple(members(fence)))
         return fence
+
+    def _create_alarm(self, request: CreateFence, number: int, rule: AlarmRule) -> Fence:
+        """Create an alarm, which is raised for the hulls for which its condition holds."""
+        config, birth = request.config, request.birth
+        fence = Fence(FenceRow(number, request.name, birth.uid, birth.created, config))
+        leg, hulls = FenceLeg(fence, created=True), self._watched(config, rule)
+        self._watching += len(hulls)
+        if self._watching > self._ground.room:
+            raise LimitExceededError("max_alarm_hulls", self._ground.limits.max_alarm_hulls)
+        for hull in hulls:
+            look(leg, watched_hulls(fence).add(hull), Cause.CREATED, request.time)
+        self._comparison.legs[number] = leg
+        return fence
+
+    def _watched(self, config: FenceConfig, rule: AlarmRule) -> list[Hull]:
+        """The hulls that a new alarm watches, by name."""
+        if config.kind == "prefix":
+            found = [leg.after for _, leg in sorted(self._ground.hulls.items()) if config.compares(leg.name)]
+            hulls = [hull for hull in found if hull is not None]
+            for hull in hulls:
+                _require_whole(hull)
+            return [hull for hull in hulls if rule.suits(geographic=hull.row.settings.geographic)]
+        hull = self._hull(config.subjects)
+        if not rule.suits(geographic=hull.row.settings.geographic):
+            globe = "is geographic, where hulls have no width" if hull.row.settings.geographic else "is a plane"
+            raise HullUnsuitableError(hull.name, f"{globe}: {rule.when!r} does not suit it", field="rule.when")
+        return [hull]
 
     def replace(self, request: ReplaceFence, fence: Fence) -> Fence:
         """Replace the area and the settings of a fence."""

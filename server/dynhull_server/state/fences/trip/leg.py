@@ -9,6 +9,7 @@ import numpy.typing as npt
 from dynhull import Crossings
 from dynhull.keys import PackedKeys, key_list, take_keys
 
+from ...alarms.watched import Watched
 from ...changes import FenceChange
 from ...hull import Hull
 from ...records import NO_TIME, Keys
@@ -42,6 +43,7 @@ from ..model.records import (
 # Some rows of crossings.
 Rows = slice | npt.NDArray[np.intp]
 TYPES = {1: EventType.ENTER, -1: EventType.EXIT, 0: EventType.CROSS, 2: EventType.TRANSFER}
+NO_KEYS = PackedKeys(b"", b"")
 NOBODY: Mapping[Key, Origin] = MappingProxyType({})
 
 
@@ -162,6 +164,31 @@ class FenceLeg:
         hulls = kind, causes, pair.other.name, None, pair.other.state.counts.revision, pair.area.state.counts.revision
         self.events.append(FenceEvent(self.last + 1, *hulls, None, None, pair.distance, NO_TIME, self.time(now)))
 
+    def alarmed(
+        self,
+        kind: EventType,
+        causes: int,
+        watched: Watched,
+        values: tuple[float | None, float, float | None],
+        began: tuple[int, int],
+        now: int,
+    ) -> None:
+        """Make the event that an alarm is raised or cleared for a hull.
+
+        Args:
+            kind: BEGIN if it is raised, CEASE if it is cleared.
+            causes: why.
+            watched: the hull.
+            values: the measure, the bound and the measure before: the distance and the previous position of the event.
+            began: the revision with which the condition began to hold, and its time: the revision of the area and the
+                event time.
+            now: the time.
+        """
+        hull, (value, bound, previous), (revision, time) = watched.hull, values, began
+        hulls = kind, causes, hull.name, None, hull.state.counts.revision, revision
+        before = None if previous is None else (previous, bound)
+        self.events.append(FenceEvent(self.last + 1, *hulls, None, before, value, time, self.time(now)))
+
     def left(self, subjects: Subjects, keys: Keys, cause: Mapping[Key, int] | int, now: int) -> None:
         """Make an exit of each of some keys of a hull that are gone, given why; with the positions they still have."""
         time, hull, revisions = self.time(now), subjects.hull.name, self._revisions(subjects.hull)
@@ -179,6 +206,12 @@ class FenceLeg:
             self._time = max(self._time, delay.since)
         self.delays[subject] = delay
         self.fence.subjects[subject[0]].note_delays(self.fence)
+
+    def put_standing(self, hull: str, standing: Delay | None) -> None:
+        """Put what an alarm has about a hull in the place of what it had."""
+        if standing is not None:
+            self._time = max(self._time, standing.since)
+        self.delays[hull, ""] = standing
 
     def summed_up(self, kind: EventType, cause: int, now: int) -> None:
         """Make one event of all subjects that are inside."""
@@ -250,7 +283,9 @@ class FenceLeg:
 def members(fence: Fence, dwelling: Dwelling | None = None) -> Iterator[Members]:
     """The subjects that are inside, by hull, and since when they wait; no keys of a hull that is near as a whole."""
     if fence.pair is not None and fence.pair.near:
-        yield Members(fence.pair.other.name, PackedKeys(b"", b""), fence.pair.other.state.counts.revision)
+        yield Members(fence.pair.other.name, NO_KEYS, fence.pair.other.state.counts.revision)
+    for watched in () if fence.watched is None else fence.watched.raised.values():
+        yield Members(watched.hull.name, NO_KEYS, watched.hull.state.counts.revision)
     for subjects in fence.subjects.values():
         keys = fence.keys_inside(subjects)
         if len(keys):

@@ -3,31 +3,45 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import assert_never
 
+from ...alarms.rule import unmarked
+from ...alarms.status import AlarmStatus, status_of
 from ...batch import Applied
 from ...changes import Change
 from ...contents.keyed import Keyed
-from ...errors import FenceNotFoundError, HullFencedError, HullUnsuitableError
+from ...errors import (
+    AlarmNotRaisedError,
+    FenceNotFoundError,
+    HullFencedError,
+    HullNotFoundError,
+    HullUnsuitableError,
+)
 from ...hull import Hull
 from ...leg import Leg
+from ...records import NO_TIME
 from ...requests import Request
 from ..events.block import AppendEvents, EventBlock, block_of, joined
 from ..events.sequences import Told
 from ..index.keys_changed import KeysChanged, of_batch, of_expiry
 from ..index.line import Line
 from ..index.subjects import Subjects
+from ..model.fence import Fence
 from ..model.records import Cause, KeptFence, Key
 from ..model.requests import (
     STRUCTURAL,
     Acknowledge,
+    AcknowledgeAlarm,
     AnyFenceRequest,
     CreateFence,
     DeleteConsumer,
     DeleteFence,
+    MuteAlarm,
     PassTime,
     ReadFence,
     ReplaceFence,
     TrimEvents,
 )
+from .alarms import deleted as clear_deleted
+from .alarms import look, put_standing
 from .comparison import EXPIRY, Comparison, Ground
 from .consumers import drop_consumer, drop_events, put_consumer
 from .deadlines import pass_time
@@ -106,6 +120,13 @@ class FencePart:
         for line in self.lines:
             line.admit(hull)
 
+    def created(self, hull: Hull, now: int) -> None:
+        """Raise alarms for a new hull, which is empty."""
+        for line in self.lines:
+            for fence, watched in line.watching([hull.name]):
+                self._comparison.applied = True
+                look(self._comparison.leg(fence), watched, Cause.APPEARED, now)
+
     def wrote(self, leg: Leg, hull: Hull, applied: Applied | None, now: int) -> None:
         """Make the events of a batch; None where it was refused."""
         if applied is None:
@@ -140,16 +161,21 @@ class FencePart:
         found = {hull.name: each for hull, each in changed.items()}
         self._comparison.compare(list(changed), now, EXPIRY if expiry else None, found)
 
-    def require_free(self, name: str) -> None:
-        """Raise HullFencedError if a fence depends on the hull, other than by a prefix."""
+    def require_free(self, name: str, *, prefixes: bool = False) -> None:
+        """Raise HullFencedError if a fence or an alarm depends on the hull, an alarm by a prefix too if `prefixes`."""
         for line in self.lines:
             for fence in line.fences.values():
                 config = fence.row.config
                 if name == config.area_hull or (config.kind != "prefix" and name == config.subjects):
-                    raise HullFencedError(name, fence.name)
+                    raise HullFencedError(name, unmarked(fence.name), "fence" if fence.watched is None else "alarm")
+                if prefixes and fence.watched is not None and name in fence.watched.of:
+                    raise HullFencedError(name, unmarked(fence.name), "fence" if fence.watched is None else "alarm")
 
     def hull_deleted(self, name: str, now: int) -> None:
-        """The keys of a deleted hull leave the fences with its prefix."""
+        """The keys of a deleted hull leave the fences with its prefix, and alarms are cleared for it."""
+        for fence, watched in [each for line in self.lines for each in line.watching([name])]:
+            self._comparison.applied = True
+            clear_deleted(self._comparison.leg(fence), watched, now)
         for subjects in [line.subjects[name] for line in self.lines if name in line.subjects]:
             for fence in subjects.fences.values():
                 leg = self._comparison.leg(fence)
@@ -189,9 +215,25 @@ class FencePart:
                 return 0
             case TrimEvents():
                 drop_events(request, comparison.leg(fence))
+            case AcknowledgeAlarm() | MuteAlarm():
+                return self._put_standing(request, fence)
             case _:
                 assert_never(request)
         return None
+
+    def _put_standing(self, request: AcknowledgeAlarm | MuteAlarm, fence: Fence) -> AlarmStatus:
+        watched = None if fence.watched is None else fence.watched.of.get(request.hull)
+        if watched is None:
+            raise HullNotFoundError(request.hull)
+        leg = self._comparison.leg(fence)
+        if isinstance(request, MuteAlarm):
+            put_standing(leg, watched, muted=request.until if request.until > request.time else NO_TIME)
+        elif not watched.raised:
+            raise AlarmNotRaisedError(unmarked(fence.name), request.hull)
+        else:
+            put_standing(leg, watched, acknowledged=leg.time(request.time))
+        self._comparison.applied = True
+        return status_of(watched, request.time)
 
     # After the requests
 
@@ -253,9 +295,12 @@ class FencePart:
         return touched
 
     def pairs(self) -> set[int]:
-        """The numbers of the fences that compare its hulls as wholes."""
+        """The numbers of the fences that compare its hulls as wholes, and of the alarms at them."""
         return {
-            fence.number for line in self.lines for name in self._ground.hulls for fence in line.pairs.get(name, ())
+            fence.number
+            for line in self.lines
+            for name in self._ground.hulls
+            for fence in (*line.pairs.get(name, ()), *line.alarms.get(name, ()))
         }
 
     def dismiss_deleted(self) -> None:

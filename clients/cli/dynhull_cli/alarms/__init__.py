@@ -1,0 +1,1 @@
+"""`dynhull alarms`: the alarms of a server and their events."""

@@ -1,0 +1,219 @@
+"""An alarm at its hulls: for which it is raised, and when time decides something there."""
+
+from collections.abc import Collection, Iterator, Mapping
+from heapq import heappop, heappush
+from typing import TYPE_CHECKING
+
+from ..batch import NO_POINTS
+from ..records import NO_TIME
+from .conditions import Condition
+from .rule import MICROSECONDS, AlarmRule
+from .values import sign_of, value_of
+
+if TYPE_CHECKING:
+    from dynhull.arrays import Points
+
+    from ..fences.model.records import Delay, Subject
+    from ..hull import Hull
+
+
+class Watched:
+    """An alarm at one hull.
+
+    Args:
+        rule: the rule of the alarm.
+        hull: the hull.
+        moved: the time of its last change, in microseconds since 1970.
+
+    Attributes:
+        hull: the hull.
+        raised: whether the alarm is raised for it.
+        standing: since when and why the condition holds, who has acknowledged it, and until when it is muted; None for
+            nothing of that.
+        moved: the time of the last change of the hull.
+        planned: when it is planned to look at it, None if it is not.
+        fresh: whether it has not been compared so far.
+    """
+
+    __slots__ = ("_changes", "_points", "_rule", "_vertices", "fresh", "hull", "moved", "planned", "raised", "standing")
+
+    def __init__(self, rule: AlarmRule, hull: "Hull", moved: int) -> None:
+        self.hull = hull
+        self.raised = False
+        self.standing: Delay | None = None
+        self.moved = moved
+        self.planned: int | None = None
+        self.fresh = True
+        self._rule = rule
+        self._vertices = NO_POINTS
+        self._look()
+
+    def _look(self) -> None:
+        state = self.hull.state
+        self._changes, self._points = state.hull.changes, state.counts.points
+        if self._rule.silence:
+            self._points = state.counts.revision  # whatever it has changed
+        elif not self._rule.of_points:
+            self._vertices = state.vertices()
+
+    @property
+    def waits(self) -> bool:
+        """Whether the condition holds, but not yet for long enough."""
+        return self.standing is not None and self.standing.enters
+
+    @property
+    def due(self) -> int | None:
+        """When time raises the alarm, None if that does not happen by itself."""
+        if self.raised:
+            return None
+        if self._rule.silence:
+            return self.moved + self._rule.silence
+        if self.standing is not None and self.standing.enters:
+            return self.standing.since + self._rule.hold
+        return None
+
+    def changed(self) -> "tuple[Points, int] | None":
+        """The vertices and the number of points before, if they have changed since this was last asked; else None."""
+        if not self._differs:
+            return None
+        before = self._vertices, self._points
+        self._look()
+        return before
+
+    def touched(self, now: int) -> bool:
+        """Whether a new revision of the hull may mean anything for the alarm: as a rule it does not."""
+        if self.fresh or not self._rule.silence:
+            return self.fresh or self._differs
+        if self.raised or not self._differs:
+            return self._differs
+        self.moved, self._points = max(self.moved, now), self.hull.state.counts.revision
+        return False
+
+    @property
+    def _differs(self) -> bool:
+        state = self.hull.state
+        if self._rule.silence:
+            return state.counts.revision != self._points
+        if self._rule.of_points:
+            return state.counts.points != self._points
+        return state.hull.changes != self._changes
+
+    def holds(self, condition: Condition) -> bool:
+        """Whether a condition of the rule holds for the hull as it was last looked at."""
+        if self._rule.of_points:
+            return condition.holds((self._points > condition.limit) - (self._points < condition.limit))
+        geographic = self.hull.row.settings.geographic
+        return condition.holds(sign_of(self._vertices, condition, geographic=geographic))
+
+    def value(self, before: "tuple[Points, int] | None" = None) -> float:
+        """The measure as it was last looked at, or of vertices and a number of points before."""
+        vertices, points = (self._vertices, self._points) if before is None else before
+        if self._rule.of_points:
+            return float(points)
+        return value_of(vertices, self._rule.raises.measure, geographic=self.hull.row.settings.geographic)
+
+    @property
+    def of_silence(self) -> bool:
+        """Whether the alarm is about silence, and not about a measure."""
+        return self._rule.silence > 0
+
+    def silent(self, now: int) -> float:
+        """The seconds since the last change of the hull."""
+        return max(now - self.moved, 0) / MICROSECONDS
+
+
+class WatchedHulls:
+    """An alarm at all of its hulls.
+
+    Args:
+        rule: the rule of the alarm.
+        created: the time of its creation, in microseconds since 1970: for hulls of which no commit is known.
+
+    Attributes:
+        of: the hulls by name.
+        raised: those for which the alarm is raised, by name.
+    """
+
+    def __init__(self, rule: AlarmRule, created: int) -> None:
+        self.of: dict[str, Watched] = {}
+        self.raised: dict[str, Watched] = {}
+        self._rule = rule
+        self._created = created
+        # A heap of times and names. An entry is outdated if the hull has another plan, and may be too early.
+        self._due: list[tuple[int, str]] = []
+
+    def __len__(self) -> int:
+        return len(self.of)
+
+    def add(self, hull: "Hull", moved: int | None = None) -> Watched:
+        """Watch a hull that has changed at that time last; None for its last commit."""
+        if moved is None:
+            moved = self._created if hull.committed is None else hull.committed.time
+        watched = self.of[hull.name] = Watched(self._rule, hull, moved)
+        return watched
+
+    def remove(self, name: str) -> None:
+        """Watch a hull no longer, which is deleted."""
+        del self.of[name]
+        self.raised.pop(name, None)
+
+    def put_raised(self, watched: Watched, *, raised: bool) -> None:
+        """Say whether the alarm is raised for a hull."""
+        watched.raised = raised
+        if raised:
+            self.raised[watched.hull.name] = watched
+        else:
+            self.raised.pop(watched.hull.name, None)
+
+    def renewed(self) -> "WatchedHulls":
+        """The same hulls as they are now, of which nothing is known otherwise."""
+        found = WatchedHulls(self._rule, self._created)
+        for each in self.of.values():
+            found.add(each.hull, None if each.hull.committed is not None else each.moved)
+        return found
+
+    def restore(self, raised: Collection[str], standings: "Mapping[Subject, Delay]") -> None:
+        """Take over for which hulls the alarm is raised, and what is known there."""
+        for name, watched in self.of.items():
+            self.put_raised(watched, raised=name in raised)
+            watched.standing = standings.get((name, ""))
+            watched.fresh = False
+            self.plan(watched)
+
+    def plan(self, watched: Watched) -> None:
+        """Plan when time raises the alarm for a hull."""
+        due = watched.due
+        if due is not None and (watched.planned is None or due < watched.planned):
+            watched.planned = due
+            heappush(self._due, (due, watched.hull.name))
+
+    @property
+    def first_due(self) -> int | None:
+        """When time raises the alarm for a hull next, or earlier; None if it does not."""
+        while self._due:
+            time, name = self._due[0]
+            watched = self.of.get(name)
+            if watched is not None and watched.planned == time:
+                if watched.due == time:
+                    return time
+                watched.planned = None
+            heappop(self._due)
+            if watched is not None:
+                self.plan(watched)
+        return None
+
+    def take(self, now: int, most: int) -> Iterator[Watched]:
+        """At most that many hulls for which time raises the alarm now."""
+        for _ in range(most):
+            due = self.first_due
+            if due is None or due > now:
+                return
+            _, name = heappop(self._due)
+            watched = self.of[name]
+            watched.planned = None
+            yield watched
+
+    @property
+    def newest(self) -> int:
+        """Since when the condition holds that holds shortest; NO_TIME if none does. O(n)."""
+        return max((each.standing.since for each in self.of.values() if each.standing is not None), default=NO_TIME)

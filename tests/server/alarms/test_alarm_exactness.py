@@ -1,0 +1,113 @@
+"""Alarms are decided as exact rationals of the points decide: also where a measure is the bound, to the last bit."""
+
+import random
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import combinations, pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from live_engine import LIMITS
+
+from dynhull import convex_hull
+from dynhull_server.state.alarms.rule import AlarmRule, marked
+from dynhull_server.state.batch import KeyedBatch, Write
+from dynhull_server.state.core import Core
+from dynhull_server.state.events import Commit, Committed, Compute, Computed
+from dynhull_server.state.fences.events.block import AppendEvents
+from dynhull_server.state.fences.model.config import FenceConfig
+from dynhull_server.state.fences.model.records import EventType
+from dynhull_server.state.fences.model.requests import CreateFence
+from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import Birth, CreateHull, WriteBatch
+
+KEYS = 5
+BATCHES = 150
+CREATED = Birth("uid", 0.0)
+Corner = tuple[Fraction, Fraction]
+
+
+class Everyone:
+    """Receives all answers."""
+
+    def answer(self, request: Any) -> None:
+        assert request.error is None
+
+
+class Life:
+    """A core whose commits succeed; it keeps whether an alarm was raised or cleared, and at which revision."""
+
+    def __init__(self) -> None:
+        self.core = Core(LIMITS)
+        self.made: list[tuple[bool, int]] = []
+
+    def step(self, event: Any) -> None:
+        for effect in self.core.step(event):
+            if isinstance(effect, Compute):
+                effect.ticket.run()
+                self.step(Computed(effect.ticket))
+            if isinstance(effect, Commit) and effect.ticket is not None:
+                for change in effect.changes:
+                    if isinstance(change, AppendEvents):
+                        (events,) = change.block.by_fence().values()
+                        self.made += [(event.type is EventType.BEGIN, event.subject_revision) for event in events]
+                self.step(Committed(effect.ticket))
+
+
+def squared(measure: str, corners: list[Corner]) -> Fraction:
+    """The area, or the square of another measure."""
+    sides = list(pairwise([*corners, corners[0]])) if corners else []
+    if measure == "area":
+        return sum((ax * by - bx * ay for (ax, ay), (bx, by) in sides), Fraction(0)) / 2
+    if measure == "diameter":
+        return max(
+            ((ax - bx) ** 2 + (ay - by) ** 2 for (ax, ay), (bx, by) in combinations(corners, 2)), default=Fraction(0)
+        )
+    if len(corners) < 3:
+        return Fraction(0)
+    heights = (
+        (max((bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in corners) ** 2, (bx - ax) ** 2 + (by - ay) ** 2)
+        for (ax, ay), (bx, by) in sides
+    )
+    return min(height / length for height, length in heights)
+
+
+def batches(dice: random.Random, scale: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Moves on a small grid, whose measures come again and again, and now and then a last bit beside it."""
+    for _ in range(BATCHES):
+        keys = np.array(sorted(dice.sample(range(KEYS), dice.randrange(1, 3))), np.uint64)
+        points = np.array([[dice.randint(-2, 2) * scale, dice.randint(-2, 2) * scale] for _ in keys])
+        if dice.random() < 0.3:
+            points[0, 0] = np.nextafter(points[0, 0], dice.choice([-9, 9]))
+        yield keys, points
+
+
+@pytest.mark.parametrize("measure", ["area", "diameter", "width"])
+@pytest.mark.parametrize(("op", "scale"), [(">", 1.0), (">=", 0.5), ("<", 2.0**-400), ("<=", 3.0)])
+def test_events_are_those_of_exact_rationals(measure: str, op: str, scale: float) -> None:
+    dice = random.Random(f"{measure} {op}")
+    # Attained by many hulls of the grid: a square of 2 by 2, the side of 4, and the height of a triangle.
+    bound = {"area": 4 * scale * scale, "diameter": 4 * scale, "width": 2 * scale}[measure]
+    exact = Fraction(bound) if measure == "area" else Fraction(bound) ** 2
+    rule = AlarmRule(f"{measure} {op} {bound!r}", str(AlarmRule(f"{measure} {op} {bound!r}", "").raises.opposite))
+    life, positions, expected, attained = Life(), {}, [], 0
+    life.step(CreateHull(Everyone(), "fleet", CREATED, HullSettings("int")))
+    life.step(CreateFence(Everyone(), marked("size"), 0, FenceConfig(rule, "other", "fleet"), CREATED))
+    raised = op.startswith("<")
+    expected = [(True, 0)] if raised else []
+    for revision, (keys, points) in enumerate(batches(dice, scale), start=1):
+        life.step(
+            WriteBatch(Everyone(), Write("fleet", KeyedBatch("int", keys, points, keys[:0]), revision, len(keys)))
+        )
+        positions.update(zip(keys.tolist(), points.tolist(), strict=True))
+        corners = [(Fraction(x), Fraction(y)) for x, y in convex_hull(np.array(list(positions.values()))).tolist()]
+        value = squared(measure, corners)
+        attained += value == exact
+        holds = {">": value > exact, ">=": value >= exact, "<": value < exact, "<=": value <= exact}[op]
+        if holds != raised:
+            raised = holds
+            expected.append((raised, revision))
+    assert life.made == expected
+    assert len(expected) > 3
+    assert attained > 0
