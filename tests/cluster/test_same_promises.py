@@ -3,11 +3,15 @@
 import importlib.util
 import re
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 from server_process import SHAPES, server_process
+
+from dynhull_client import HullClient, HullUnsuitableError, InvalidRequestError
+from dynhull_cluster.placement import worker_of
 
 FOLDER = Path(__file__).parents[1] / "server"
 
@@ -20,10 +24,11 @@ def loaded(name: str) -> ModuleType:
     return module
 
 
-fixtures, hulls, query, resume, stream, watch = map(
+fixtures, alarms, hulls, query, resume, stream, watch = map(
     loaded,
     (
         "conftest",
+        "alarms/test_alarms",
         "writes/test_hulls",
         "reads/test_query",
         "watches/test_resume",
@@ -48,6 +53,8 @@ def name(request: pytest.FixtureRequest) -> str:
 channel, stub, client, hull = fixtures.channel, fixtures.stub, fixtures.client, fixtures.hull
 filled = query.filled
 
+test_an_alarm_is_raised_and_cleared = alarms.test_an_alarm_is_raised_and_cleared_with_hysteresis
+test_consumers_of_alarms_have_their_places = alarms.test_consumers_have_their_places
 test_what_a_batch_did = hulls.test_what_a_batch_did
 test_an_ingest_answers_once = hulls.test_an_ingest_answers_once
 test_pages = hulls.test_pages
@@ -62,3 +69,19 @@ test_a_gap_is_refused_with_the_number_expected = stream.test_a_gap_is_refused_wi
 test_removed_and_added_stand_in_boundary_order = watch.test_removed_and_added_stand_in_boundary_order
 test_progress_while_quiet = watch.test_progress_while_quiet
 test_a_deleted_hull_ends_its_watches = watch.test_a_deleted_hull_ends_its_watches
+
+
+def test_an_alarm_is_with_the_worker_of_its_hulls(client: HullClient, name: str) -> None:
+    client.create_hull(name)
+    apart = next(
+        f"elsewhere-{number}" for number in count() if worker_of(f"elsewhere-{number}", 2) != worker_of(name, 2)
+    )
+    with pytest.raises(HullUnsuitableError) as refused:
+        client.create_alarm(apart, hull=name, when="area > 1")
+    assert refused.value.reason == "HULLS_APART"
+    with pytest.raises(InvalidRequestError, match='a prefix has a "/"'):
+        client.create_alarm(name, prefix="all", when="area > 1")
+    for each in (name, apart):
+        client.create_alarm(each, prefix=f"{each}/", when="area > 1")
+    assert {name, apart} <= {each.name for each in client.list_alarms()}
+    assert [each.name for each in client.list_alarms(apart)] == [apart]

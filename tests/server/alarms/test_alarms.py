@@ -76,7 +76,12 @@ def test_an_alarm_is_raised_and_cleared_with_hysteresis(client: HullClient, name
     for side in (2, 3, 2.5, 2, 4, 1, 3):
         square(client, name, side)
     events = seen(client, name)
-    assert told(events) == [("raised", name, 2, 9.0), ("cleared", name, 6, 1.0), ("raised", name, 7, 9.0)]
+    assert [(event.type, event.revision, event.value) for event in events] == [
+        ("raised", 2, 9.0),
+        ("cleared", 6, 1.0),
+        ("raised", 7, 9.0),
+    ]
+    assert {event.hull for event in events} == {name}
     assert [(event.bound, event.previous) for event in events] == [(9.0, 4.0), (4.0, 16.0), (9.0, 1.0)]
     assert [event.sequence for event in events] == [1, 2, 3]
     assert all(event.cause == {"batch"} and event.cause_revision == event.revision for event in events)
