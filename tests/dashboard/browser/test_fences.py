@@ -7,7 +7,6 @@ from itertools import count
 from pathlib import Path
 
 import pytest
-from chromium import chromium
 from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import PATIENCE, until, wait_until
@@ -19,17 +18,11 @@ from server_process import Server, run, server_process
 from dynhull_client import AsyncHullClient, Circle, HullClient, Polygon
 from dynhull_dashboard.fence_feed import FenceFeed
 
+pytestmark = pytest.mark.long  # first, so that one worker, and one browser, has all of them
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 YARD = Polygon([[0, 0], [10, 0], [10, 10], [0, 10]], ([[4, 4], [6, 4], [6, 6], [4, 6]],))
 NUMBERS = count(1)
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A real Chromium."""
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")
@@ -292,7 +285,6 @@ def test_events_that_were_dropped_while_the_server_was_away(
         expect(table_row(page, fence).locator("td").nth(2)).to_have_text("11 of 13")
 
 
-@pytest.mark.long
 @pytest.mark.one_process("the fence and its hulls have no first part of their names in common")
 def test_from_no_fence_to_one_whose_server_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:
     kept = "--data", str(tmp_path), "--port", str(free_port())

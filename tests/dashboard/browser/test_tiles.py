@@ -9,7 +9,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 import pytest
-from chromium import chromium
 from command_line import dynhull
 from dashboard_process import dashboard_process, opened
 from patience import PATIENCE
@@ -19,6 +18,7 @@ from playwright.sync_api import Browser, Page, expect
 from dynhull_client import HullClient
 from dynhull_dashboard.tiles import Tiles
 
+pytestmark = pytest.mark.long  # first, so that one worker, and one browser, has all of them
 ATTRIBUTION = "© <nobody>"
 PIXELS, FIELD = 256, 10  # of a tile, and the degrees of a field of the chessboard that is on the map
 
@@ -76,12 +76,6 @@ def serving(server: TileServer) -> Iterator[TileServer]:
         yield server
         server.shutdown()
         thread.join()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 def wait_for_tiles(page: Page) -> None:

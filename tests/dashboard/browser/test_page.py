@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chromium import chromium
 from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
@@ -19,6 +18,7 @@ from server_process import Server, run, server_process
 from dynhull import GeoHull
 from dynhull_client import HullClient
 
+pytestmark = pytest.mark.long  # first, so that one worker, and one browser, has all of them
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
 
@@ -52,13 +52,6 @@ INSIDE = """([name, columns, rows]) => {
         }
     return found
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A real Chromium."""
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")
@@ -643,7 +636,6 @@ def test_the_hull_is_verified_when_asked_to(browser: Browser, url: str, client: 
         expect(state).to_contain_text("✓ equal at revision 2,")
 
 
-@pytest.mark.long
 def test_each_empty_state_says_what_to_do(browser: Browser, tmp_path: Path) -> None:
     points = tmp_path / "points.csv"
     points.write_text("x,y\n0,0\n4,0\n4,4\n")
