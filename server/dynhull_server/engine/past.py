@@ -1,11 +1,13 @@
 """Hulls as they were: rebuilt from a stored state and the batches after it, in short steps beside the writes."""
 
 import asyncio
+from collections import Counter
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager, asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
+from weakref import WeakValueDictionary
 
 from ..state.core import SMALL
 from ..state.errors import (
@@ -24,7 +26,7 @@ from ..state.hull_state import Counts, HullState
 from ..state.records import CommitStamp, Keys, Record
 from ..state.root_state import state_of
 from ..state.tracks import Moves, Tracker
-from ..storage.past import Moment, Past, created
+from ..storage.past import Hole, Moment, Past, created
 from .divided_hull import DividedHull
 from .driver import Driver
 from .fences import Fences
@@ -32,6 +34,7 @@ from .live_hull import LiveHull
 from .recalls import UNREADABLE, Recalls
 
 T = TypeVar("T")
+Outcome = Literal["anew", "kept", "unreadable"]
 # Holds a place of those who may rebuild at the same time.
 Place = Callable[[], AbstractContextManager[None]]
 
@@ -58,6 +61,9 @@ class PastHulls:
         past: keeps the past.
         keeps: whether anything is kept.
         max_rows: the number of points and of rows of batches that one read may rebuild, and that are kept.
+
+    Attributes:
+        outcomes: how often a hull was rebuilt anew, or from one that was kept; and how often it could not be read.
     """
 
     def __init__(self, driver: Driver, past: Past, *, keeps: bool, max_rows: int) -> None:
@@ -66,6 +72,8 @@ class PastHulls:
         self._keeps = keeps
         self._max_rows = max_rows
         self._kept: list[_Rebuilt] = []  # the last used at the end
+        self._turns: WeakValueDictionary[tuple[int, int], asyncio.Lock] = WeakValueDictionary()
+        self.outcomes: Counter[Outcome] = Counter()
 
     async def moment(self, live: LiveHull, revision: int | None, time: int, field: str = "at_") -> Moment:
         """The revision that is asked for: a number, or None for the last one committed at or before a time.
@@ -100,20 +108,21 @@ class PastHulls:
 
     @asynccontextmanager
     async def state(self, hull: Hull, revision: int) -> AsyncIterator[HullState]:
-        """The state of a hull at a revision, for one reader at a time.
+        """The state of a hull at a revision, for one reader at a time: others wait for it, rather than rebuild it, too.
 
         Raises:
             LimitExceededError: it would take too many rows.
             RevisionForgottenError: what it takes is not kept any more.
         """
-        rebuilt = await self._reach(hull, revision)
-        try:
-            yield rebuilt.state
-        except RefusedError:
+        async with self._turns.setdefault((hull.row.number, revision), asyncio.Lock()):
+            rebuilt = await self._reach(hull, revision)
+            try:
+                yield rebuilt.state
+            except RefusedError:
+                self._keep(rebuilt)
+                raise
+            # After any other end a thread may still read it.
             self._keep(rebuilt)
-            raise
-        # After any other end a thread may still read it.
-        self._keep(rebuilt)
 
     async def own(self, hull: Hull, revision: int) -> HullState:
         """The state of a hull at a revision, for one who changes it. Raises the errors of `state`."""
@@ -185,6 +194,7 @@ class PastHulls:
     async def _reach(self, hull: Hull, revision: int) -> _Rebuilt:
         """A hull at a revision, from a kept one or anew."""
         rebuilt = self._take(hull, revision)
+        self.outcomes["anew" if rebuilt is None else "kept"] += 1
         if rebuilt is None:
             rebuilt = await self._begin(hull, revision)
         while rebuilt.state.counts.revision < revision:
@@ -262,7 +272,13 @@ class PastHulls:
         except KeyError:
             raise HullNotFoundError(name) from None
         except UNREADABLE as error:
+            self.outcomes["unreadable"] += 1
             raise NotStoredError(words_for_callers(error)) from error
+
+    async def holes(self) -> list[Hole]:
+        """What of the past of hulls could not be read when it was last needed."""
+        found: list[Hole] = await self._driver.rebuild(self._past.holes)
+        return found
 
 
 def _forgotten(live: LiveHull, revision: int, oldest: Moment, field: str) -> RevisionForgottenError:

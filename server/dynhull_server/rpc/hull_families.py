@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
@@ -18,11 +18,13 @@ from prometheus_client.metrics_core import Metric
 from ..engine.driver import Driver
 from ..engine.hulls import Hulls
 from ..engine.measures import HullMeasures
+from ..engine.past import Outcome
 from ..engine.series import KeptSeries
 from ..engine.server_time import MICROSECONDS
 from ..engine.steps import Slices
 from ..state.errors import HullNotFoundError
 from ..state.hull import Hull
+from ..storage.past import Hole
 
 # The number of largest hulls with metrics of their own; for all hulls there would be too many for Prometheus.
 NAMED_HULLS = 100
@@ -106,7 +108,7 @@ class HullFamilies:
         measured = [(hull.name, hull.row.settings.geographic, each) for hull, each in present]
         largest = [hull for *_, hull in sorted(survey.largest, reverse=True) if hull not in self._measured]
         sizes = [(hull.name, hull.counts.points, hull.vertex_count) for hull in largest]
-        sums = self._sums(survey)
+        sums = [*self._sums(survey), *self._past(await self._hulls.pasts.holes())]
         return chain(sums, _sizes(measured, sizes), _measures(measured) if self._prefixes else ())
 
     def _sums(self, survey: _Survey) -> list[Metric]:
@@ -124,6 +126,27 @@ class HullFamilies:
             left_out = "Hulls under --metrics-prefix without measures here: there are more than --metrics-hulls."
             sums.append(GaugeMetricFamily("dynhull_metrics_hulls_left_out", left_out, value=survey.left_out))
         return sums
+
+    def _past(self, holes: Sequence[Hole]) -> Iterator[Metric]:
+        """How the past was read, and what could not be."""
+        rebuilt = CounterMetricFamily(
+            "dynhull_past_reads",
+            "Hulls rebuilt as they were: anew, or from one that was kept; and reads that failed.",
+            labels=["outcome"],
+        )
+        for outcome in get_args(Outcome):
+            rebuilt.add_metric([outcome], self._hulls.pasts.outcomes[outcome])
+        yield rebuilt
+        missing = GaugeMetricFamily(
+            "dynhull_past_holes",
+            "1 for revisions of the past that could not be read when they were last needed.",
+            labels=["hull", "first", "last"],
+        )
+        names = {hull.row.number: hull.name for hull in self._driver.core.hulls.values()} if holes else {}
+        for hole in holes:
+            if hole.number in names:
+                missing.add_metric([names[hole.number], str(hole.first), str(hole.last)], 1)
+        yield missing
 
     async def _survey(self) -> _Survey:
         found, slices = _Survey(), Slices()

@@ -22,7 +22,7 @@ from ..state.fences.model.records import (
 )
 from ..state.records import Append, CommitStamp, Create, Delete, HullRow, Kept, Keys, Record
 from .of_keys import batches_of_keys, contents_of_keys
-from .past import Moment, StoredHistory, created
+from .past import Hole, Moment, StoredHistory, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 
 KEPT_SNAPSHOTS = 2
@@ -190,6 +190,10 @@ class MemoryStorage:
             hull = self._hulls[number]
             committed = hull.records[-1].committed if hull.records else first.committed
             return StoredHistory(first, Moment(hull.last, committed))
+
+    def holes(self) -> list[Hole]:
+        """None: memory does not fail."""
+        return []
 
     def why_no_history(self) -> str:
         """It keeps nothing on a disk."""

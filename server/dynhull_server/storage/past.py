@@ -41,6 +41,20 @@ class StoredHistory:
     moves: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """Revisions of the past of a hull that could not be read when they were last needed.
+
+    Attributes:
+        number: the number of the hull.
+        first, last: the revisions.
+    """
+
+    number: int
+    first: int
+    last: int
+
+
 class Past(Protocol):
     """Reads hulls as they were, from a state and the batches after it.
 
@@ -88,3 +102,6 @@ class Past(Protocol):
 
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""
+
+    def holes(self) -> list[Hole]:
+        """What could not be read of hulls that are there, when it was last needed."""

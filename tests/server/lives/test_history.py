@@ -1,16 +1,18 @@
 """The past of hulls that keep theirs, as clients of real processes see it: how much is there, and that it survives."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
 from cases import with_all_cases
 from command_line import dynhull
+from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from server_process import server_process, shape_options
 
-from dynhull_client import HullClient, HullUnsuitableError, InvalidRequestError
+from dynhull_client import DynhullError, HullClient, HullUnsuitableError, InvalidRequestError
 from dynhull_server.state.records import KeyRows
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -38,6 +40,33 @@ def write_until_filed(client, name, batches):
 
     wait_until(filed)
     return revision
+
+
+def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_path):
+    with measured("--data", str(tmp_path), *SNAPSHOTS) as (server, metrics), HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="str", history="30d")
+        write_until_filed(client, "fleet", 1)
+        with ThreadPoolExecutor(8) as threads:
+            pasts = list(threads.map(lambda _: client.at("fleet", 2).positions(KEYS).positions.tolist(), range(8)))
+        assert all(each == positions(2).tolist() for each in pasts)
+        found = scrape(metrics)
+        assert found['dynhull_past_reads_total{outcome="anew"}'] == 1
+        assert found['dynhull_past_reads_total{outcome="kept"}'] >= 15
+        assert not [name for name in found if name.startswith("dynhull_past_holes")]
+
+        write_until_filed(client, "fleet", client.history("fleet").batches + 1)
+        newest = max(tmp_path.rglob("*.batches.parquet"))  # nobody has read it
+        first, last, _ = newest.name.split("-")
+        content = newest.read_bytes()
+        newest.unlink()
+        with pytest.raises(DynhullError, match=f"revisions {int(first)} to {int(last)} cannot be read"):
+            client.at("fleet", int(first))
+        found = scrape(metrics)
+        assert found[f'dynhull_past_holes{{first="{int(first)}",hull="fleet",last="{int(last)}"}}'] == 1
+        assert found['dynhull_past_reads_total{outcome="unreadable"}'] >= 1
+        newest.write_bytes(content)
+        assert client.at("fleet", int(first)).positions(KEYS).positions.tolist() == positions(int(first)).tolist()
+        assert not [name for name in scrape(metrics) if name.startswith("dynhull_past_holes")]
 
 
 def test_how_much_is_kept_is_told_changed_and_lost_with_the_hull(tmp_path):

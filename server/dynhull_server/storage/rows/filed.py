@@ -1,7 +1,7 @@
 """Reading hulls as they were before what the journal has: from segments."""
 
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
@@ -10,8 +10,8 @@ from dynhull.keys import key_list
 
 from ...state.records import CommitStamp, Kept, Keys, Record
 from ..of_keys import batches_of_keys
-from ..past import Moment, created
-from ..port import DamagedError
+from ..past import Hole, Moment, created
+from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.columns import Batches, contents_of
 from ..segments.gathered import gathered
@@ -29,10 +29,14 @@ class Filed:
 
     Args:
         archive: has their files.
+
+    Attributes:
+        unreadable: the names of the files that could not be read when they were last needed.
     """
 
     def __init__(self, archive: Archive) -> None:
         self._archive = archive
+        self.unreadable: set[str] = set()
         self._turn = Lock()
         self._open: OrderedDict[str, Batches] = OrderedDict()
 
@@ -68,8 +72,7 @@ class Filed:
 
     def state(self, hull: HullRows, until: int) -> Kept:
         """The newest state that lies beside a segment and is not after a revision."""
-        segment = _begins(hull, until)
-        return Kept() if segment.first == 1 else read_state(self._archive, segment)
+        return self._read_state(_begins(hull, until), None)
 
     def batches(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """Some batches after a revision: no more than one segment has."""
@@ -82,14 +85,13 @@ class Filed:
 
     def key_state(self, hull: HullRows, keys: Keys, until: int) -> Kept:
         """The newest state that lies beside a segment, with the points of some keys alone."""
-        segment = _begins(hull, until)
-        return Kept() if segment.first == 1 else read_state(self._archive, segment, keys)
+        return self._read_state(_begins(hull, until), keys)
 
     def key_batches(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
         """What the batches of one segment do to some keys, from a revision on."""
         segment = _segment(hull, after + 1)
         name, facts = segment.file + BATCHES, segment.facts
-        with naming_revisions(segment):
+        with self._noted(segment, BATCHES):
             columns, _, _ = keys_from_parquet(self._archive.read(name, facts.bytes, facts.digest), name, keys)
         last = min(until, segment.last)
         return list(batches_of_keys(Batches(columns).between(after, last), set(key_list(keys)))), last
@@ -100,13 +102,33 @@ class Filed:
             if batches is not None:
                 self._open.move_to_end(segment.file)
                 return batches
-        with naming_revisions(segment):
+        with self._noted(segment, BATCHES):
             batches = read_batches(self._archive, segment)
         with self._turn:
             self._open[segment.file] = batches
             while len(self._open) > KEPT_OPEN:
                 self._open.popitem(last=False)
         return batches
+
+    def _read_state(self, segment: StoredSegment, keys: Keys | None) -> Kept:
+        if segment.first == 1:
+            return Kept()
+        with self._noted(segment, STATE):
+            return read_state(self._archive, segment, keys)
+
+    @contextmanager
+    def _noted(self, segment: StoredSegment, end: str) -> Iterator[None]:
+        """Say which revisions cannot be read without a file, and take note of whether it can."""
+        file, first, last = segment.file + end, segment.first, segment.last
+        what = f"revisions {first} to {last}" if end == BATCHES else f"the state at revision {first - 1}"
+        try:
+            yield
+        except StorageError as error:
+            with self._turn:
+                self.unreadable.add(file)
+            raise type(error)(f"{what} cannot be read: {error}") from error
+        with self._turn:
+            self.unreadable.discard(file)
 
 
 def read_batches(archive: Archive, segment: StoredSegment) -> Batches:
@@ -131,13 +153,14 @@ def read_state(archive: Archive, segment: StoredSegment, keys: Keys | None = Non
     return replace(kept, revision=segment.first - 1, contents=contents)
 
 
-@contextmanager
-def naming_revisions(segment: StoredSegment) -> Iterator[None]:
-    """An error about the file of a segment says which revisions are in it."""
-    try:
-        yield
-    except DamagedError as error:
-        raise DamagedError(f"revisions {segment.first} to {segment.last} cannot be read: {error}") from error
+def holes(hulls: Mapping[int, HullRows], files: Set[str]) -> Iterator[Hole]:
+    """What is missing of the past of hulls while these files cannot be read."""
+    for number, hull in hulls.items():
+        for segment in hull.segments:
+            if segment.file + BATCHES in files:
+                yield Hole(number, segment.first, segment.last)
+            elif segment.file + STATE in files:
+                yield Hole(number, segment.first - 1, segment.first - 1)
 
 
 def _begins(hull: HullRows, until: int) -> StoredSegment:

@@ -1,5 +1,6 @@
 """What storages on databases have in common: a ledger in memory, and rows that are read as of the same moment."""
 
+import logging
 from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,7 +16,7 @@ from ...state.errors import words
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
 from ...state.records import CommitStamp, HullRow, Kept, Keys, Record
 from ..of_keys import batches_of_keys, contents_of_keys
-from ..past import Moment, StoredHistory, created
+from ..past import Hole, Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from ..segments.archive import NEEDS, Archive, is_installed
 from . import chunks
@@ -24,7 +25,7 @@ from .encoding import weight
 from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
-from .filed import Filed
+from .filed import Filed, holes
 from .filing import oldest_of_all, outdated, read_due
 from .group import (
     Chunk,
@@ -44,6 +45,8 @@ from .past_rows import batches_after, gathered_after, moment_at, oldest_moment, 
 from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader
+
+log = logging.getLogger(__name__)
 
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
 
@@ -154,8 +157,11 @@ class RowStorage(ABC):
     def oldest_moment(self, number: int, *, timed: bool = False) -> Moment:
         """The oldest revision that can be read."""
         with self._of_hull(number) as (reader, hull):
-            found = None if self._filed is None else self._filed.oldest_moment(hull, timed=timed)
-            return found or oldest_moment(reader, hull, timed=timed)
+            return self._oldest_moment(reader, hull, timed=timed)
+
+    def _oldest_moment(self, reader: Reader, hull: HullRows, *, timed: bool) -> Moment:
+        found = None if self._filed is None else self._filed.oldest_moment(hull, timed=timed)
+        return found or oldest_moment(reader, hull, timed=timed)
 
     def moment(self, number: int, time: int) -> Moment | None:
         """The last revision committed at or before a time."""
@@ -287,14 +293,22 @@ class RowStorage(ABC):
 
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""
-        first = self.oldest_moment(number)
         with self._of_hull(number) as (reader, hull):
+            first = self._oldest_moment(reader, hull, timed=False)
             last = Moment(hull.last, commit_of(reader, hull, hull.last) if hull.last else created(hull.row))
             facts = [segment.facts for segment in hull.segments]
             size = sum(segment.size for segment in hull.segments)
             return StoredHistory(
                 first, last, size, sum(each.batches for each in facts), sum(each.moves for each in facts)
             )
+
+    def holes(self) -> list[Hole]:
+        """What could not be read of hulls that are there, when it was last needed."""
+        files = set() if self._filed is None else self._filed.unreadable.copy()
+        if not files:
+            return []
+        with self._visible:
+            return list(holes(self._settled().hulls, files))
 
     def why_no_history(self) -> str:
         """Why it cannot keep what the journal drops."""
@@ -321,7 +335,12 @@ class RowStorage(ABC):
         if archive.most_bytes:
             with self._visible:
                 gone = list(oldest_of_all(self._settled().hulls, archive.most_bytes))
-            yield from (RetireSegment(number, segment) for number, segment in gone)
+            for number, segment in gone:
+                log.warning(
+                    "the past of all hulls is more than --max-history-bytes: the oldest goes",
+                    extra={"hull": number, "first": segment.first, "last": segment.last, "bytes": segment.size},
+                )
+                yield RetireSegment(number, segment)
         yield from self._remove_files(archive)
 
     def _with_past(self) -> list[int]:
