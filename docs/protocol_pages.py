@@ -22,6 +22,7 @@ LABELS = {
 TITLES = {
     "hull_service": "Hulls: calls",
     "hull": "Hulls: messages",
+    "feed": "Feeds: messages",
     "fence_service": "Fences: calls",
     "fence": "Fences: messages",
     "alarm_service": "Alarms: calls",

@@ -31,6 +31,7 @@ from dynhull_server.settings import Settings
 
 from . import worker_link
 from .composed import Composed
+from .merged_feeds import FEED, MergedFeeds
 from .relay import Relay, Route, within
 from .shared_fences import WATCH_FENCE, SharedFences
 from .shared_many import WATCH_MANY, SharedMany
@@ -89,6 +90,7 @@ class Gateway:
         self._watches = SharedWatches(self._relay, metrics)
         self._many = SharedMany(self._relay, metrics, ManyQuotas(settings))
         self._fences = SharedFences(self._relay, metrics)
+        self._feeds = MergedFeeds(self._relay, metrics)
         self._server = grpc_server(settings, shared_port=True)
         self._serving = False
         self._all_well = asyncio.Event()
@@ -176,6 +178,8 @@ class Gateway:
             return self._watches.watch
         if path == WATCH_MANY:
             return self._many.watch
+        if path == FEED:
+            return self._feeds.feed
         if path == WATCH_FENCE:
             return self._fences.watch
         if method.client_streaming:

@@ -199,6 +199,7 @@ class Server:
             ManyQuotas(self._settings),
             pasts,
             Places("max_replays", self._settings.max_replays, self._settings.max_replays_per_caller),
+            Places("max_feeds", self._settings.max_feeds, self._settings.max_feeds_per_caller),
             create_on_write=self._settings.create_on_write,
             max_watch_lag=self._settings.max_watch_lag,
         )

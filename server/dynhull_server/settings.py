@@ -188,6 +188,9 @@ class Settings(BaseModel):
     )
     max_replays_per_caller: int = Field(8, ge=1, description="The same per token, or without tokens per address.")
 
+    max_feeds: int = Field(1_000, ge=1, description="Largest number of simultaneous feeds of batches.")
+    max_feeds_per_caller: int = Field(100, ge=1, description="The same per token, or without tokens per address.")
+
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
     max_alarms: int = Field(100_000, ge=1, description="Largest number of alarms.")
     max_alarm_hulls: int = Field(

@@ -16,6 +16,7 @@ from refusal import refusal
 from dynhull.margin import max_margin
 from dynhull_client import (
     Batch,
+    FeedBatch,
     HullClient,
     HullNotFoundError,
     HullUnsuitableError,
@@ -52,15 +53,16 @@ class Place:
 
 def entry(token: str, prefix: str) -> str:
     digest = sha256(token.encode()).hexdigest()
-    return f'[[token]]\nsha256 = "{digest}"\nread = ["{prefix}"]\nwrite = ["{prefix}"]\n'
+    return f'[[token]]\nsha256 = "{digest}"\nread = ["{prefix}"]\nwrite = ["{prefix}"]\npast = ["{prefix}"]\n'
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    tokens = tmp_path_factory.mktemp("tokens") / "tokens.toml"
+    folder = tmp_path_factory.mktemp("workers")
+    tokens = folder / "tokens.toml"
     tokens.write_text(entry("all", "") + entry("north", "north/"))
     options = ("--workers", "2", "--gateways", "2", "--tokens", str(tokens), "--log-level", "error")
-    options += ("--metrics-prefix", "fleet/")
+    options += ("--metrics-prefix", "fleet/", "--data", str(folder / "data"))
     with measured(*options) as (server, metrics), HullClient(server.address, token="all") as client:
         for name, shift in ((ZERO, 0.0), (ONE, 10.0), (WITH_ONE, 20.0)):
             client.create_hull(name)
@@ -160,6 +162,40 @@ def test_reads_of_all_workers_are_answered_in_order(client: HullClient) -> None:
     assert gap.result().distance == 6.0
     assert isinstance(missing.exception(), HullNotFoundError)
     assert last.result().sides.tolist() == [1]
+
+
+def test_the_feed_of_a_prefix_is_merged_from_all_workers(client: HullClient) -> None:
+    """Each batch once, those of a worker in order, and positions lead on from all of them."""
+    names = [f"{part}/fed-{number}" for part in ("north", "fleet") for number in range(2)]
+    for name in names:
+        client.create_hull(name, keyed="str")
+
+    def write(number: int) -> None:
+        for name in names:
+            client.put(name, [f"k{number}"], [(number, 0)])
+
+    for number in range(3):
+        write(number)
+    seen: list[FeedBatch] = []
+    with client.feed(prefix="", after=0) as feed:
+        while len(seen) < 3 * len(names) or seen[-1].after is None:
+            seen += [each for each in [next(feed)] if each.hull in names]
+        write(3)
+        live: list[FeedBatch] = []
+        while len(live) < len(names):
+            live += [each for each in [next(feed)] if each.hull in names]
+    with client.feed(prefix="", after=seen[-1].after) as again:
+        assert set(names) <= set((next(again).hulls or {}).keys())
+        later = [next(again) for _ in names]
+    for batches in (seen + live, seen + later):
+        for name in names:
+            mine = [each for each in batches if each.hull == name]
+            assert [(each.revision, each.keys) for each in mine] == [(n + 1, (f"k{n}",)) for n in range(4)]
+        for worker in range(2):
+            commits = [each.commit or 0 for each in batches if worker_of(each.hull, 2) == worker]
+            assert commits == sorted(commits)
+    for name in names:
+        client.delete_hull(name)
 
 
 def test_a_refusal_is_told_while_requests_are_sent(place: Place) -> None:

@@ -81,8 +81,16 @@ def test_every_example_of_the_description_works(gateway: Gateway) -> None:
                 for name in fences[1:]:  # all of which need the hull
                     gateway.call("DELETE", f"/fences/{name}")
             for at, body, kind in calls(described, path, operation):
-                if at.endswith("/events"):
-                    events = Events(gateway, f"{at}?after=0" if "fences" in at else at)
+                if at.endswith(("/events", "/feed")):
+                    start = (
+                        "?prefix=fleet&begin=true"
+                        if at == "/feed"
+                        else "?after=0"
+                        if "fences" in at or "/feed" in at
+                        else ""
+                    )
+                    events = Events(gateway, at + start)
+                    assert events.response.status == 200, (at, events.response.read())
                     assert events.next()
                     events.close()
                     continue
@@ -109,7 +117,14 @@ def test_answers_are_as_described(gateway: Gateway, tmp_path: Path) -> None:
     run = subprocess.run(
         [
             *(program, "run", f"{gateway.url}/openapi.json", "--no-color", "--phases", phases),
-            *("--max-examples", EXAMPLES, "--exclude-checks", NOT_CHECKED, "--exclude-path-regex", "/(events|replay)$"),
+            *(
+                "--max-examples",
+                EXAMPLES,
+                "--exclude-checks",
+                NOT_CHECKED,
+                "--exclude-path-regex",
+                "/(events|replay|feed)$",
+            ),
             *("--request-timeout", "60", "--suppress-health-check", "all", *chosen),
         ],
         cwd=tmp_path,

@@ -71,6 +71,7 @@ class LinkedServer(ShellServer):
             ManyQuotas(Settings()),
             Places("max_past_reads", MOST_CALLS, MOST_CALLS),
             Places("max_replays", MOST_CALLS, MOST_CALLS),
+            Places("max_feeds", MOST_CALLS, MOST_CALLS),
             create_on_write=True,
             max_watch_lag=math.inf,
         )

@@ -45,7 +45,7 @@ class Queries:
         self._model = model
         metrics = Metrics()
         quotas = ManyQuotas(Settings())
-        pasts = [Places(limit, MOST_CALLS, MOST_CALLS) for limit in ("max_past_reads", "max_replays")]
+        pasts = [Places(limit, MOST_CALLS, MOST_CALLS) for limit in ("max_past_reads", "max_replays", "max_feeds")]
         self._service = HullService(
             engine.driver, engine.hulls, metrics, quotas, *pasts, create_on_write=False, max_watch_lag=math.inf
         )

@@ -87,6 +87,7 @@ def fences(client: sdk.HullClient) -> None:
     assert_type(client.fence_inside("f"), sdk.Inside)
     assert_type(client.watch_fence("f", "mail", conflate=False), sdk.FenceWatch)
     assert_type(client.fence_events_between("b", "a", 7, "2026-01-01T00:00Z", dwell=2), sdk.FenceEvents)
+    assert_type(client.feed("h", after=0), sdk.Feed)
     assert_type(client.ack_fence("f", "mail", 7), sdk.FenceConsumer)
     client.delete_consumer("f", "mail")
     client.delete_fence("f")

@@ -18,7 +18,7 @@ from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
 from .events import replays
 from .events import routes as events
-from .events.documents import FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
+from .events.documents import FeedBatch, FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
 from .events.shared import SharedWatches
 from .figures import Figures, Measured
 from .gathering import Gatherer
@@ -46,7 +46,7 @@ questions."""
 # What the descriptions of routes refer to by name.
 REFERRED: tuple[type[BaseModel], ...] = (
     *(Problem, Batch, Feature, FeatureCollection, Item),
-    *(HullSnapshot, HullChange, HullProgress, Hulls, FenceEvent),
+    *(HullSnapshot, HullChange, HullProgress, Hulls, FenceEvent, FeedBatch),
 )
 SEEN_BY_PAGES = ["Idempotency-Key", "Last-Event-ID", "Authorization", "Content-Type"]
 

@@ -22,11 +22,20 @@ from ._async_client import AsyncHullClient
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncAlarmWatch, AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
+from ._async_watch import (
+    AsyncAlarmWatch,
+    AsyncFeed,
+    AsyncFenceEvents,
+    AsyncFenceWatch,
+    AsyncManyWatch,
+    AsyncReplay,
+    AsyncWatch,
+)
 from ._async_writer import AsyncWriter
 from ._batch import Batch
 from ._client import HullClient
 from ._errors import *  # noqa: F403  # all of them: `_errors.__all__`
+from ._feed_messages import FeedBatch, FeedHeld
 from ._fence_messages import Fence, FenceConsumer, FenceEvent, Inside, SubjectsInside
 from ._history_messages import History
 from ._hull_copies import HullCopies
@@ -69,7 +78,7 @@ from ._series import Series
 from ._sync_past import Past
 from ._tracks import Track
 from ._uses import Efficient, Measured, Phases, Separation
-from ._watch import AlarmWatch, FenceEvents, FenceWatch, ManyWatch, Replay, Watch
+from ._watch import AlarmWatch, Feed, FenceEvents, FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 __all__ = [
@@ -79,6 +88,7 @@ __all__ = [
     "AlarmWatch",
     "Applied",
     "AsyncAlarmWatch",
+    "AsyncFeed",
     "AsyncFenceEvents",
     "AsyncFenceWatch",
     "AsyncHullClient",
@@ -101,6 +111,9 @@ __all__ = [
     "Efficient",
     "Entities",
     "Event",
+    "Feed",
+    "FeedBatch",
+    "FeedHeld",
     "Fence",
     "FenceConsumer",
     "FenceDifference",

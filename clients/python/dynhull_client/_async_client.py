@@ -6,6 +6,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from . import _alarms as alarms
 from . import _calls as calls
+from . import _feed as feeds
 from . import _fences as fences
 from . import _fences_between as between
 from . import _history as past
@@ -21,7 +22,15 @@ from ._async_connection import AsyncConnection
 from ._async_ingest import AsyncIngest
 from ._async_past import AsyncPast
 from ._async_pipeline import AsyncPipeline
-from ._async_watch import AsyncAlarmWatch, AsyncFenceEvents, AsyncFenceWatch, AsyncManyWatch, AsyncReplay, AsyncWatch
+from ._async_watch import (
+    AsyncAlarmWatch,
+    AsyncFeed,
+    AsyncFenceEvents,
+    AsyncFenceWatch,
+    AsyncManyWatch,
+    AsyncReplay,
+    AsyncWatch,
+)
 from ._async_writer import AsyncWriter
 from ._calls import Call, Pages
 from ._messages import HullInfo
@@ -151,6 +160,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     watch = opening(AsyncWatch, calls.watch)
     replay = opening(AsyncReplay, playing.replay)
     watch_many = opening(AsyncManyWatch, many.watch_many)
+    feed = opening(AsyncFeed, feeds.feed)
     watch_fence = opening(AsyncFenceWatch, fences.watch_fence)
     fence_events_between = opening(AsyncFenceEvents, between.fence_events_between)
     watch_alarm = opening(AsyncAlarmWatch, alarms.watch_alarm)

@@ -16,6 +16,8 @@ from ._async_connection import AsyncConnection, note, unless
 from ._calls import Watching
 from ._connection import client_is_closed
 from ._errors import DynhullError
+from ._feed import Feeding, FeedPlace
+from ._feed_messages import FeedBatch
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
@@ -147,3 +149,10 @@ class AsyncAlarmWatch(AsyncFollower[AlarmEvent]):
 
     def __init__(self, connection: AsyncConnection, watching: WatchingAlarm) -> None:
         super().__init__(connection, AlarmPlace(watching, connection.retries))
+
+
+class AsyncFeed(AsyncFollower[FeedBatch]):
+    """`Feed` for asyncio: an async iterator and an async context manager; another task may call `close`."""
+
+    def __init__(self, connection: AsyncConnection, feeding: Feeding) -> None:
+        super().__init__(connection, FeedPlace(feeding, connection.retries))

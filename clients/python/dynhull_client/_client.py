@@ -6,6 +6,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 
 from . import _alarms as alarms
 from . import _calls as calls
+from . import _feed as feeds
 from . import _fences as fences
 from . import _fences_between as between
 from . import _history as past
@@ -24,7 +25,7 @@ from ._messages import HullInfo
 from ._methods import Client, answer_of, described, documented, opening
 from ._pipeline import Pipeline
 from ._sync_past import Past
-from ._watch import AlarmWatch, FenceEvents, FenceWatch, ManyWatch, Replay, Watch
+from ._watch import AlarmWatch, Feed, FenceEvents, FenceWatch, ManyWatch, Replay, Watch
 from ._writer import Writer
 
 P = ParamSpec("P")
@@ -163,6 +164,7 @@ class HullClient(Client[BlockingConnection]):
     watch = opening(Watch, calls.watch)
     replay = opening(Replay, playing.replay)
     watch_many = opening(ManyWatch, many.watch_many)
+    feed = opening(Feed, feeds.feed)
     watch_fence = opening(FenceWatch, fences.watch_fence)
     fence_events_between = opening(FenceEvents, between.fence_events_between)
     watch_alarm = opening(AlarmWatch, alarms.watch_alarm)

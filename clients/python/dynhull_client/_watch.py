@@ -14,6 +14,8 @@ from ._alarms import WatchingAlarm
 from ._calls import Watching
 from ._connection import BlockingConnection
 from ._errors import DynhullError
+from ._feed import Feeding, FeedPlace
+from ._feed_messages import FeedBatch
 from ._fence_messages import FenceEvent
 from ._fence_place import FencePlace
 from ._fences import WatchingFence
@@ -165,3 +167,14 @@ class AlarmWatch(Follower[AlarmEvent]):
 
     def __init__(self, connection: BlockingConnection, watching: WatchingAlarm) -> None:
         super().__init__(connection, AlarmPlace(watching, connection.retries))
+
+
+class Feed(Follower[FeedBatch]):
+    """The batches of a hull, each once and in order. Iterates until closed.
+
+    Iterating blocks until the next batch, reconnects as often as necessary, and raises DynhullError if the feed cannot
+    continue. A context manager, which closes it; `close` may also be called by another thread, and ends the iteration.
+    """
+
+    def __init__(self, connection: BlockingConnection, feeding: Feeding) -> None:
+        super().__init__(connection, FeedPlace(feeding, connection.retries))

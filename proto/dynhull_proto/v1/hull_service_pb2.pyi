@@ -1,6 +1,7 @@
 import datetime
 
 from dynhull_proto.v1 import batch_pb2 as _batch_pb2
+from dynhull_proto.v1 import feed_pb2 as _feed_pb2
 from dynhull_proto.v1 import hull_pb2 as _hull_pb2
 from dynhull_proto.v1 import points_pb2 as _points_pb2
 from google.protobuf import any_pb2 as _any_pb2

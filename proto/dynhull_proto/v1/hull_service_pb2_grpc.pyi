@@ -4,6 +4,7 @@ isort:skip_file
 """
 
 from collections import abc as _abc
+from dynhull_proto.v1 import feed_pb2 as _feed_pb2
 from dynhull_proto.v1 import hull_service_pb2 as _hull_service_pb2
 from grpc import aio as _aio
 import abc as _abc_1
@@ -222,6 +223,14 @@ class HullServiceStub:
     needs the permission "past", where tokens are used. What is held in quarantine is no part of them. FAILED_PRECONDITION
     if the hull is not keyed, is over shards, or has a window of a number of points. OUT_OF_RANGE as in Replay.
     """
+    Feed: _grpc.UnaryStreamMultiCallable[_feed_pb2.FeedRequest, _feed_pb2.FeedResponse]
+    """Sends every batch of a hull with its rows, each once and in order: first those that are kept, then new ones as they are
+    committed. It never ends by itself, and a caller goes on after the last revision that it has. A caller who reads slowly
+    is sent the batches later, from where they are kept; of those that are kept no more it is sent the revisions.
+
+    It needs the right to read the past of the hull. FAILED_PRECONDITION if the server keeps no batches, or if the hull is
+    over shards.
+    """
     Verify: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
     which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
@@ -421,6 +430,14 @@ class HullServiceAsyncStub(HullServiceStub):
     """Sends the ways of keys from one moment to another one: where each was at the start, and then its positions in order. It
     needs the permission "past", where tokens are used. What is held in quarantine is no part of them. FAILED_PRECONDITION
     if the hull is not keyed, is over shards, or has a window of a number of points. OUT_OF_RANGE as in Replay.
+    """
+    Feed: _aio.UnaryStreamMultiCallable[_feed_pb2.FeedRequest, _feed_pb2.FeedResponse]  # type: ignore[assignment]
+    """Sends every batch of a hull with its rows, each once and in order: first those that are kept, then new ones as they are
+    committed. It never ends by itself, and a caller goes on after the last revision that it has. A caller who reads slowly
+    is sent the batches later, from where they are kept; of those that are kept no more it is sent the revisions.
+
+    It needs the right to read the past of the hull. FAILED_PRECONDITION if the server keeps no batches, or if the hull is
+    over shards.
     """
     Verify: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]  # type: ignore[assignment]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
@@ -840,6 +857,20 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         """Sends the ways of keys from one moment to another one: where each was at the start, and then its positions in order. It
         needs the permission "past", where tokens are used. What is held in quarantine is no part of them. FAILED_PRECONDITION
         if the hull is not keyed, is over shards, or has a window of a number of points. OUT_OF_RANGE as in Replay.
+        """
+
+    @_abc_1.abstractmethod
+    def Feed(
+        self,
+        request: _feed_pb2.FeedRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_feed_pb2.FeedResponse], _abc.AsyncIterator[_feed_pb2.FeedResponse]]:
+        """Sends every batch of a hull with its rows, each once and in order: first those that are kept, then new ones as they are
+        committed. It never ends by itself, and a caller goes on after the last revision that it has. A caller who reads slowly
+        is sent the batches later, from where they are kept; of those that are kept no more it is sent the revisions.
+
+        It needs the right to read the past of the hull. FAILED_PRECONDITION if the server keeps no batches, or if the hull is
+        over shards.
         """
 
     @_abc_1.abstractmethod

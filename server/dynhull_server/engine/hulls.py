@@ -24,6 +24,8 @@ from .batch_stream import BatchStream
 from .divided_hull import DividedHull
 from .division import Divisions
 from .driver import Driver
+from .feed import HullFeeds
+from .feed_many import PrefixFeed
 from .fences import Fences
 from .layers import COPIES
 from .live_hull import LiveHull
@@ -31,6 +33,7 @@ from .past import PastHull, PastHulls, Place
 from .positions import Standing, standing
 from .recalls import UNREADABLE, Recalls
 from .replay import ReplayedHull
+from .roster import Roster
 from .rosters import Rosters
 from .series import KeptSeries
 from .waiter import Waiter
@@ -49,11 +52,13 @@ class Hulls:
         rosters: those of the watches of many hulls.
         pasts: finds and rebuilds earlier revisions.
         series: the measures that are kept.
+        feeds: reads the batches of each.
     """
 
     def __init__(self, driver: Driver, storage: Storage, fences: Fences, divisions: Divisions | None) -> None:
         self.rosters = Rosters(lambda: driver.core.hulls.values())
         self.series = KeptSeries(self.of, driver)
+        self.feeds = HullFeeds(driver, storage, keeps=storage.keeps)
         self._driver = driver
         self._fences = fences
         self._divisions = divisions
@@ -112,6 +117,10 @@ class Hulls:
         if hull.row.number != live.number:
             raise HullNotFoundError(live.name)
         return hull
+
+    def feed(self, roster: Roster) -> PrefixFeed:
+        """The feed of the hulls of a roster, for one reader."""
+        return PrefixFeed(self.feeds, self.get, roster, self.standing.incarnation)
 
     def has(self, name: str) -> bool:
         """Whether a hull of that name exists."""

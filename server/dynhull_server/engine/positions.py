@@ -46,6 +46,10 @@ class Standing(NamedTuple):
         return self._replace(number=min(self.number, max(commit.number - 1, 0)), time=min(self.time, commit.time))
 
 
+# Before all commits, of any data.
+BEGINNING = Standing(0, 0, 0)
+
+
 def incarnation_of(hulls: Sequence[HullRow]) -> str:
     """What the last copy of a storage has added to the uids of all hulls there were; "" for none."""
     return next((hull.uid.partition(INCARNATION)[2] for hull in hulls if INCARNATION in hull.uid), "")
@@ -93,7 +97,7 @@ def encode_position(standings: Sequence[Standing]) -> bytes:
     room for them, and never later than they are: who goes on from there is sent some states again.
     """
     if len(standings) * _STANDING.size <= MOST_BYTES:
-        return b"".join(_STANDING.pack(*each) for each in standings)
+        return encode_standings(standings)
     newest = max(each.time for each in standings)
     bits, ages = _bits(len(standings)), 0
     for each in reversed(standings):
@@ -109,8 +113,13 @@ def decode_position(position: bytes) -> Position:
     return Position(_together(standings), standings)
 
 
+def encode_standings(standings: Sequence[Standing]) -> bytes:
+    """The standings themselves, twenty bytes each."""
+    return b"".join(_STANDING.pack(*each) for each in standings)
+
+
 def decode_standings(position: bytes) -> list[Standing]:
-    """The standings in a position of few partitions. Raises ValueError."""
+    """The inverse of `encode_standings`. Raises ValueError."""
     if len(position) % _STANDING.size:
         raise ValueError(_NONE_OF_OURS)
     return [Standing(*each) for each in _STANDING.iter_unpack(position)]

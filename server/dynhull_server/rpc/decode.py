@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points, packed_points, plain_points
-from dynhull_proto.v1 import alarm_service_pb2, fence_service_pb2, hull_service_pb2, points_pb2
+from dynhull_proto.v1 import alarm_service_pb2, feed_pb2, fence_service_pb2, hull_service_pb2, points_pb2
 
 from ..engine.layers import MOST_LAYERS
 from ..engine.positions import Position, decode_position
@@ -91,7 +91,8 @@ def decode_after(may_skip: bool, request: Any) -> int:
     return after
 
 
-def _require_prefix(prefix: str) -> None:
+def require_prefix(prefix: str) -> None:
+    """Raise InvalidFieldError if no name begins with this."""
     if not NAME_CHARACTERS.fullmatch(prefix):
         raise InvalidFieldError("prefix", prefix, 'names consist of letters, digits and "._-/"')
 
@@ -102,7 +103,7 @@ def decode_page(
     | alarm_service_pb2.ListAlarmsRequest,
 ) -> tuple[str, str, int]:
     """The prefix, the name before the page, and the size of the page."""
-    _require_prefix(request.prefix)
+    require_prefix(request.prefix)
     if request.page_token and not (
         NAME.fullmatch(request.page_token) and request.page_token.startswith(request.prefix)
     ):
@@ -275,7 +276,7 @@ def decode_max_vertices(request: Any, others: Sequence[str] = ("directions",)) -
 def decode_many(request: hull_service_pb2.WatchManyRequest) -> Choice:
     """The hulls of a request about many."""
     if not request.names:
-        _require_prefix(request.prefix)
+        require_prefix(request.prefix)
         return Choice(request.prefix)
     if request.prefix:
         raise InvalidFieldError("names", f"{len(request.names)} names", "cannot be combined with prefix")
@@ -359,7 +360,8 @@ def decode_interval(
     request: hull_service_pb2.WatchRequest
     | hull_service_pb2.ReplayRequest
     | fence_service_pb2.WatchFenceRequest
-    | alarm_service_pb2.WatchAlarmRequest,
+    | alarm_service_pb2.WatchAlarmRequest
+    | feed_pb2.FeedRequest,
 ) -> float | None:
     """Seconds without an event before a progress mark, None for no marks."""
     if not request.HasField("progress_interval"):

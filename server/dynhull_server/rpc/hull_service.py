@@ -10,8 +10,8 @@ import numpy as np
 
 from dynhull.arrays import Checked
 from dynhull.keys import key_list
+from dynhull_proto.v1 import feed_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_proto.v1 import points_pb2
 
 from ..engine import entities
 from ..engine.driver import Driver
@@ -24,15 +24,23 @@ from ..engine.views import ResumedView
 from ..engine.watch import watch
 from ..engine.watch_many import watch_many
 from ..state.batch import Applied
-from ..state.errors import HullEmptyError, HullFencedError, HullReplacedError, LimitExceededError, PartRefusedError
+from ..state.errors import (
+    HullEmptyError,
+    HullFencedError,
+    HullReplacedError,
+    LimitExceededError,
+    PartRefusedError,
+)
 from ..state.frames import require_lines, require_reach
 from ..state.records import Contents
 from . import answers, decode, encode
 from .calls import Call
 from .decode_batch import decode_keys
+from .decode_feed import decode_feed_choice
 from .decode_moment import decode_moment
 from .decode_replay import decode_view
 from .decode_settings import decode_center, decode_history, decode_quarantine, decode_settings, decode_shards
+from .feeds import BatchFeeds
 from .many import MANY_INTERVAL, HullStates, ManyQuotas, encode_many, require_many
 from .metrics import Metrics
 from .places import Places
@@ -68,6 +76,7 @@ class HullService:
         quotas: how much a caller may watch of many hulls.
         pasts: limits the reads of the past at a time.
         replays: limits the replays at a time.
+        feeds: limits the feeds at a time.
         create_on_write: whether a write to a missing hull creates it.
         max_watch_lag: the seconds that a watcher may take to receive an event.
     """
@@ -80,6 +89,7 @@ class HullService:
         quotas: ManyQuotas,
         pasts: Places,
         replays: Places,
+        feeds: Places,
         *,
         create_on_write: bool,
         max_watch_lag: float,
@@ -88,6 +98,7 @@ class HullService:
         self._pasts = pasts
         self._replays = Replays(hulls, replays, driver.aside, max_watch_lag)
         self._tracks = Tracks(hulls, pasts, max_watch_lag)
+        self._feeds = BatchFeeds(hulls, feeds, quotas.roster, metrics, max_watch_lag)
         self._driver = driver
         self._aside = driver.aside
         self._metrics = metrics
@@ -570,6 +581,15 @@ class HullService:
                             raise LimitExceededError("max_message_bytes", call.max_message_bytes)
                     with self._metrics.sending(watcher, "many"):
                         await call.write_within(self._max_watch_lag, message)
+
+    async def Feed(self, request: feed_pb2.FeedRequest, call: Call) -> None:
+        choice = decode_feed_choice(request)
+        if choice is not None:
+            await self._feeds.send_many(request, choice, call)
+            return
+        hull = self._read(call, request.name)
+        call.access.require_past(hull.name)
+        await self._feeds.send(request, hull, call)
 
     def _run(self, rows: int) -> Run:
         """The way to run the steps of an answer that reads this many rows."""

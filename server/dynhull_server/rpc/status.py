@@ -39,6 +39,7 @@ from ..state.errors import (
     PagesForgottenError,
     PartRefusedError,
     PointMissingError,
+    PositionForgottenError,
     RefusedError,
     RestoredError,
     RevisionForgottenError,
@@ -188,6 +189,7 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     NotStoredError: Refusal("STORAGE_FAILED"),
     OutcomeUnknownError: Refusal("OUTCOME_UNKNOWN"),
     PagesForgottenError: Refusal("REVISION_FORGOTTEN", lambda e: {"field": "vertex_page_token", "value": e.revision}),
+    PositionForgottenError: Refusal("REVISION_FORGOTTEN", lambda _: {"field": "position"}),
     PermissionDeniedError: Refusal("PERMISSION_DENIED", lambda e: {"scope": e.scope, "value": e.name}),
     RestoredError: Refusal(
         "RESTORED", lambda e: {"value": e.name, "uid": e.uid, "last": e.last, "expected": e.last + 1}

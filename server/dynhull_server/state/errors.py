@@ -292,6 +292,16 @@ class PagesForgottenError(RefusedError):
         self.revision = revision
 
 
+class PositionForgottenError(RefusedError):
+    """The position of a feed is of other data than those that there are."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "this position is of other data: a backup was restored, or the hulls were divided among other processes; "
+            "begin again, from what there is"
+        )
+
+
 class HullReplacedError(RefusedError):
     """The hull of that name has been deleted and created again, or restored from a backup.
 

@@ -22,7 +22,7 @@ from dynhull_client import (
     UnauthenticatedError,
     UnavailableError,
 )
-from dynhull_proto.v1 import batch_pb2, points_pb2
+from dynhull_proto.v1 import batch_pb2, feed_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
@@ -80,6 +80,7 @@ EVERY_CALL = {
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
     "Track": lambda stub, name: next(stub.Track(pb.TrackRequest(name=name))),
     "Replay": lambda stub, name: next(stub.Replay(pb.ReplayRequest(name=name))),
+    "Feed": lambda stub, name: next(stub.Feed(feed_pb2.FeedRequest(name=name))),
     "WatchMany": lambda stub, name: next(stub.WatchMany(pb.WatchManyRequest(names=[name]))),
     "GetLayers": lambda stub, name: stub.GetLayers(pb.GetLayersRequest(name=name, layer_count=1)),
     "GetInfluence": lambda stub, name: stub.GetInfluence(pb.GetInfluenceRequest(name=name)),

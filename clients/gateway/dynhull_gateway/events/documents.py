@@ -10,6 +10,7 @@ from ..schemas import Measures, Response, SubjectsInside
 CHANGED = "When the newest batch was committed, or points last left by time."
 # The id of an event says after which sequence to go on.
 STATE = [name for name in dynhull_client.ManyChange.__dataclass_fields__ if name not in ("kind", "position")]
+BATCH = [name for name in dynhull_client.FeedBatch.__dataclass_fields__ if name not in ("type", "after")]
 SENT = [name for name in dynhull_client.FenceEvent.__dataclass_fields__ if name != "after"]
 
 
@@ -76,6 +77,26 @@ class FenceEvent(BaseModel):
     inside: list[SubjectsInside] = Field([], description="Of snapshot and closed, who was inside, by hull.")
 
 
+@answering(dynhull_client.FeedHeld, partial=True)
+class FeedHeld(BaseModel):
+    """What a batch has changed in the quarantine of a hull; fields that do not apply are left out."""
+
+    points: Rows = Field([], description="The positions held.")
+    times: list[str | None] = Field([], description="Their times, null for one without.")
+
+
+@answering(dynhull_client.FeedBatch, BATCH, partial=True)
+class FeedBatch(BaseModel):
+    """The data of a batch of a hull; fields that do not apply are left out."""
+
+    points: Rows = Field([], description="The positions of the keys put.")
+    inserts: Rows = Field([], description="The points inserted into a hull without keys.")
+    deletes: Rows = Field([], description="The points deleted from it.")
+    times: list[str | None] = Field([], description="The event times of the points put or inserted, null for none.")
+    expire_times: list[str | None] = Field([], description="When the points put leave the hull, likewise.")
+    held: FeedHeld | None = Field(None, description="What it has changed in the quarantine.")
+
+
 @answering(dynhull_client.ManyChange, STATE, partial=True)
 class HullNow(Response):
     """The newest that is known of one of many hulls; fields that do not apply are left out."""
@@ -130,4 +151,10 @@ OF_PAST_FENCE = (
     'event: enter\ndata: {"type":"enter","sequence":2,"cause":["subject_appeared"],'
     '"hull":"fleet","key":"LH400","revision":2,"position":[0.0,0.0],"distance":0.0,"time":"2026-01-31T12:00:01Z"}\n\n'
     'event: complete\ndata: {"events":2}\n\n'
+)
+OF_FEED = (
+    "retry: 1000\n\n"
+    "event: batch\nid: fe203b7c85e2be96:2\n"
+    'data: {"hull":"fleet","revision":2,"uid":"fe203b7c85e2be96","commit":7,"time":"2026-01-31T12:00:00+00:00",'
+    '"cause":"batch","keys":["LH400"],"points":[[8.57,50.03]]}\n\n'
 )

@@ -19,6 +19,7 @@ from ..fences import arguments_of
 from ..problems import ProblemError
 from ..schemas import LARGEST, NAME, FencePath, HullPath, Prefix
 from . import documents
+from .batches import FeedReading, batches, look
 from .feeds import PATIENCE_SECONDS, Feed
 from .fence_events import Reading
 from .fence_events import events as fence_events
@@ -76,6 +77,15 @@ Consumer = Annotated[
 AfterSequence = Annotated[
     int | None, Query(ge=0, le=LARGEST, description="Begin after this sequence; 0 for all that is kept.")
 ]
+AfterRevision = Annotated[
+    int | None, Query(ge=0, le=LARGEST, description="Begin after this revision; 0 for all batches that are kept.")
+]
+# Forty digits for each of at most 1024 partitions.
+LastFeedPosition = Annotated[
+    str | None,
+    Header(alias="Last-Event-ID", max_length=40_960, description="The id of the last event that was received."),
+]
+FromTheBeginning = Annotated[bool, Query(description="Begin with the oldest batches that are kept.")]
 Conflate = Annotated[bool, Query(description="Leave out events that cancel each other.")]
 
 
@@ -231,6 +241,54 @@ async def fence_events_between(
     past = PastEvents(client.fence_events_between(**given))
     await past.begin(PATIENCE_SECONDS)
     return EventStream(past.texts(state.settings.keepalive_seconds), state.health, state.figures)
+
+
+@router.get("/hulls/{name}/feed", response_class=Described, responses=events(documents.OF_FEED))
+async def hull_feed(
+    request: Request,
+    client: Caller,
+    name: HullPath,
+    after: AfterRevision = None,
+    last_event_id: LastEventId = None,
+) -> Response:
+    """Follow every batch of a hull with its rows: events "batch", each once and in order, with ids UID:REVISION.
+
+    It begins with the next batch unless Last-Event-ID or a revision says where. It needs the right to read the past of
+    the hull. The data is JSON, as described by the schema FeedBatch. Also: "lost", with the `first` and the `last`
+    revision of batches that are kept no more and were not sent; "replaced", when another hull has the name now, whose
+    batches follow; and "problem", which ends the stream.
+    """
+    resume = resumed(last_event_id)
+    uid, place = ("", after) if resume is None else resume
+    return await _feed(request, client, FeedReading(name, None, uid, place))
+
+
+@router.get("/feed", response_class=Described, responses=events(documents.OF_FEED))
+async def feed_of_many(
+    request: Request,
+    client: Caller,
+    prefix: Prefix = "",
+    begin: FromTheBeginning = False,
+    last_event_id: LastFeedPosition = None,
+) -> Response:
+    """Follow every batch of all hulls of a prefix, those to come, too: events "batch", each once, by their commits.
+
+    It begins with the next batch unless Last-Event-ID says where, or `begin`. It needs the right to read the past of
+    the prefix. Events without an id belong together with those up to the next id. The data is JSON, as described by the
+    schema FeedBatch. Also: "lost", with the `first` and the `last` revision of batches that are kept no more and were
+    not sent; "deleted", with a `hull` that was deleted; "hulls" after Last-Event-ID, with the uids of the `hulls` that
+    there are, by name: what a reader has of others is no more; and "problem", which ends the stream.
+    """
+    position = None if last_event_id is None else position_of(last_event_id)
+    return await _feed(request, client, FeedReading(None, prefix, "", position or (0 if begin else None)))
+
+
+async def _feed(request: Request, client: AsyncHullClient, reading: FeedReading) -> EventStream:
+    admit(request)
+    await look(client, reading)
+    state = request.app.state
+    texts = batches(client, reading, state.settings.keepalive_seconds)
+    return EventStream(texts, state.health, state.figures)
 
 
 async def _require_keys(client: AsyncHullClient, name: str) -> None:

@@ -1,0 +1,93 @@
+"""The feed of a hull, or of many: every batch, each once and in order."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+import grpc
+
+from dynhull_cli.feed_lines import batch_members
+from dynhull_client import AsyncFeed, AsyncHullClient, DynhullError, FeedBatch, HullReplacedError, UnavailableError
+
+from .messages import COMMENT, message, place, problem
+from .shared import RETRY_SECONDS
+
+
+@dataclass(slots=True)
+class FeedReading:
+    """What is read, and how far.
+
+    Attributes:
+        name: the hull; None for many.
+        prefix: that of many hulls; None for one.
+        uid: the uid of the hull; empty if it is not known yet, and for many.
+        after: what the reader goes on after, as in a `FeedBatch`; None for new batches only.
+    """
+
+    name: str | None
+    prefix: str | None
+    uid: str
+    after: int | bytes | None
+
+    def feed(self, client: AsyncHullClient, progress_interval: float) -> AsyncFeed:
+        """The feed of what is left."""
+        return client.feed(
+            self.name, prefix=self.prefix, after=self.after, uid=self.uid, progress_interval=progress_interval
+        )
+
+    def follow(self, batch: FeedBatch) -> None:
+        """Note what the reader has."""
+        if batch.after is not None:
+            self.after, self.uid = batch.after, "" if self.name is None else batch.uid
+
+
+async def look(client: AsyncHullClient, reading: FeedReading) -> None:
+    """Learn where the feed begins; raises the error that refuses it. While the server is away the stream waits for it.
+
+    Another hull of the name is no error: the stream says so.
+    """
+    with suppress(UnavailableError, HullReplacedError):
+        async with reading.feed(client, 1.0) as feed:
+            async for first in feed:
+                if reading.after is None:
+                    reading.follow(first)
+                if reading.after is not None:
+                    return
+
+
+async def batches(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:
+    """The batches as text, over restarts of the server; a comment when there is none for long."""
+    while True:
+        try:
+            async for text in _read(client, reading, keepalive):
+                yield text
+        except HullReplacedError:
+            reading.uid, reading.after = "", 0
+            yield message("replaced", "", {"hull": reading.name})
+        except DynhullError as error:
+            if error.code != grpc.StatusCode.UNAVAILABLE:
+                yield problem(error)
+                return
+            yield COMMENT
+            await asyncio.sleep(RETRY_SECONDS)
+
+
+async def _read(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:
+    """One feed, which continues over lost connections itself once it has begun."""
+    async with reading.feed(client, keepalive) as feed:
+        async for batch in feed:
+            # A reader that is cut off before the first batch misses none.
+            yield place(_ident(batch)) + COMMENT if batch.type == "progress" else _text(batch)
+            reading.follow(batch)
+
+
+def _text(batch: FeedBatch) -> bytes:
+    data = {name: value for name, value in batch_members(batch).items() if name != "type"}
+    return message(batch.type, _ident(batch), data)
+
+
+def _ident(batch: FeedBatch) -> str:
+    if batch.after is None:
+        return ""
+    return batch.after.hex() if isinstance(batch.after, bytes) else f"{batch.uid}:{batch.after}"
