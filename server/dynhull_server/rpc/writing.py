@@ -174,18 +174,21 @@ class StreamedBatches:
             raise decode.InvalidFieldError("producer", producer, f"the producer of this call is {self._producer!r}")
         if message.may_skip and not self._may_skip:
             raise decode.InvalidFieldError("may_skip", value=True, problem="the first message of the call decides it")
-        batches = self._batches_of(message)
         rows, arrived = self._call.message_bytes // decode.BYTES_PER_POINT, self._driver.time()
-        writes: list[Write] = []
-        try:
-            if rows <= SMALL:
-                self._decode(batches, arrived, rows, writes)
-            else:
-                await self._driver.in_turn(partial(self._decode, batches, arrived, rows, writes))
-        except decode.InvalidFieldError:
+        several = message.batches if self._may_be_several else ()
+        if several:
+            self._require_batches_alone(message, len(several))
+            writes: list[Write] = []
+            try:
+                await decoding(self._driver, rows, self._decode_several, several, arrived, rows, writes)
+            except decode.InvalidFieldError:
+                self._send(writes)
+                raise
             self._send(writes)
-            raise
-        self._send(writes)
+        elif message.HasField("batch"):
+            self._send([await decoding(self._driver, rows, self._decode_write, message, arrived, rows)])
+        else:
+            _require_no_number(message)
 
     def _notify(self) -> None:
         if self._news is not None and not self._news.done():
@@ -206,25 +209,19 @@ class StreamedBatches:
         except Exception as failure:  # raised after the batches before it are answered
             self._failure = failure
 
-    def _batches_of(self, message: Any) -> Sequence[Any]:
-        """The batches of a message; a message with one is that batch itself."""
-        several: Sequence[Any] = message.batches if self._may_be_several else ()
-        if not several:
-            if message.HasField("batch"):
-                return [message]
-            _require_no_number(message)
-            return []
+    def _require_batches_alone(self, message: Any, batches: int) -> None:
+        """Refuse several batches where the call has not asked for them, too many, or one beside them."""
         if not self.several:
             problem = "only in a call whose first message has accept_results"
-            raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
-        if len(several) > MOST_IN_A_MESSAGE:
+        elif batches > MOST_IN_A_MESSAGE:
             problem = f"a message has at most {MOST_IN_A_MESSAGE}"
-            raise decode.InvalidFieldError("batches", f"{len(several)} batches", problem)
-        if message.HasField("batch") or message.sequence or message.HasField("after_sequence"):
-            raise decode.InvalidFieldError("batches", f"{len(several)} batches", "use batch or batches, not both")
-        return several
+        elif message.HasField("batch") or message.sequence or message.HasField("after_sequence"):
+            problem = "use batch or batches, not both"
+        else:
+            return
+        raise decode.InvalidFieldError("batches", f"{batches} batches", problem)
 
-    def _decode(self, batches: Sequence[Any], arrived: int, rows: int, writes: list[Write]) -> None:
+    def _decode_several(self, batches: Sequence[Any], arrived: int, rows: int, writes: list[Write]) -> None:
         """Decode batches of about `rows` points together."""
         for each in batches:
             writes.append(self._decode_write(each, arrived, rows // len(batches)))  # noqa: PERF401  # those before an invalid one are sent
