@@ -45,11 +45,12 @@ from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.records import Center, HullSettings, Identity, QuarantineRules, Times, Window
 
+from .cluster_plan import Operation
 from .entities import Key
 from .fence_model import PREFIX
 from .globe import CENTERS, FAR, GLOBE, places, points
 from .model import SKIPS, Asked, Content, Model, tag
-from .plan import TIMED, Operation
+from .operations import TIMED
 
 NO_POINTS = np.empty((0, 2))
 # The points of one batch have an x of their own each, in eighths.

@@ -28,11 +28,11 @@ from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NotCommittedError, Progress, StorageError, StoredContents, TakenOverError
 
 from .clients import Client, probe
+from .cluster_plan import Operation, Plan
 from .core_life import ClientActor, Condition, CoreServer, Wait, compare
 from .hidden import Entry, Place, Proc, System
 from .machine import SimulatedThreads
 from .model import Model
-from .plan import Operation, Plan
 from .postgres import Postgres, Session
 from .schedule import Schedule
 from .store import FaultyStorage

@@ -77,11 +77,11 @@ from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 
 from .clients import Client, Outline, content, outline
+from .cluster_plan import Operation
 from .entities import loaded
 from .fence_model import PREFIX
 from .globe import points
 from .model import SKIPS, Model, Truth
-from .plan import Operation
 from .quarantine_model import waiting_of
 from .schedule import Schedule
 

@@ -32,8 +32,8 @@ from dynhull_server.state.batch import Applied, Batch, Write
 from dynhull_server.state.errors import HullNotFoundError, NotStoredError, OutcomeUnknownError, SequenceGapError
 
 from .clients import Client, Outline
+from .cluster_plan import Operation
 from .network import TO_GATEWAY, TO_WORKER, NetworkLoop
-from .plan import Operation
 from .queries import MOST_BYTES, MOST_CALLS, _outline, _read
 from .shell_life import ShellServer
 

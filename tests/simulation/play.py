@@ -12,10 +12,10 @@ from dynhull_server.storage.memory import MemoryStorage
 
 from .clients import Client, probe, probe_fence
 from .cluster_life import World
+from .cluster_plan import Plan
 from .core_life import CoreServer
 from .link_life import LinkedServer
 from .model import Finding, Model
-from .plan import Plan
 from .schedule import Schedule
 from .shell_life import ShellServer
 from .sqlite_store import SQLiteLives

@@ -24,8 +24,9 @@ from dynhull_server.settings import Settings
 from dynhull_server.state.errors import HullNotFoundError, StoppingError
 
 from .clients import Client, Outline
+from .cluster_plan import Operation
 from .model import Asked, Model
-from .plan import TIMED, Operation
+from .operations import TIMED
 
 if TYPE_CHECKING:
     from .entities import Key

@@ -25,11 +25,11 @@ from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import Center, HullSettings
 
 from .clients import Client, Outline, outline
+from .cluster_plan import Operation
 from .core_life import compare
 from .fence_model import PREFIX
 from .machine import Loop, SimulatedClock, SimulatedThreads, simulated_machine
 from .model import Finding, Model
-from .plan import Operation
 from .queries import Queries
 from .schedule import Schedule
 from .store import FaultyStorage

@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Iterator
 
-from .plan import Plan
+from .cluster_plan import Plan
 from .play import play
 
 # Schedules that are tried for each smaller plan.
