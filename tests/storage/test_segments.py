@@ -31,7 +31,6 @@ from dynhull_server.state.records import (
     QuarantineRules,
     Record,
 )
-from dynhull_server.storage.of_keys import batches_of_keys, contents_of_keys
 from dynhull_server.storage.port import NEWEST, DamagedError
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments.archive import BATCHES, Archive
@@ -127,19 +126,29 @@ def require_all(storage, records):
 
 def require_all_of_keys(storage, records):
     """What the batches do to some keys is what they do to all, without the others; and so is each state."""
-    for wanted in (KEYS[:1], KEYS[2:5], ["nobody"]):
+    for wanted in (KEYS[:1], KEYS[2:5], ["nobody", "nobody at all"]):
         keys = PackedKeys.pack(wanted)
         for after in (0, 1, len(records) // 2):
             found, at = [], after
             while at < len(records):
-                some, last = storage.key_batches(1, keys, at, len(records))
+                last, changes = storage.key_changes(1, keys, at, len(records))
                 assert at < last
-                found += some
+                columns = changes.revisions, changes.times, changes.rows, *changes.points.T
+                found += zip(*(column.tolist() for column in columns), strict=True)
                 at = last
-            same(found, list(batches_of_keys(records[after:], set(wanted))))
-            kept = storage.key_state(1, keys, after)
-            assert kept.revision == storage.state(1, after).revision
-            same(kept.contents, contents_of_keys(storage.state(1, after).contents, set(wanted)))
+            assert sorted(found) == sorted(
+                (each.revision, each.committed.time, wanted.index(key), *point)
+                for each in records[after:]
+                for key, point in zip(each.rows.keys, each.rows.points.tolist(), strict=True)
+                if key in wanted
+            )
+            assert [revision for revision, *_ in found] == sorted(revision for revision, *_ in found)
+            whole = storage.state(1, after)
+            revision, rows, contents = storage.key_state(1, keys, after)
+            expected = dict(zip(whole.contents.keys or (), whole.contents.points.tolist(), strict=True))
+            there = {wanted[row]: point for row, point in zip(rows.tolist(), contents.points.tolist(), strict=True)}
+            assert revision == whole.revision
+            assert there == {key: point for key, point in expected.items() if key in wanted}
 
 
 @pytest.fixture(params=["folder", "postgresql"])

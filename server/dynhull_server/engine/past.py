@@ -146,8 +146,8 @@ class PastHulls:
         """
 
         def begin() -> tuple[Tracker, int]:
-            kept = self._past.key_state(live.number, keys, revision)
-            return Tracker(live.settings, keys, kept), kept.revision
+            at, rows, contents = self._past.key_state(live.number, keys, revision)
+            return Tracker(live.settings, len(keys), rows, contents), at
 
         tracker, at = await self._onwards(live, revision, begin)
         while at < revision:
@@ -164,9 +164,9 @@ class PastHulls:
         """
 
         def step() -> tuple[int, Moves]:
-            records, last = self._past.key_batches(live.number, keys, after, until)
-            self._require_room(rows + sum(1 + len(each.rows) for each in records))
-            return last, tracker.moves(records)
+            last, changes = self._past.key_changes(live.number, keys, after, until)
+            self._require_room(rows + len(changes))
+            return last, tracker.moves(changes)
 
         found: tuple[int, Moves] = await self._onwards(live, after, step)
         return found

@@ -1,19 +1,17 @@
 """The ways of some keys through the revisions of a hull."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from dynhull.arrays import Points
-from dynhull.keys import key_list
 
-from .contents import replayed
-from .contents.deadlines import Key
-from .contents.key_rows import of_kind
-from .contents.keyed import Keyed
-from .records import NO_TIME, Expiry, HullSettings, Kept, KeyRows, Keys, Record, Times
+from .records import FOREVER, NO_TIME, Condition, Contents, HullSettings, Times
+
+PUT, REMOVE, EXPIRE = range(3)
+NO_KEY = -1
 
 
 @dataclass(slots=True)
@@ -59,89 +57,144 @@ def joined(parts: Sequence[Moves]) -> Moves:
 NO_ROWS, NO_TIMES = np.empty(0, np.int32), np.empty(0, np.int64)
 
 
+@dataclass(slots=True)
+class KeyChanges:
+    """What batches say of some keys: rows in the order in which they count.
+
+    Attributes:
+        rows: (n,) which of the keys; NO_KEY for what is about all of them.
+        ops: (n,) PUT, REMOVE, or EXPIRE: all that are too old leave.
+        revisions: (n,) the revision.
+        times: (n,) when it was committed; NO_TIME where that is not known.
+        points: (n, 2) the position put.
+        event_times: (n,) its time, NO_TIME for none; of EXPIRE the time up to which keys leave.
+        deadlines: (n,) when the key leaves, FOREVER for never.
+        clocks: (n,) the clock of the hull after the revision; NO_TIME for none.
+        conditions: by revision, which keys are put, where that is not all.
+    """
+
+    rows: npt.NDArray[np.int32]
+    ops: npt.NDArray[np.int8]
+    revisions: npt.NDArray[np.int64]
+    times: Times
+    points: Points
+    event_times: Times
+    deadlines: Times
+    clocks: Times
+    conditions: dict[int, Condition]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
 class Tracker:
-    """Follows some keys of a hull, of which it has no others: each batch does to them what it did to the hull.
+    """Follows some keys of a hull: what each batch did to them there, it does here.
 
     Args:
         settings: those of the hull. It has no window by number, in which other keys decide who leaves.
-        keys: the keys.
-        kept: where these are at first.
+        keys: the number of the keys.
+        rows: which of these are there at first.
+        contents: where they are, row by row.
     """
 
-    def __init__(self, settings: HullSettings, keys: Keys, kept: Kept) -> None:
-        self._keys = keys
-        self._rows: dict[Key, int] = {key: row for row, key in enumerate(key_list(keys))}
+    def __init__(self, settings: HullSettings, keys: int, rows: npt.NDArray[np.int32], contents: Contents) -> None:
         self._by_event_time = settings.by_event_time
-        # Positions are where they were put, on the globe, too; what is held out of the hull is not there.
-        bare = replace(settings, frame="plane", center=None, quarantine=None)
-        contents = replayed(Kept(kept.revision, replace(kept.contents, held=None), clock=kept.clock), bare)
-        assert isinstance(contents, Keyed)
-        self._contents = contents
-        self._there: set[Key] = set(key_list(contents.hull.entities()[0]))
-
-    def follow(self, records: Iterable[Record]) -> None:
-        """Go over batches."""
-        self.moves(records)
+        self._there = np.zeros(keys, np.bool_)
+        self._points = np.full((keys, 2), np.nan)
+        self._times = np.full(keys, NO_TIME)
+        self._deadlines = np.full(keys, FOREVER)
+        self._there[rows] = True
+        self._points[rows] = contents.points
+        if contents.times is not None:
+            self._times[rows] = contents.times
+        if contents.deadlines is not None:
+            self._deadlines[rows] = contents.deadlines
 
     def standing(self, revision: int, time: int) -> Moves:
         """Where the keys are that are there, as if they had been put there at a time."""
-        found = self._contents.find(self._keys)
-        rows = np.flatnonzero(found.present).astype(np.int32)
-        times = np.full(len(rows), NO_TIME) if found.times is None else found.times[rows]
-        return Moves(rows, np.full(len(rows), revision), np.full(len(rows), time), found.points[rows], times)
+        rows = np.flatnonzero(self._there).astype(np.int32)
+        count = len(rows)
+        return Moves(rows, np.full(count, revision), np.full(count, time), self._points[rows], self._times[rows])
 
-    def moves(self, records: Iterable[Record]) -> Moves:
+    def moves(self, changes: KeyChanges) -> Moves:
         """Go over batches, and return what they have done."""
-        return joined([part for record in records for part in self._moves(record)] or [NOTHING])
+        if not len(changes):
+            return NOTHING
+        plain = not (
+            self._by_event_time
+            or changes.conditions
+            or (changes.ops == EXPIRE).any()
+            or (changes.deadlines != FOREVER).any()
+            or (self._deadlines != FOREVER).any()
+        )
+        return self._at_once(changes) if plain else self._one_by_one(changes)
 
-    def _moves(self, record: Record) -> list[Moves]:
-        rows = record.rows
-        if isinstance(rows, Expiry):
-            self._contents.replay([record])
-            found = self._contents.find(of_kind(list(self._there), self._keys))
-            gone = [key for key, present in zip(list(self._there), found.present.tolist(), strict=True) if not present]
-            return self._ends(record, gone)
-        assert isinstance(rows, KeyRows)
-        written = self._written(rows)
-        self._contents.replay([record])
-        put = [self._rows[key] for key in key_list(rows.keys)]
-        parts = self._ends(record, [key for key in key_list(rows.removes) if key in self._there])
-        self._there.update(key_list(rows.keys) if written is None else _which(key_list(rows.keys), written))
-        if not put:
-            return parts
-        times = np.full(len(put), NO_TIME) if rows.times is None else rows.times
-        moves = _of(record, put, rows.points, times)
-        return [*parts, moves if written is None else moves[written]]
+    def _at_once(self, changes: KeyChanges) -> Moves:
+        """The same where each put counts, and nothing leaves by time."""
+        put, rows = changes.ops == PUT, changes.rows
+        order = np.lexsort((np.arange(len(rows)), rows))
+        begins = np.append(True, rows[order][1:] != rows[order][:-1])
+        before = np.empty(len(rows), np.bool_)  # whether the key of each row is there before it
+        before[order] = np.where(begins, self._there[rows[order]], np.roll(put[order], 1))
+        last = order[np.append(begins[1:], True)]
+        of_last = rows[last]
+        self._there[of_last] = put[last]
+        self._points[of_last], self._times[of_last] = changes.points[last], changes.event_times[last]
+        return _moves(changes, np.flatnonzero(put | before))
 
-    def _ends(self, record: Record, gone: list[Key]) -> list[Moves]:
-        """What it is for keys to leave."""
-        if not gone:
-            return []
-        self._there.difference_update(gone)
-        rows = [self._rows[key] for key in gone]
-        return [_of(record, rows, np.full((len(rows), 2), np.nan), np.full(len(rows), NO_TIME))]
+    def _one_by_one(self, changes: KeyChanges) -> Moves:
+        parts: list[Moves] = []
+        written: list[int] = []  # rows since the last part
+        there, times, deadlines = self._there, self._times, self._deadlines
+        for place, (row, op) in enumerate(zip(changes.rows.tolist(), changes.ops.tolist(), strict=True)):
+            if op == EXPIRE:
+                leaving = np.flatnonzero(self._leaving(changes, place)).astype(np.int32)
+                if len(leaving):
+                    there[leaving] = False
+                    parts += [_moves(changes, written), _left(changes, place, leaving)]
+                    written = []
+            elif op == REMOVE:
+                if there[row]:
+                    there[row] = False
+                    written.append(place)
+            elif self._counts(changes, place, row):
+                there[row] = True
+                self._points[row], times[row] = changes.points[place], changes.event_times[place]
+                deadlines[row] = changes.deadlines[place]
+                written.append(place)
+        return joined([*parts, _moves(changes, written)])
 
-    def _written(self, rows: KeyRows) -> npt.NDArray[np.bool_] | None:
-        """Which puts change the position of their key; None for all."""
-        if rows.condition is None and not (self._by_event_time and rows.times is not None):
-            return None
-        found = self._contents.find(rows.keys)
-        written = np.ones(len(rows.keys), np.bool_)
-        if rows.condition is not None:
-            written &= found.present == (rows.condition == "present")
-        if self._by_event_time and rows.times is not None and found.times is not None:
-            written &= ~(found.present & (rows.times < found.times))
-        return written
+    def _counts(self, changes: KeyChanges, place: int, row: int) -> bool:
+        """Whether a put changes the position of its key."""
+        condition = changes.conditions.get(int(changes.revisions[place]))
+        if condition is not None and bool(self._there[row]) != (condition == "present"):
+            return False
+        stale = self._by_event_time and self._there[row] and changes.event_times[place] < self._times[row]
+        return not stale
+
+    def _leaving(self, changes: KeyChanges, place: int) -> npt.NDArray[np.bool_]:
+        """Which keys leave by time."""
+        until, clock = changes.event_times[place], changes.clocks[place]
+        old = self._times <= until if until != NO_TIME else np.zeros(len(self._times), np.bool_)
+        leaving: npt.NDArray[np.bool_] = self._there & ((old & (self._times != NO_TIME)) | (self._deadlines <= clock))
+        return leaving
 
 
-def _of(record: Record, rows: list[int], points: Points, event_times: Times) -> Moves:
-    time = NO_TIME if record.committed is None else record.committed.time
+def _moves(changes: KeyChanges, which: "list[int] | npt.NDArray[np.intp]") -> Moves:
+    """Some of the rows."""
+    if not len(which):
+        return NOTHING
+    gone = changes.ops[which] != PUT
+    points, event_times = changes.points[which], changes.event_times[which]
+    points[gone], event_times[gone] = np.nan, NO_TIME
+    return Moves(changes.rows[which], changes.revisions[which], changes.times[which], points, event_times)
+
+
+def _left(changes: KeyChanges, place: int, rows: npt.NDArray[np.int32]) -> Moves:
+    """Keys that have left by time."""
     count = len(rows)
-    return Moves(np.array(rows, np.int32), np.full(count, record.revision), np.full(count, time), points, event_times)
-
-
-def _which(keys: list[Key], which: npt.NDArray[np.bool_]) -> list[Key]:
-    return [key for key, chosen in zip(keys, which.tolist(), strict=True) if chosen]
+    at = np.full(count, changes.revisions[place]), np.full(count, changes.times[place])
+    return Moves(rows, *at, np.full((count, 2), np.nan), np.full(count, NO_TIME))
 
 
 NOTHING = Moves(NO_ROWS, NO_TIMES, NO_TIMES, np.empty((0, 2)), NO_TIMES)

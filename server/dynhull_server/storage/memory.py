@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Lock
 
-from dynhull.keys import key_list
+import numpy as np
+import numpy.typing as npt
 
 from ..state.changes import Change
 from ..state.fences.events.block import AppendEvents
@@ -20,10 +21,12 @@ from ..state.fences.model.records import (
     PutConsumer,
     PutDelays,
 )
-from ..state.records import Append, CommitStamp, Create, Delete, HullRow, Kept, Keys, Record
-from .of_keys import batches_of_keys, contents_of_keys
+from ..state.records import Append, CommitStamp, Contents, Create, Delete, HullRow, Kept, Keys, Record
+from ..state.tracks import KeyChanges
+from .of_keys import changes_of_keys, contents_of_keys
 from .past import Hole, Moment, StoredHistory, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
+from .segments.columns import columns_of
 
 KEPT_SNAPSHOTS = 2
 STEP_RECORDS = 1024  # of a read of the past
@@ -173,15 +176,16 @@ class MemoryStorage:
         """The batches themselves."""
         return self.batches(number, after, until)
 
-    def key_state(self, number: int, keys: Keys, until: int) -> Kept:
-        """The newest snapshot, with the points of some keys alone."""
+    def key_state(self, number: int, keys: Keys, until: int) -> tuple[int, npt.NDArray[np.int32], Contents]:
+        """What the newest snapshot has of some keys."""
         kept = self.state(number, until)
-        return replace(kept, contents=contents_of_keys(kept.contents, set(key_list(keys))))
+        return kept.revision, *contents_of_keys(kept.contents, keys)
 
-    def key_batches(self, number: int, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
+    def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What some of the batches after a revision do to some keys."""
         records = self.batches(number, after, until)
-        return list(batches_of_keys(records, set(key_list(keys)))), records[-1].revision
+        columns = columns_of(records, self._hulls[number].row.settings.identity)
+        return records[-1].revision, changes_of_keys(columns, keys)
 
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""

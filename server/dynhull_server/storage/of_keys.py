@@ -1,57 +1,84 @@
 """What of a state, and of batches, is about some keys."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+import json
 
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.keys import key_list
+from dynhull.keys import PackedKeys, key_list
 
-from ..state.contents.deadlines import Key
-from ..state.contents.key_rows import select_keys
-from ..state.records import Contents, Expiry, KeyRows, Keys, Record, Times
+from ..state.records import Contents, Keys, Times
+from ..state.tracks import EXPIRE, NO_KEY, PUT, REMOVE, KeyChanges
+from .segments import columns as segment
+from .segments.columns import SegmentColumns
 
 
-def contents_of_keys(contents: Contents, keys: set[Key]) -> Contents:
-    """The points of some keys, without what is held out of the hull."""
+def contents_of_keys(contents: Contents, keys: Keys) -> tuple[npt.NDArray[np.int32], Contents]:
+    """Which of some keys are there, and their points, times and deadlines."""
     if contents.keys is None:
-        return contents
-    chosen = _among(contents.keys, keys)
-    return Contents(
-        contents.points[chosen],
-        select_keys(contents.keys, chosen),
-        _rows(contents.times, chosen),
-        _rows(contents.deadlines, chosen),
+        return np.empty(0, np.int32), Contents()
+    places = _places(contents.keys, keys)
+    chosen = places != NO_KEY
+    times, deadlines = _rows(contents.times, chosen), _rows(contents.deadlines, chosen)
+    return places[chosen], Contents(contents.points[chosen], None, times, deadlines)
+
+
+def changes_of_keys(columns: SegmentColumns, keys: Keys) -> KeyChanges:
+    """What batches do to some keys, without what is held out of the hull."""
+    rows = np.full(len(columns), NO_KEY, np.int32)
+    rows[columns.keyed] = _places(columns.keys, keys)
+    said = (columns.kind == segment.ROWS) & (columns.op == segment.NONE)
+    revisions = columns.revision[said].tolist()
+    details = [columns.detail[row] for row in np.flatnonzero(said).tolist()]
+    words = {revision: json.loads(detail) for revision, detail in zip(revisions, details, strict=True) if detail}
+    expires = columns.kind == segment.EXPIRY
+    chosen = ((columns.kind == segment.ROWS) & (rows != NO_KEY)) | expires
+    ops = np.where(columns.op == segment.PUT, PUT, np.where(expires, EXPIRE, REMOVE)).astype(np.int8)
+    return KeyChanges(
+        rows[chosen],
+        ops[chosen],
+        columns.revision[chosen],
+        columns.committed[chosen],
+        columns.points[chosen],
+        columns.event_time[chosen],
+        columns.expire_time[chosen],
+        columns.clock[chosen],
+        {revision: each["condition"] for revision, each in words.items() if "condition" in each},
     )
 
 
-def batches_of_keys(records: Iterable[Record], keys: set[Key]) -> Iterator[Record]:
-    """Batches without the rows of other keys, those that have none left out; and all that let keys leave by time."""
-    for record in records:
-        if isinstance(record.rows, Expiry):
-            yield record
-            continue
-        assert isinstance(record.rows, KeyRows)  # of a hull with keys
-        rows = record.rows
-        put, removed = _among(rows.keys, keys), _among(rows.removes, keys)
-        if put.any() or removed.any():
-            yield replace(
-                record,
-                rows=KeyRows(
-                    select_keys(rows.keys, put),
-                    rows.points[put],
-                    select_keys(rows.removes, removed),
-                    _rows(rows.times, put),
-                    _rows(rows.deadlines, put),
-                    rows.condition,
-                ),
-                center=None,
-            )
+def _places(keys: Keys, wanted: Keys) -> npt.NDArray[np.int32]:
+    """The place of each key among those that are wanted; NO_KEY for others. O(size of the keys)."""
+    found = np.full(len(keys), NO_KEY, np.int32)
+    if not isinstance(keys, PackedKeys):
+        _find(found, np.arange(len(keys)), keys, np.asarray(wanted), np.arange(len(wanted)))
+        return found
+    lengths = np.frombuffer(keys.lengths, np.uint8)
+    data, starts = np.frombuffer(keys.data, np.uint8), np.cumsum(lengths, dtype=np.int64) - lengths
+    texts = [str(key).encode() for key in key_list(wanted)]
+    for length in {len(text) for text in texts}:
+        rows = np.flatnonzero(lengths == length)
+        alike = [place for place, text in enumerate(texts) if len(text) == length]
+        # Bytes of numpy end before zeros; but of two texts of the same length these are not what differs.
+        these = data[starts[rows, np.newaxis] + np.arange(length)].view(f"S{length}").ravel()
+        _find(found, rows, these, np.array([texts[place] for place in alike], f"S{length}"), np.array(alike))
+    return found
 
 
-def _among(keys: Keys, wanted: set[Key]) -> npt.NDArray[np.bool_]:
-    return np.fromiter((key in wanted for key in key_list(keys)), np.bool_, len(keys))
+def _find(
+    found: npt.NDArray[np.int32],
+    rows: npt.NDArray[np.intp],
+    keys: npt.NDArray[np.generic],
+    wanted: npt.NDArray[np.generic],
+    places: npt.NDArray[np.intp],
+) -> None:
+    """Write the place of each key that is wanted, in some rows."""
+    if not len(wanted):
+        return
+    order = np.argsort(wanted)
+    at = np.minimum(np.searchsorted(wanted[order], keys), len(wanted) - 1)
+    there = wanted[order][at] == keys
+    found[rows[there]] = places[order[at[there]]]
 
 
 def _rows(times: Times | None, which: npt.NDArray[np.bool_]) -> Times | None:

@@ -3,7 +3,11 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..state.records import CommitStamp, HullRow, Kept, Keys, Record
+import numpy as np
+import numpy.typing as npt
+
+from ..state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
+from ..state.tracks import KeyChanges
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,14 +95,11 @@ class Past(Protocol):
         place alone. It does not say who has numbered them.
         """
 
-    def key_state(self, number: int, keys: Keys, until: int) -> Kept:
-        """The newest state that is kept of a revision not after `until`, with the points of some keys alone."""
+    def key_state(self, number: int, keys: Keys, until: int) -> tuple[int, npt.NDArray[np.int32], Contents]:
+        """The revision of the newest kept state not after `until`, which of some keys it has, and their points."""
 
-    def key_batches(self, number: int, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
-        """What some of the batches after a revision do to some keys, and the last revision of these batches.
-
-        Batches are left out that do nothing to them. What is held out of the hull is, too.
-        """
+    def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
+        """What some of the batches after a revision do to some keys, and the last revision of these batches."""
 
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""

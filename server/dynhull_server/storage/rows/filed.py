@@ -6,10 +6,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
-from dynhull.keys import key_list
-
 from ...state.records import CommitStamp, Kept, Keys, Record
-from ..of_keys import batches_of_keys
+from ...state.tracks import KeyChanges
+from ..of_keys import changes_of_keys
 from ..past import Hole, Moment, created
 from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive
@@ -87,14 +86,13 @@ class Filed:
         """The newest state that lies beside a segment, with the points of some keys alone."""
         return self._read_state(_begins(hull, until), keys)
 
-    def key_batches(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
+    def key_changes(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What the batches of one segment do to some keys, from a revision on."""
         segment = _segment(hull, after + 1)
-        name, facts = segment.file + BATCHES, segment.facts
+        name, facts, last = segment.file + BATCHES, segment.facts, min(until, segment.last)
         with self._noted(segment, BATCHES):
             columns, _, _ = keys_from_parquet(self._archive.read(name, facts.bytes, facts.digest), name, keys)
-        last = min(until, segment.last)
-        return list(batches_of_keys(Batches(columns).between(after, last), set(key_list(keys)))), last
+        return last, changes_of_keys(columns.between(after, last), keys)
 
     def _batches(self, segment: StoredSegment) -> Batches:
         with self._turn:

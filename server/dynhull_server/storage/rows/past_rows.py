@@ -116,8 +116,7 @@ def columns_between(reader: Reader, hull: HullRows, after: int, until: int, most
             if count >= most:
                 break
     columns = joined(parts, identity)
-    first, last = np.searchsorted(columns.revision, [after, until], side="right").tolist()
-    columns = columns.rows(first, last)
+    columns = columns.between(after, until)
     gaps = np.flatnonzero(np.diff(columns.revision, prepend=after) > 1)
     if len(gaps) or not len(columns):
         missing = int(columns.revision[gaps[0] - 1]) + 1 if len(gaps) and gaps[0] else after + 1

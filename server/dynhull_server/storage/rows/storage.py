@@ -9,13 +9,15 @@ from dataclasses import replace
 from threading import Lock
 from typing import Protocol, TypeVar
 
-from dynhull.keys import key_list
+import numpy as np
+import numpy.typing as npt
 
 from ...state.changes import Change
 from ...state.errors import words
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
-from ...state.records import CommitStamp, HullRow, Kept, Keys, Record
-from ..of_keys import batches_of_keys, contents_of_keys
+from ...state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
+from ...state.tracks import KeyChanges
+from ..of_keys import changes_of_keys, contents_of_keys
 from ..past import Hole, Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from ..segments.archive import NEEDS, Archive, is_installed
@@ -41,7 +43,16 @@ from .group import (
     SetHistory,
 )
 from .ledger import DROPPED, HullRows, Ledger, StoredSnapshot
-from .past_rows import batches_after, gathered_after, moment_at, oldest_moment, state_until
+from .past_rows import (
+    GATHERED_ROWS,
+    batches_after,
+    columns_between,
+    gathered_after,
+    moment_at,
+    oldest_moment,
+    require_kept,
+    state_until,
+)
 from .reading import commit_of, read_each, read_hull, read_records
 from .staging import staging
 from .tables import Reader
@@ -190,21 +201,23 @@ class RowStorage(ABC):
                 return self._filed.gathered(hull, after, until)
             return gathered_after(reader, hull, after, until)
 
-    def key_state(self, number: int, keys: Keys, until: int) -> Kept:
-        """The newest snapshot, with the points of some keys alone."""
+    def key_state(self, number: int, keys: Keys, until: int) -> tuple[int, npt.NDArray[np.int32], Contents]:
+        """What the newest snapshot has of some keys."""
         with self._of_hull(number) as (reader, hull):
             if self._filed is not None and until < hull.oldest:
-                return self._filed.key_state(hull, keys, until)
-            kept = state_until(reader, hull, until)
-            return replace(kept, contents=contents_of_keys(kept.contents, set(key_list(keys))))
+                kept = self._filed.key_state(hull, keys, until)
+            else:
+                kept = state_until(reader, hull, until)
+            return kept.revision, *contents_of_keys(kept.contents, keys)
 
-    def key_batches(self, number: int, keys: Keys, after: int, until: int) -> tuple[list[Record], int]:
+    def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What some of the batches after a revision do to some keys."""
         with self._of_hull(number) as (reader, hull):
             if self._filed is not None and after < hull.oldest:
-                return self._filed.key_batches(hull, keys, after, until)
-            records = batches_after(reader, hull, after, until)
-            return list(batches_of_keys(records, set(key_list(keys)))), records[-1].revision
+                return self._filed.key_changes(hull, keys, after, until)
+            require_kept(hull, after)
+            columns = columns_between(reader, hull, after, min(until, hull.last), GATHERED_ROWS)
+            return int(columns.revision[-1]), changes_of_keys(columns, keys)
 
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
         """A reader, and the rows of a hull as of the same moment; KeyError if no hull has that number."""

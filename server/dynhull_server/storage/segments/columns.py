@@ -93,6 +93,11 @@ class SegmentColumns:
             *(getattr(self, name)[keys if name == "keys" else slice(first, last)] for name in COLUMNS),
         )
 
+    def between(self, after: int, until: int) -> "SegmentColumns":
+        """The rows of the batches after one revision up to another one."""
+        first, last = np.searchsorted(self.revision, [after, until], side="right").tolist()
+        return self.rows(first, max(first, last))
+
     @property
     def moves(self) -> int:
         """The number of points and keys that these batches write."""

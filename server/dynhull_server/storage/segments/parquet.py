@@ -31,7 +31,9 @@ MOST_PLACES = 12
 EXACT = 2**53  # below that every whole number is a double
 SAMPLE = 1000
 LEVEL = 9
-GROUP_ROWS = 2**17
+# Who asks for the way of a key decompresses one of these: of 2**17 rows they take 2.6 percent fewer bytes, but four
+# times as long.
+GROUP_ROWS = 2**14
 # The columns as other programs see them.
 ORDER = (
     "revision",
@@ -145,10 +147,16 @@ def keys_from_parquet(data: bytes, name: str, keys: Keys) -> tuple[SegmentColumn
     import pyarrow.parquet as pq
 
     try:
-        wanted = pa.array(sorted(key_list(keys)), pa.string() if isinstance(keys, PackedKeys) else pa.uint64())
+        values = sorted(key_list(keys))
+        wanted = pa.array(values, pa.string() if isinstance(keys, PackedKeys) else pa.uint64())
         file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True)
         found = file.schema_arrow.metadata or {}
-        groups = [place for place in range(file.num_row_groups) if _may_have(file.metadata.row_group(place), wanted)]
+        column = file.schema_arrow.names.index("key")
+        groups = [
+            place
+            for place in range(file.num_row_groups)
+            if _may_have(file.metadata.row_group(place).column(column), values)
+        ]
         table = file.read_row_groups(groups)
         key = table.column("key")
         table = table.filter(pc.or_(pc.is_in(key, value_set=wanted), pc.is_null(key)))
@@ -158,14 +166,11 @@ def keys_from_parquet(data: bytes, name: str, keys: Keys) -> tuple[SegmentColumn
         raise DamagedError(f"{name} is damaged: {error}") from error
 
 
-def _may_have(group: pq.RowGroupMetaData, wanted: pa.Array) -> bool:
+def _may_have(column: pq.ColumnChunkMetaData, values: list[Any]) -> bool:
     """Whether a group of rows, which lie by key, may have one with these keys, which are in order, or with none."""
-    places = range(group.num_columns)
-    column = next(group.column(place) for place in places if group.column(place).path_in_schema == "key")
     statistics = column.statistics
     if statistics is None or not statistics.has_min_max or statistics.null_count:
         return True
-    values = wanted.to_pylist()
     after = bisect_left(values, statistics.min)
     return after < len(values) and values[after] <= statistics.max
 
