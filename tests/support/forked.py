@@ -23,7 +23,7 @@ import threading
 import time
 import warnings
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import NoReturn
 
@@ -132,10 +132,11 @@ def _wait_to_be(connection: socket.socket) -> None:
 def import_for(command: list[str]) -> None:
     for module in ("dynhull_client",) if command[0] == sys.executable else ("dynhull_cli.main", "dynhull_cli.commands"):
         importlib.import_module(module)
-    for entry in entry_points(group="dynhull.commands"):
+    for entry in _entries():
         if entry.name in command:
             for module in (entry.module, *RUN_BY.get(entry.name, RUN_BY_OTHERS)):
                 importlib.import_module(module)
+            _read_options(entry.name)
     for option, modules in (
         ("--workers", RUN_BY_SEVERAL),
         ("--cluster", RUN_BY_SEVERAL),
@@ -145,6 +146,21 @@ def import_for(command: list[str]) -> None:
             for module in modules:
                 importlib.import_module(module)
     gc.freeze()  # a collection would write to, and so copy, all of the memory that the processes share
+
+
+@cache
+def _entries() -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group="dynhull.commands"))
+
+
+@cache
+def _read_options(name: str) -> None:
+    """Have typer read the options of a command, by parsing none: of `serve`, that takes a third of its start."""
+    import typer
+
+    from dynhull_cli.commands import app
+
+    typer.main.get_command(app).get_command(None, name).make_context(name, [], resilient_parsing=True)
 
 
 def _become(command: list[str], folder: str, environment: dict[str, str], files: list[int]) -> None:
