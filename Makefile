@@ -216,7 +216,7 @@ mutants: $(BIN)/uv  ## put MUTANTS small faults into the reference geometry, one
 simulate: .venv/.test  ## random lives of the server in simulated time, for SECONDS from SEED, while a model checks every promise
 	PYTHONPATH=tests $(BIN)/python -m simulation run --seconds $(SECONDS) --seed $(SEED) --keep
 
-.venv/.peers: tests/javascript/package-lock.json tests/peers.sh
+.venv/.peers: tests/javascript/package-lock.json clients/typescript/package-lock.json tests/peers.sh
 	mkdir -p .venv
 	tests/peers.sh
 	touch $@
@@ -239,4 +239,4 @@ $(BIN)/uv:
 	touch $@
 
 clean:  ## remove everything that these words made
-	rm -rf .venv build dist tests/javascript/node_modules
+	rm -rf .venv build dist tests/javascript/node_modules clients/typescript/node_modules clients/typescript/types

@@ -35,6 +35,8 @@ if command -v go >/dev/null && ! command -v grpcurl >/dev/null; then
         || skipped "could not build grpcurl"
 fi
 if command -v npm >/dev/null; then
-    npm ci --prefix javascript --no-audit --no-fund --ignore-scripts --loglevel=error \
-        || skipped "could not install the npm packages"
+    for folder in javascript ../clients/typescript; do
+        npm ci --prefix "$folder" --no-audit --no-fund --ignore-scripts --loglevel=error \
+            || skipped "could not install the npm packages of $folder"
+    done
 fi

@@ -12,6 +12,7 @@ from typing import NoReturn
 import pytest
 
 JAVASCRIPT = Path(__file__).parents[1] / "javascript"
+TYPESCRIPT = Path(__file__).parents[2] / "clients" / "typescript"
 INSTALLED_BY = {
     "caddy": "Debian's package caddy",
     "chromium-headless-shell": "Debian's package chromium-headless-shell",
@@ -49,3 +50,10 @@ def javascript() -> Path:
     if not (JAVASCRIPT / "node_modules" / "@grpc").is_dir():
         missing("npm packages", "run `make peers`")
     return JAVASCRIPT
+
+
+def typescript() -> Path:
+    """The folder of the TypeScript package, with the npm packages that it needs."""
+    if not (TYPESCRIPT / "node_modules" / "typescript").is_dir():
+        missing("npm packages", "run `make peers`")
+    return TYPESCRIPT

@@ -1,0 +1,197 @@
+import { DynhullError } from "./errors.js"
+import { fromJson, toJson } from "./json.js"
+
+/**
+ * @typedef {object} ConnectionOptions
+ * @property {string | null} [token] sent as `Authorization: Bearer`, kept in memory only
+ * @property {number} [timeout] seconds that an answer may take
+ * @property {number} [retries] how often a read, or a numbered batch, is sent again when nobody answers
+ * @property {typeof globalThis.fetch} [fetch] another fetch
+ *
+ * @typedef {object} Call
+ * @property {string} [method]
+ * @property {Record<string, string | number | bigint | boolean | null | undefined>} [query]
+ * @property {unknown} [body]
+ * @property {string} [idempotencyKey]
+ * @property {boolean} [repeatable] whether it may be sent again if it is not known what became of it
+ * @property {AbortSignal | null} [signal]
+ */
+
+/** The first pause before something is tried again, and the longest, in seconds. */
+export const PAUSES = { first: 0.25, last: 15 }
+
+/** Calls of one gateway. */
+export class Connection {
+  #token
+  #timeout
+  #retries
+  #fetch
+
+  /**
+   * @param {string} url
+   * @param {ConnectionOptions} options
+   */
+  constructor(url, { token = null, timeout = 30, retries = 3, fetch = globalThis.fetch.bind(globalThis) }) {
+    this.url = url.replace(/\/+$/, "")
+    this.#token = token
+    this.#timeout = timeout
+    this.#retries = retries
+    this.#fetch = fetch
+  }
+
+  /**
+   * Ask, and again when that is safe.
+   * @param {string} path
+   * @param {Call} [call]
+   * @returns {Promise<any>} what the answer's JSON has
+   */
+  async ask(path, call = {}) {
+    const pauses = growing()
+    for (let tries = 0; ; tries++) {
+      try {
+        return await this.#once(path, call)
+      } catch (error) {
+        const again = error instanceof DynhullError && (error.passing || (call.repeatable && error.unknown))
+        if (!again || tries >= this.#retries) throw error
+        await pause(pauses.next().value, call.signal)
+      }
+    }
+  }
+
+  /**
+   * Open a stream of events.
+   * @param {string} path
+   * @param {Call} call
+   * @param {string} lastEventId where to go on; empty for the beginning
+   * @returns {Promise<ReadableStream<Uint8Array>>}
+   */
+  async open(path, call, lastEventId) {
+    const headers = { Accept: "text/event-stream", ...(lastEventId && { "Last-Event-ID": lastEventId }) }
+    const response = await this.#send(path, call, headers, call.signal ?? undefined)
+    if (!response.ok || response.body === null) throw await problemOf(response)
+    return response.body
+  }
+
+  /** @param {string} path @param {Call} call */
+  async #once(path, call) {
+    const late = AbortSignal.timeout(this.#timeout * 1000)
+    const signal = call.signal ? AbortSignal.any([call.signal, late]) : late
+    const headers = {
+      Accept: "application/json",
+      ...(call.body !== undefined && { "Content-Type": "application/json" }),
+      ...(call.idempotencyKey && { "Idempotency-Key": call.idempotencyKey }),
+    }
+    try {
+      const response = await this.#send(path, call, headers, signal)
+      if (!response.ok) throw await problemOf(response)
+      const text = await response.text()
+      return text ? fromJson(text) : null
+    } catch (error) {
+      if (error instanceof DynhullError || call.signal?.aborted) throw error
+      if (late.aborted) {
+        const detail = `${path}: no answer within ${this.#timeout} s`
+        throw new DynhullError({ reason: "DEADLINE", detail }, error)
+      }
+      throw unreachable(this.url, error)
+    }
+  }
+
+  /**
+   * @param {string} path
+   * @param {Call} call
+   * @param {Record<string, string>} headers
+   * @param {AbortSignal | undefined} signal
+   */
+  async #send(path, { method = "GET", query = {}, body }, headers, signal) {
+    const given = Object.entries(query).flatMap(([name, value]) => (value == null ? [] : [[name, String(value)]]))
+    const search = given.length ? `?${new URLSearchParams(given)}` : ""
+    const all = this.#token === null ? headers : { ...headers, Authorization: `Bearer ${this.#token}` }
+    try {
+      return await this.#fetch(this.url + path + search, {
+        method,
+        headers: all,
+        ...(body !== undefined && { body: toJson(body) }),
+        ...(signal && { signal }),
+        cache: "no-store",
+      })
+    } catch (error) {
+      if (signal?.aborted) throw error
+      throw unreachable(this.url, error)
+    }
+  }
+}
+
+/**
+ * A part of a path: a slash in a name is written %2F.
+ * @param {TemplateStringsArray} texts
+ * @param {string[]} names
+ */
+export function path(texts, ...names) {
+  return String.raw({ raw: texts }, ...names.map(encodeURIComponent))
+}
+
+/**
+ * Growing pauses in seconds, no two callers alike.
+ * @returns {Generator<number, never>}
+ */
+export function* growing() {
+  for (let seconds = PAUSES.first; ; seconds = Math.min(2 * seconds, PAUSES.last)) yield seconds * (0.5 + Math.random())
+}
+
+/**
+ * Wait; shorter if the page is shown again or the network is back.
+ * @param {number} seconds
+ * @param {AbortSignal | null} [signal]
+ * @returns {Promise<void>}
+ */
+export function pause(seconds, signal) {
+  return new Promise((resolve, reject) => {
+    if (signal?.aborted) return reject(signal.reason)
+    const end = (/** @type {() => void} */ then) => () => {
+      clearTimeout(timer)
+      signal?.removeEventListener("abort", abort)
+      for (const [target, name] of WAKERS) target.removeEventListener(name, wake)
+      then()
+    }
+    const abort = end(() => reject(signal?.reason))
+    const wake = end(resolve)
+    const timer = setTimeout(wake, seconds * 1000)
+    signal?.addEventListener("abort", abort)
+    for (const [target, name] of WAKERS) target.addEventListener(name, wake)
+  })
+}
+
+/** What says that a sleeping page is there again. @type {[EventTarget, string][]} */
+const WAKERS =
+  typeof document === "undefined"
+    ? []
+    : [
+        [document, "visibilitychange"],
+        [globalThis, "online"],
+      ]
+
+/** @param {string} url @param {unknown} cause */
+export function unreachable(url, cause) {
+  const said = cause instanceof Error ? cause.message : String(cause)
+  return new DynhullError({ reason: "UNREACHABLE", detail: `no answer from ${url}: ${said}` }, cause)
+}
+
+/** @param {Response} response */
+async function problemOf(response) {
+  const text = await response.text()
+  const type = response.headers.get("Content-Type") ?? ""
+  if (!type.startsWith("application/problem+json")) {
+    // A proxy's page: the server behind it may be back soon.
+    const reason = response.status >= 500 ? "UNREACHABLE" : "REFUSED"
+    return new DynhullError({ reason, status: response.status, detail: `${response.status} ${response.statusText}` })
+  }
+  return problem(fromJson(text))
+}
+
+/**
+ * The error that problem details describe.
+ * @param {any} said
+ */
+export function problem(said) {
+  return new DynhullError({ ...said, reason: said.reason ?? "REFUSED" })
+}

@@ -1,0 +1,6 @@
+export { Client } from "./client.js"
+export { DynhullError } from "./errors.js"
+export { HullCopies } from "./hull-copies.js"
+export { HullCopy } from "./hull-copy.js"
+export { isoTime, micros } from "./json.js"
+export { Writer } from "./writer.js"

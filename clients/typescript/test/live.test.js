@@ -1,0 +1,129 @@
+import assert from "node:assert/strict"
+import { test } from "node:test"
+
+import { Client, DynhullError, HullCopies, HullCopy } from "../src/index.js"
+
+const url = process.env.DYNHULL_GATEWAY ?? ""
+const options = { skip: url ? false : "DYNHULL_GATEWAY names no gateway" }
+const client = new Client(url)
+const name = (/** @type {string} */ what) => `${process.env.DYNHULL_NAME ?? "node"}/${what}`
+
+test("hulls are created, written, asked and deleted", options, async () => {
+  const hull = name("all")
+  const { revision, keyed, created } = await client.createHull(hull, { keyed: "int", existOk: true })
+  assert.deepEqual([revision, keyed, typeof created], [0n, "int", "bigint"])
+  const keys = [1, 9007199254740993n, 18446744073709551615n, 4n]
+  const applied = await client.put(hull, keys, [[0, 0], [4, 0], [4, 3], [5e-324, 1e-320]])
+  assert.deepEqual([applied.revision, applied.inserted, applied.hullChanged], [1n, 4, true])
+  const found = await client.getHull(hull)
+  assert.deepEqual(found.vertices, [[0, 0], [4, 0], [4, 3], [5e-324, 1e-320]])
+  assert.deepEqual(found.vertexKeys, [1n, 9007199254740993n, 18446744073709551615n, 4n])
+  assert.deepEqual((await client.locate(hull, [[1, 0.5], [2, 0], [9, 9]])).sides, [1, 0, -1])
+  assert.deepEqual((await client.locate(hull, { keys: [1n] })).sides, [0])
+  assert.deepEqual((await client.support(hull, [[1, 0]], { keys: true })).keys, [9007199254740993n])
+  const { positions, present } = await client.positions(hull, [18446744073709551615n, 7n])
+  assert.deepEqual([positions, present], [[[4, 3], [null, null]], [true, false]])
+  assert.equal((await client.remove(hull, [4n, 5n])).missing, 1)
+  assert.equal((await client.getMeasures(hull)).area, 6)
+  assert.equal((await client.verify(hull)).equal, true)
+  const past = await client.at(hull, 1)
+  assert.deepEqual([past.revision, (await past.locate([[5e-324, 1e-320]])).sides], [1n, [0]])
+  assert.deepEqual((await past.entities()).keys.length, 4)
+  const all = []
+  for await (const each of client.listHulls(name(""))) all.push(each.name)
+  assert.ok(all.includes(hull))
+  await client.deleteHull(hull)
+  await assert.rejects(client.getHull(hull), { reason: "HULL_NOT_FOUND", status: 404 })
+})
+
+test("refusals name the field, the row and the value", options, async () => {
+  const hull = name("refused")
+  await client.createHull(hull)
+  const bad = client.apply(hull, { insert: [[0, 0], [1, /** @type {any} */ ("x")]] })
+  await assert.rejects(bad, (error) => {
+    assert.ok(error instanceof DynhullError)
+    assert.deepEqual([error.reason, error.field, error.row, error.value], ["INVALID_FIELD", "insert", 1, '"x"'])
+    return true
+  })
+  await assert.rejects(client.apply(hull, { delete: [[8, 8]] }), { reason: "POINT_MISSING" })
+  await assert.rejects(new Client("http://127.0.0.1:1", { retries: 0 }).getHull(hull), { reason: "UNREACHABLE" })
+})
+
+test("a numbered batch is applied once, and a transfer whole", options, async () => {
+  const [a, b] = [name("once/a"), name("once/b")]
+  for (const hull of [a, b]) await client.createHull(hull, { keyed: "str" })
+  const batch = { keys: ["k"], points: [[1, 1]], producer: "page", sequence: 1 }
+  assert.equal((await client.apply(a, /** @type {any} */ (batch))).duplicate, false)
+  assert.equal((await client.apply(a, /** @type {any} */ (batch))).duplicate, true)
+  assert.equal(await client.lastSequence(a, "page"), 1n)
+  const moved = await client.transfer({ [a]: { remove: ["k"] }, [b]: { keys: ["k"], points: [[2, 2]] } })
+  assert.deepEqual([moved[a].deleted, moved[b].inserted], [1, 1])
+})
+
+test("a watch waits for its hull, follows it, and says that it is gone", options, async () => {
+  const hull = name("watched")
+  const copy = new HullCopy()
+  const watch = client.watch(hull, { copy, keys: true, measures: true })
+  const first = watch.next()
+  await client.createHull(hull, { keyed: "str" })
+  assert.equal((await first).value?.type, "snapshot")
+  await client.put(hull, ["a", "b", "c"], [[0, 0], [4, 0], [4, 3]])
+  while (copy.revision < 1n) await watch.next()
+  assert.deepEqual(copy.locate([[3, 1], [0, 0], [0, 1]]), Int8Array.of(1, 0, -1))
+  await client.remove(hull, ["a"])
+  while (copy.revision < 2n) await watch.next()
+  assert.deepEqual([copy.vertices, copy.vertexKeys], [[[4, 0], [4, 3]], ["b", "c"]])
+  await client.deleteHull(hull)
+  let last
+  do last = (await watch.next()).value
+  while (last?.type !== "deleted")
+  assert.throws(() => copy.area, { reason: "HULL_NOT_FOUND" })
+  await watch.return()
+})
+
+test("many hulls are watched by one stream", options, async () => {
+  const copies = new HullCopies()
+  const watch = client.watchMany(name("many/"), { outlines: true, copies })
+  for await (const event of watch) {
+    if (event.type === "complete" && !copies.size) {
+      await client.createHull(name("many/a"))
+      await client.apply(name("many/a"), { insert: [[0, 0], [4, 0], [4, 3]] })
+    } else if (copies.get(name("many/a"))?.revision === 1n) {
+      assert.equal(copies.get(name("many/a"))?.area, 6)
+      await client.deleteHull(name("many/a"))
+    } else if (event.gone.length) break
+  }
+  assert.equal(copies.size, 0)
+})
+
+test("fences make events, which a consumer acknowledges", options, async () => {
+  const [hull, fence] = [name("fenced"), name("fence")]
+  await client.createHull(hull, { keyed: "str" })
+  const made = await client.createFence(fence, { area: { center: [0, 0], radius: 3 }, subjects: hull, initial: "none" })
+  assert.deepEqual([made.area, made.lastSequence], [{ center: [0, 0], radius: 3 }, 0n])
+  await client.put(hull, ["a"], [[1, 1]])
+  await client.put(hull, ["a"], [[9, 9]])
+  const types = []
+  for await (const event of client.watchFence(fence, { after: 0 })) {
+    types.push([event.type, event.key, event.sequence, event.position])
+    if (types.length === 2) break
+  }
+  assert.deepEqual(types, [["enter", "a", 1n, [1, 1]], ["exit", "a", 2n, [9, 9]]])
+  assert.equal((await client.ackFence(fence, "page", 2n)).backlog, 0)
+  assert.deepEqual((await client.fenceInside(fence)).subjects.flatMap((each) => each.keys), [])
+  await client.deleteFence(fence)
+})
+
+test("a writer gathers, waits for room, and stops where the server refuses", options, async () => {
+  const hull = name("writer")
+  await client.createHull(hull, { keyed: "int" })
+  const writer = client.writer(hull, { batchRows: 500, room: 1000 })
+  for (let i = 0; i < 5000; i++) await writer.put([i % 700], [[i, i % 13]])
+  await writer.remove([0])
+  await writer.flush()
+  assert.equal((await client.getHull(hull)).info.points, 699)
+  assert.equal(writer.sequence, await client.lastSequence(hull, writer.producer))
+  await writer.put([1], [[1, 1]], ["yesterday"]).catch(() => {})
+  await assert.rejects(writer.flush(), { reason: "INVALID_FIELD" })
+  await assert.rejects(writer.put([2], [[2, 2]]), { reason: "INVALID_FIELD" })
+})

@@ -1,0 +1,82 @@
+"""Writes clients/typescript/test/cases.json: questions to copies of hulls, with the exact answers, for every language.
+
+Run it from the root of the project: python tests/typescript/make_cases.py
+"""
+
+import json
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+from dynhull import DynamicHull
+
+CASES = Path(__file__).parents[2] / "clients" / "typescript" / "test" / "cases.json"
+TINY, HUGE = 5e-324, 1.7976931348623157e308
+
+
+def shapes(dice: Random) -> list[list[tuple[float, float]]]:
+    """Points of hulls: none, one, few, many, on a line, at both ends of what doubles can be."""
+    found: list[list[tuple[float, float]]] = [
+        [],
+        [(1.5, -2.5)],
+        [(0.0, 0.0), (4.0, 3.0)],
+        [(2.0, -1.0), (2.0, 5.0)],
+        [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0)],
+        [(0.0, 0.0), (0.0, 2.0), (3.0, 2.0), (3.0, 0.0)],
+        [(TINY, TINY), (3 * TINY, TINY), (2 * TINY, 4 * TINY)],
+        [(-HUGE, -HUGE), (HUGE, -HUGE), (0.0, HUGE)],
+        [(TINY, 0.0), (HUGE, TINY), (1.0, HUGE), (-1e-300, 1e300)],
+        [(0.1, 0.1), (0.2, 0.2), (0.3, 0.3), (0.30000000000000004, 0.1)],
+    ]
+    for size in (3, 5, 8, 20, 100):
+        for scale in (1.0, 1e-310, 1e200, 2.0**-30):
+            found += [[(dice.uniform(-1, 1) * scale, dice.uniform(-1, 1) * scale) for _ in range(size)]]
+    found.append([(float(x), float(x * x)) for x in range(-20, 21)])
+    return found
+
+
+def near(dice: Random, vertices: list[list[float]]) -> list[list[float]]:
+    """Points on and beside edges and vertices, some units in the last place away."""
+    found = []
+    for index, (ax, ay) in enumerate(vertices):
+        bx, by = vertices[(index + 1) % len(vertices)]
+        part = dice.random()
+        x, y = ax * (1 - part) + bx * part, ay * (1 - part) + by * part
+        for _ in range(dice.randrange(4)):
+            x = float(np.nextafter(x, dice.choice((-np.inf, np.inf))))
+            y = float(np.nextafter(y, dice.choice((-np.inf, np.inf))))
+        found += [[x, y], [ax, ay], [float(np.nextafter(ax, bx)), ay]]
+    return [point for point in found if np.isfinite(point).all()][:60]
+
+
+def case(dice: Random, points: list[tuple[float, float]]) -> dict[str, object]:
+    hull = DynamicHull(np.array(points, float).reshape(-1, 2))
+    vertices = hull.vertices().tolist()
+    asked = [*near(dice, vertices), [0.0, 0.0], [-0.0, 1.0], [HUGE, TINY], [-HUGE, HUGE], [1e-320, -1e-320]]
+    asked += [[dice.uniform(-2, 2), dice.uniform(-2, 2)] for _ in range(5)]
+    directions = [[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [TINY, HUGE], [-0.3, 0.7], [3.0, -4.0]]
+    finite = [None if not np.isfinite(each) else each for each in hull.distance(asked).tolist()]
+    tangents = [None if np.isnan(pair).any() else pair.tolist() for pair in hull.tangents(asked)]
+    return {
+        "vertices": vertices,
+        "area": hull.area if np.isfinite(hull.area) else None,
+        "points": asked,
+        "sides": hull.locate(asked).tolist(),
+        "distances": finite,
+        "tangents": tangents,
+        "directions": directions,
+        "support": hull.support(directions).tolist() if vertices else [],
+    }
+
+
+def main() -> None:
+    dice = Random(41)
+    cases = [case(dice, points) for points in shapes(dice)]
+    CASES.write_text(
+        json.dumps(cases, allow_nan=False, separators=(",", ":")).replace('{"vertices"', '\n{"vertices"') + "\n"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,166 @@
+"""The TypeScript package: its own tests with a real gateway, kills, its types, a page, and the cases that it shares."""
+
+import gzip
+import json
+import subprocess
+import threading
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chromium import chromium
+from gateway_process import Gateway, gateway_process
+from mortal_server import MortalServer
+from peers import program, typescript
+from server_process import PATIENCE
+
+from dynhull import DynamicHull
+from dynhull_client import HullClient, HullCopy, Snapshot
+
+HERE = Path(__file__).parent
+KILLS = 2
+POINTS = 20_000
+ONE_SCRIPT = 60_000  # bytes, compressed
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MortalServer]:
+    server = MortalServer(tmp_path_factory.mktemp("typescript"))
+    yield server
+    server.kill()
+
+
+@pytest.fixture(scope="module")
+def gateway(server: MortalServer) -> Iterator[Gateway]:
+    with gateway_process(server.address, "--origin", "*") as running:
+        yield running
+
+
+def node(*words: str, **environment: str) -> str:
+    """What a program of Node prints in the package's folder."""
+    command = ["env", *(f"{name}={value}" for name, value in environment.items()), program("node"), *words]
+    done = subprocess.run(command, cwd=typescript(), capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def blocks(kind: str) -> list[str]:
+    """The blocks of a kind on the page about the package."""
+    text = (HERE.parents[1] / "docs" / "how-to" / "typescript.md").read_text()
+    return [block.partition("```")[0] for block in text.split(f"```{kind}\n")[1:]]
+
+
+def test_its_own_tests(gateway: Gateway) -> None:
+    said = node("--test", "--test-reporter=tap", DYNHULL_GATEWAY=gateway.url)
+    assert "\n# fail 0\n" in said
+    assert "\n# skipped 0\n" in said
+
+
+def test_its_types_are_right_and_it_packs() -> None:
+    said = node("node_modules/typescript/bin/tsc", "--noEmit")
+    assert said == ""
+    command = [program("npm"), "pack", "--dry-run", "--json", "--ignore-scripts"]
+    packed = subprocess.run(command, cwd=typescript(), capture_output=True, text=True, check=True, timeout=PATIENCE)
+    files = {each["path"] for each in json.loads(packed.stdout)[0]["files"]}
+    sources = {f"src/{each.name}" for each in (typescript() / "src").iterdir()}
+    assert files == sources | {"package.json", "README.md", "LICENSES.md"}
+
+
+def test_python_has_the_same_cases() -> None:
+    cases = json.loads((typescript() / "test" / "cases.json").read_text())
+    for case in cases:
+        vertices = np.array(case["vertices"], float).reshape(-1, 2)
+        copy = HullCopy()
+        copy.update(Snapshot(1, len(vertices), vertices, None))
+        assert copy.locate(case["points"]).tolist() == case["sides"]
+        told = [np.inf if each is None else each for each in case["distances"]]
+        assert copy.distance(case["points"]).tolist() == told
+        if len(vertices):
+            assert copy.support(case["directions"]).tolist() == case["support"]
+
+
+def test_points_beside_edges(tmp_path: Path) -> None:
+    """Each verdict beside edges is that of the library."""
+    dice = np.random.default_rng(41)
+    angles = np.sort(dice.uniform(0, 2 * np.pi, 300))
+    hull = DynamicHull(np.column_stack([np.cos(angles), np.sin(angles)]) * 10 + 3)
+    vertices = hull.vertices()
+    edges, part = dice.integers(len(vertices), size=POINTS), dice.uniform(size=(POINTS, 1))
+    points = vertices[edges] * part + np.roll(vertices, -1, axis=0)[edges] * (1 - part)
+    points += np.spacing(points) * dice.integers(-3, 4, size=points.shape)
+    points[: len(vertices)] = vertices
+    for name, array in (("vertices", vertices), ("points", points)):
+        (tmp_path / name).write_bytes(array.astype("<f8").tobytes())
+    found = node(str(HERE / "locate.mjs"), str(tmp_path))
+    sides = np.frombuffer(bytes.fromhex(found), np.int8)
+    expected = hull.locate(points)
+    assert len({*expected.tolist()}) == 3
+    assert np.array_equal(sides, expected)
+
+
+def test_a_writer_and_a_watch_outlive_servers(server: MortalServer, gateway: Gateway) -> None:
+    name = "typescript/kills"
+    command = [program("node"), str(HERE / "outlives.mjs"), gateway.url, name]
+    with subprocess.Popen(command, cwd=typescript(), stdout=subprocess.PIPE, text=True) as running:
+        assert running.stdout is not None
+        for _ in range(KILLS):
+            for _ in range(80):
+                running.stdout.readline()  # a line for each event of the watch, and for each acknowledgement
+            server.kill()
+            server.start()
+        said = json.loads(running.stdout.read().splitlines()[-1])
+        assert running.wait(PATIENCE) == 0
+    with HullClient(server.address) as client:
+        hull = client.get_hull(name)
+        assert hull.revision == said["sequence"], "a batch was applied twice, or not at all"
+        assert hull.vertices.tolist() == said["vertices"]
+        assert hull.info.points == said["keys"]
+
+
+def test_what_the_page_of_documentation_says(gateway: Gateway, server: MortalServer) -> None:
+    first, watching, writing = blocks("js")
+    ended = watching.replace("console.log(", "if (event.type === 'snapshot') break\n  console.log(")
+    program = (
+        (first + ended + writing).replace("http://127.0.0.1:8080", gateway.url).replace('"dynhull"', '"./src/index.js"')
+    )
+    node("--input-type=module", "-e", program + "console.assert(sides[0] === 1)")
+    with HullClient(server.address) as client:
+        assert client.positions("fleet", ["LH400"]).positions.tolist() == [[9, 51]]
+
+
+def test_a_page_with_a_live_hull(gateway: Gateway, server: MortalServer, tmp_path: Path) -> None:
+    name = "typescript/page"
+    (page,) = blocks('html title="index.html"')
+    (tmp_path / "index.html").write_text(page.replace("http://127.0.0.1:8080", gateway.url).replace("fleet", name))
+    (tmp_path / "node_modules").mkdir()
+    for package in ("lossless-json", "robust-predicates"):
+        (tmp_path / "node_modules" / package).symlink_to(typescript() / "node_modules" / package)
+    (tmp_path / "node_modules" / "dynhull").symlink_to(typescript())
+    loaded: list[bytes] = []
+    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
+    with (
+        ThreadingHTTPServer(("127.0.0.1", 0), handler) as pages,
+        HullClient(server.address) as client,
+        chromium() as browser,
+    ):
+        serving = threading.Thread(target=pages.serve_forever)
+        serving.start()
+        client.create_hull(name)
+        seen = browser.new_page()
+        errors: list[str] = []
+        seen.on("pageerror", lambda error: errors.append(str(error)))
+        seen.on("response", lambda response: loaded.append(response.body()) if response.url.endswith(".js") else None)
+        seen.goto(f"http://127.0.0.1:{pages.server_port}/")
+        client.apply(name, insert=[(0, 0), (4, 0), (4, 3)])
+        seen.wait_for_function("document.title === 'revision 1: area 6'")
+        client.apply(name, insert=[(0, 3)])
+        seen.wait_for_function("document.title === 'revision 2: area 12'")
+        assert seen.locator("polygon").get_attribute("points") == "0,0 4,0 4,3 0,3"
+        assert errors == []
+        seen.close()
+        pages.shutdown()
+        serving.join()
+    assert sum(len(gzip.compress(each)) for each in loaded) <= ONE_SCRIPT
