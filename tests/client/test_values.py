@@ -54,6 +54,7 @@ EXPORTED = [
     "DynhullError",
     "Efficient",
     "Entities",
+    "Erasure",
     "Event",
     "Feed",
     "FeedBatch",

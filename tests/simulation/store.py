@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
-from dynhull_server.state.records import CommitStamp, HullRow, Kept
+from dynhull_server.state.records import CommitStamp, HullRow, Kept, Keys
+from dynhull_server.storage.past import Erasure
 from dynhull_server.storage.port import NEWEST, NotCommittedError, Progress, Storage, StorageStep, StoredContents
 
 from .model import Model
@@ -189,6 +190,17 @@ class FaultyStorage:
             self.give_way()
             self._fail("history")
             yield step
+
+    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator[StorageStep]:
+        """Steps; each may fail."""
+        for step in self._inner.erase(number, keys, until, now):
+            self.give_way()
+            self._fail("history")
+            yield step
+
+    def erasures(self, number: int) -> tuple[Erasure, ...]:
+        """What was erased."""
+        return self._inner.erasures(number)
 
     def sync(self) -> None:
         """Fails, perhaps."""

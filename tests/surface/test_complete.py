@@ -136,6 +136,7 @@ BODIES = [
     ("recenter", schemas.Recenter, {}),
     ("reshard", schemas.Reshard, {}),
     ("set_history", schemas.KeptHistory, {}),
+    ("erase_history", schemas.ErasedKeys, {}),
 ]
 
 

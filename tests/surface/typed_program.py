@@ -19,6 +19,7 @@ def hulls(client: sdk.HullClient) -> None:
     assert_type(client.reshard("b", 4), sdk.HullInfo)
     assert_type(client.set_history("a", "30d", 10**9), sdk.HullInfo)
     assert_type(client.history("a"), sdk.History)
+    assert_type(client.erase_history("a", ["k"]), sdk.Erasure | None)
     assert_type(client.wait_for_hull("a", min_revision=1, timeout=2.5), sdk.HullInfo)
     assert_type(client.list_hulls("a"), Iterator[sdk.HullInfo])
     assert_type(client.set_quarantine("a", sdk.Quarantine(max_speed=300)), sdk.HullInfo)

@@ -1,6 +1,6 @@
 """`dynhull history`: what there is of the past of a hull, and how much of it is kept."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,7 +13,7 @@ from .plural import plural
 if TYPE_CHECKING:
     from datetime import timedelta
 
-    from dynhull_client import History, HullClient
+    from dynhull_client import Erasure, History, HullClient
 
 FOREVER, NOTHING = "forever", "none"
 KEPT = "How long to keep the past: a time span such as 30d, or forever."
@@ -43,7 +43,34 @@ def set_history(
     _report(client, name, as_json)
 
 
-@beside({"set": set_history})
+@connected
+def erase_history(
+    client: "HullClient",
+    name: HullName,
+    key: Annotated[list[str], typer.Option(help="Key to erase. May be repeated.")],
+    as_json: AsJson = False,
+) -> None:
+    """Erase keys from the past of a hull, which then is as if they had never been in it.
+
+        dynhull remove fleet --key LH400
+        dynhull history erase fleet --key LH400
+
+    All of it is erased at once, or none. What the hull has now stays, so a key that it has is refused. Backups
+    that were made before, and events of fences, keep the keys.
+    """
+    from .keyed_rows import keys_for
+
+    found = client.erase_history(name, keys_for(client, name, key))
+    if as_json:
+        typer.echo(json_line(name=name, erased=None if found is None else _erasure(found)))
+    elif found is None:
+        typer.echo(f"{name}: no segment has {'this key' if len(key) == 1 else 'any of these keys'}")
+    else:
+        revisions = f"revisions {found.first_revision} to {found.last_revision}"
+        typer.echo(f"{name}: {plural(found.moves, 'move')} of {plural(found.keys, 'key')} erased from {revisions}")
+
+
+@beside({"set": set_history, "erase": erase_history})
 @connected
 def history(client: "HullClient", name: HullName, as_json: AsJson = False) -> None:
     """Show from when on the past of a hull can be read, and how many bytes it takes.
@@ -80,12 +107,27 @@ def _report(client: "HullClient", name: str, as_json: bool) -> None:
                 moves=found.moves,
                 history=age if age is None or isinstance(age, bool) else age.total_seconds(),
                 history_bytes=found.history_bytes,
+                erasures=list(map(_erasure, found.erasures)),
             )
         )
         return
     since = "" if found.first_time is None else f" of {found.first_time.isoformat(timespec='seconds')}"
     in_segments = f"{plural(found.moves, 'move')} in {plural(found.bytes, 'byte')} of segments"
     typer.echo(f"{name}: from revision {found.first_revision}{since} on, {in_segments}, {_kept(found)}")
+    for each in found.erasures:
+        revisions = f"revisions {each.first_revision} to {each.last_revision}"
+        erased = f"{plural(each.keys, 'key')} erased from {revisions}, {plural(each.moves, 'move')}"
+        typer.echo(f"  {each.time.isoformat(timespec='seconds')}: {erased}")
+
+
+def _erasure(erasure: "Erasure") -> dict[str, Any]:
+    return {
+        "time": erasure.time.isoformat(),
+        "first_revision": erasure.first_revision,
+        "last_revision": erasure.last_revision,
+        "keys": erasure.keys,
+        "moves": erasure.moves,
+    }
 
 
 def _kept(found: "History") -> str:

@@ -112,6 +112,17 @@ async def set_history(client: Caller, name: HullPath, kept: schemas.KeptHistory)
     return schemas.HullInfo.model_validate(await client.set_history(name, kept.history, kept.history_bytes))
 
 
+@router.post("/hulls/{name}/history/erase")
+async def erase_history(client: Caller, name: HullPath, erased: schemas.ErasedKeys) -> schemas.Erasure | None:
+    """Erase keys from the past of a hull, which then is as if they had never been in it.
+
+    Keys that the hull has now are refused. The token needs to be allowed to write the hull, and to read its past. Null
+    if no segment had any of the keys.
+    """
+    found = await client.erase_history(name, erased.keys)
+    return None if found is None else schemas.Erasure.model_validate(found)
+
+
 @router.put("/hulls/{name}/quarantine")
 async def set_quarantine(client: Caller, name: HullPath, rules: schemas.QuarantineRules) -> schemas.HullInfo:
     """Replace the rules that hold bad positions out of a keyed hull. What is held stays so."""

@@ -195,6 +195,19 @@ class KeptHistory(Request):
     history_bytes: KeptBytes = None
 
 
+class ErasedKeys(Request):
+    """Keys to erase from the past of a hull."""
+
+    model_config = example(keys=["LH400"])
+
+    keys: list[Key]
+
+
+@answering(sdk.Erasure)
+class Erasure(Response):
+    """Keys were erased from the past of a hull. Which ones is kept nowhere."""
+
+
 @answering(sdk.History)
 class History(Response):
     """What is there of the past of a hull."""

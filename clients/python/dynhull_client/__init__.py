@@ -37,7 +37,7 @@ from ._client import HullClient
 from ._errors import *  # noqa: F403  # all of them: `_errors.__all__`
 from ._feed_messages import FeedBatch, FeedHeld
 from ._fence_messages import Fence, FenceConsumer, FenceEvent, Inside, SubjectsInside
-from ._history_messages import History
+from ._history_messages import Erasure, History
 from ._hull_copies import HullCopies
 from ._hull_copy import HullCopy
 from ._ingest import Ingest
@@ -110,6 +110,7 @@ __all__ = [
     "Distances",
     "Efficient",
     "Entities",
+    "Erasure",
     "Event",
     "Feed",
     "FeedBatch",

@@ -110,6 +110,7 @@ class HullClient(Client[BlockingConnection]):
     reshard = _answering(calls.reshard)
     set_history = _answering(past.set_history)
     history = _answering(past.history)
+    erase_history = _answering(past.erase_history)
     wait_for_hull = _answering(calls.wait_for_hull)
     delete_hull = _answering(calls.delete_hull)
     apply = _answering(calls.apply)

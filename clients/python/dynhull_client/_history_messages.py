@@ -12,6 +12,24 @@ from ._times import decode_time
 
 
 @dataclass(frozen=True, slots=True)
+class Erasure:
+    """Keys were erased from the past of a hull. Which ones is kept nowhere.
+
+    Attributes:
+        time: when.
+        first_revision, last_revision: as of these revisions, and those between, the hull may lack keys that it had.
+        keys: the number of keys that were named.
+        moves: how often batches had put, removed or held one of them.
+    """
+
+    time: datetime
+    first_revision: int
+    last_revision: int
+    keys: int
+    moves: int
+
+
+@dataclass(frozen=True, slots=True)
 class History:
     """What is there of the past of a hull.
 
@@ -25,6 +43,7 @@ class History:
         moves: the number of points and keys that these batches write.
         history: for how long the past is kept; True for ever, None for not at all.
         history_bytes: in how many bytes it is kept at most; None for any number.
+        erasures: what was erased from it, the oldest first.
     """
 
     first_revision: int
@@ -36,6 +55,7 @@ class History:
     moves: int
     history: timedelta | bool | None = None
     history_bytes: int | None = None
+    erasures: tuple[Erasure, ...] = ()
 
 
 def encode_history(history: Any, history_bytes: int | None) -> hull_pb2.History | None:
@@ -93,4 +113,15 @@ def decode_history(response: pb.GetHistoryResponse) -> History:
         response.moves,
         age,
         kept.max_bytes or None,
+        tuple(map(_erasure, response.erasures)),
     )
+
+
+def decode_erasure(response: pb.EraseHistoryResponse) -> Erasure | None:
+    """What has been erased as received; None for nothing."""
+    return _erasure(response.erasure) if response.HasField("erasure") else None
+
+
+def _erasure(message: hull_pb2.Erasure) -> Erasure:
+    revisions = message.first_revision, message.last_revision
+    return Erasure(decode_time(message.time), *revisions, message.keys, message.moves)

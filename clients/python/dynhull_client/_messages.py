@@ -79,6 +79,7 @@ class HullInfo:
         shards: the number of shards that its points are divided among; None for a hull that is not divided. Of a keyed
             hull over shards `distinct` is 0, because it is not known.
         changed: when its newest batch was committed, or points last left by time; None where that is not known.
+        erased: as of the past: whether it may lack keys that it had then, because `erase_history` has erased them.
     """
 
     name: str
@@ -98,6 +99,7 @@ class HullInfo:
     held: int = 0
     shards: int | None = None
     changed: datetime | None = None
+    erased: bool = False
 
     @property
     def restored(self) -> bool:
@@ -515,6 +517,7 @@ def decode_info(message: hull_pb2.Hull) -> HullInfo:
         message.held_count,
         config.shards or None,
         _changed(message),
+        message.erased,
     )
 
 

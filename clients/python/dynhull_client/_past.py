@@ -69,6 +69,7 @@ class AsOf:
         name: the name of the hull.
         revision: the revision.
         time: when it was committed; of revision 0, when the hull was created; None where that is not known.
+        erased: whether the hull may lack keys that it had then, because `erase_history` has erased them.
     """
 
     def __init__(self, connection: Any, info: HullInfo) -> None:
@@ -76,6 +77,7 @@ class AsOf:
         self.name = info.name
         self.revision = info.revision
         self.time = info.changed
+        self.erased = info.erased
         self._uid = info.uid
 
     def __repr__(self) -> str:

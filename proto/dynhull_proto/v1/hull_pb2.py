@@ -26,7 +26,7 @@ from google.protobuf import duration_pb2 as google_dot_protobuf_dot_duration__pb
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1b\x64ynhull_proto/v1/hull.proto\x12\ndynhull.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\x85\x03\n\x04Hull\x12\x0c\n\x04name\x18\x01 \x01(\t\x12&\n\x06\x63onfig\x18\x02 \x01(\x0b\x32\x16.dynhull.v1.HullConfig\x12\x10\n\x08revision\x18\x03 \x01(\x04\x12\x13\n\x0bpoint_count\x18\x04 \x01(\x04\x12\x1c\n\x14\x64istinct_point_count\x18\x05 \x01(\x04\x12/\n\x0b\x63reate_time\x18\x06 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0b\n\x03uid\x18\x07 \x01(\t\x12.\n\nclock_time\x18\x08 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\"\n\x06\x63\x65nter\x18\t \x01(\x0b\x32\x12.dynhull.v1.LonLat\x12*\n\nquarantine\x18\n \x01(\x0b\x32\x16.dynhull.v1.Quarantine\x12\x12\n\nheld_count\x18\x0b \x01(\x04\x12\x30\n\x0c\x63hanged_time\x18\x0c \x01(\x0b\x32\x1a.google.protobuf.Timestamp\"\xbc\x02\n\nHullConfig\x12&\n\x08identity\x18\x01 \x01(\x0e\x32\x14.dynhull.v1.Identity\x12\x12\n\nmax_points\x18\x02 \x01(\x04\x12\"\n\x06window\x18\x03 \x01(\x0b\x32\x12.dynhull.v1.Window\x12&\n\x08ordering\x18\x04 \x01(\x0e\x32\x14.dynhull.v1.Ordering\x12 \n\x05\x66rame\x18\x05 \x01(\x0e\x32\x11.dynhull.v1.Frame\x12\"\n\x06\x63\x65nter\x18\x06 \x01(\x0b\x32\x12.dynhull.v1.LonLat\x12*\n\nquarantine\x18\x07 \x01(\x0b\x32\x16.dynhull.v1.Quarantine\x12\x0e\n\x06shards\x18\x08 \x01(\r\x12$\n\x07history\x18\t \x01(\x0b\x32\x13.dynhull.v1.History\"H\n\x07History\x12*\n\x07max_age\x18\x01 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x11\n\tmax_bytes\x18\x02 \x01(\x04\"\x88\x01\n\nQuarantine\x12\x16\n\tmax_speed\x18\x01 \x01(\x01H\x00\x88\x01\x01\x12\x17\n\nmax_growth\x18\x02 \x01(\x01H\x01\x88\x01\x01\x12\x1a\n\rconfirmations\x18\x03 \x01(\rH\x02\x88\x01\x01\x42\x0c\n\n_max_speedB\r\n\x0b_max_growthB\x10\n\x0e_confirmations\"-\n\x06LonLat\x12\x11\n\tlongitude\x18\x01 \x01(\x01\x12\x10\n\x08latitude\x18\x02 \x01(\x01\"\xbf\x01\n\x06Window\x12*\n\x07max_age\x18\x01 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x12\n\nmax_points\x18\x02 \x01(\x04\x12 \n\x05\x63lock\x18\x03 \x01(\x0e\x32\x11.dynhull.v1.Clock\x12+\n\x08max_skew\x18\x04 \x01(\x0b\x32\x19.google.protobuf.Duration\x12&\n\x05\x61head\x18\x05 \x01(\x0e\x32\x17.dynhull.v1.AheadPolicy\"\xd1\x01\n\x08Measures\x12\x0c\n\x04\x61rea\x18\x01 \x01(\x01\x12\x11\n\tperimeter\x18\x02 \x01(\x01\x12\x12\n\ncentroid_x\x18\x03 \x01(\x01\x12\x12\n\ncentroid_y\x18\x04 \x01(\x01\x12\r\n\x05min_x\x18\x05 \x01(\x01\x12\r\n\x05min_y\x18\x06 \x01(\x01\x12\r\n\x05max_x\x18\x07 \x01(\x01\x12\r\n\x05max_y\x18\x08 \x01(\x01\x12\x15\n\x08\x64iameter\x18\t \x01(\x01H\x00\x88\x01\x01\x12\x12\n\x05width\x18\n \x01(\x01H\x01\x88\x01\x01\x42\x0b\n\t_diameterB\x08\n\x06_width*E\n\x05\x46rame\x12\x15\n\x11\x46RAME_UNSPECIFIED\x10\x00\x12\x0f\n\x0b\x46RAME_PLANE\x10\x01\x12\x14\n\x10\x46RAME_GEOGRAPHIC\x10\x02*@\n\x05\x43lock\x12\x15\n\x11\x43LOCK_UNSPECIFIED\x10\x00\x12\x10\n\x0c\x43LOCK_SERVER\x10\x01\x12\x0e\n\nCLOCK_DATA\x10\x02*\\\n\x0b\x41headPolicy\x12\x1c\n\x18\x41HEAD_POLICY_UNSPECIFIED\x10\x00\x12\x17\n\x13\x41HEAD_POLICY_REFUSE\x10\x01\x12\x16\n\x12\x41HEAD_POLICY_CLAMP\x10\x02*S\n\x08Ordering\x12\x18\n\x14ORDERING_UNSPECIFIED\x10\x00\x12\x14\n\x10ORDERING_ARRIVAL\x10\x01\x12\x17\n\x13ORDERING_EVENT_TIME\x10\x02*p\n\x08Identity\x12\x18\n\x14IDENTITY_UNSPECIFIED\x10\x00\x12\x15\n\x11IDENTITY_MULTISET\x10\x01\x12\x18\n\x14IDENTITY_STRING_KEYS\x10\x02\x12\x19\n\x15IDENTITY_INTEGER_KEYS\x10\x03\x42\x16Z\x14\x64ynhull/v1;dynhullv1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1b\x64ynhull_proto/v1/hull.proto\x12\ndynhull.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\x95\x03\n\x04Hull\x12\x0c\n\x04name\x18\x01 \x01(\t\x12&\n\x06\x63onfig\x18\x02 \x01(\x0b\x32\x16.dynhull.v1.HullConfig\x12\x10\n\x08revision\x18\x03 \x01(\x04\x12\x13\n\x0bpoint_count\x18\x04 \x01(\x04\x12\x1c\n\x14\x64istinct_point_count\x18\x05 \x01(\x04\x12/\n\x0b\x63reate_time\x18\x06 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0b\n\x03uid\x18\x07 \x01(\t\x12.\n\nclock_time\x18\x08 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\"\n\x06\x63\x65nter\x18\t \x01(\x0b\x32\x12.dynhull.v1.LonLat\x12*\n\nquarantine\x18\n \x01(\x0b\x32\x16.dynhull.v1.Quarantine\x12\x12\n\nheld_count\x18\x0b \x01(\x04\x12\x30\n\x0c\x63hanged_time\x18\x0c \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06\x65rased\x18\r \x01(\x08\"\xbc\x02\n\nHullConfig\x12&\n\x08identity\x18\x01 \x01(\x0e\x32\x14.dynhull.v1.Identity\x12\x12\n\nmax_points\x18\x02 \x01(\x04\x12\"\n\x06window\x18\x03 \x01(\x0b\x32\x12.dynhull.v1.Window\x12&\n\x08ordering\x18\x04 \x01(\x0e\x32\x14.dynhull.v1.Ordering\x12 \n\x05\x66rame\x18\x05 \x01(\x0e\x32\x11.dynhull.v1.Frame\x12\"\n\x06\x63\x65nter\x18\x06 \x01(\x0b\x32\x12.dynhull.v1.LonLat\x12*\n\nquarantine\x18\x07 \x01(\x0b\x32\x16.dynhull.v1.Quarantine\x12\x0e\n\x06shards\x18\x08 \x01(\r\x12$\n\x07history\x18\t \x01(\x0b\x32\x13.dynhull.v1.History\"H\n\x07History\x12*\n\x07max_age\x18\x01 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x11\n\tmax_bytes\x18\x02 \x01(\x04\"\x7f\n\x07\x45rasure\x12(\n\x04time\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x16\n\x0e\x66irst_revision\x18\x02 \x01(\x04\x12\x15\n\rlast_revision\x18\x03 \x01(\x04\x12\x0c\n\x04keys\x18\x04 \x01(\x04\x12\r\n\x05moves\x18\x05 \x01(\x04\"\x88\x01\n\nQuarantine\x12\x16\n\tmax_speed\x18\x01 \x01(\x01H\x00\x88\x01\x01\x12\x17\n\nmax_growth\x18\x02 \x01(\x01H\x01\x88\x01\x01\x12\x1a\n\rconfirmations\x18\x03 \x01(\rH\x02\x88\x01\x01\x42\x0c\n\n_max_speedB\r\n\x0b_max_growthB\x10\n\x0e_confirmations\"-\n\x06LonLat\x12\x11\n\tlongitude\x18\x01 \x01(\x01\x12\x10\n\x08latitude\x18\x02 \x01(\x01\"\xbf\x01\n\x06Window\x12*\n\x07max_age\x18\x01 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x12\n\nmax_points\x18\x02 \x01(\x04\x12 \n\x05\x63lock\x18\x03 \x01(\x0e\x32\x11.dynhull.v1.Clock\x12+\n\x08max_skew\x18\x04 \x01(\x0b\x32\x19.google.protobuf.Duration\x12&\n\x05\x61head\x18\x05 \x01(\x0e\x32\x17.dynhull.v1.AheadPolicy\"\xd1\x01\n\x08Measures\x12\x0c\n\x04\x61rea\x18\x01 \x01(\x01\x12\x11\n\tperimeter\x18\x02 \x01(\x01\x12\x12\n\ncentroid_x\x18\x03 \x01(\x01\x12\x12\n\ncentroid_y\x18\x04 \x01(\x01\x12\r\n\x05min_x\x18\x05 \x01(\x01\x12\r\n\x05min_y\x18\x06 \x01(\x01\x12\r\n\x05max_x\x18\x07 \x01(\x01\x12\r\n\x05max_y\x18\x08 \x01(\x01\x12\x15\n\x08\x64iameter\x18\t \x01(\x01H\x00\x88\x01\x01\x12\x12\n\x05width\x18\n \x01(\x01H\x01\x88\x01\x01\x42\x0b\n\t_diameterB\x08\n\x06_width*E\n\x05\x46rame\x12\x15\n\x11\x46RAME_UNSPECIFIED\x10\x00\x12\x0f\n\x0b\x46RAME_PLANE\x10\x01\x12\x14\n\x10\x46RAME_GEOGRAPHIC\x10\x02*@\n\x05\x43lock\x12\x15\n\x11\x43LOCK_UNSPECIFIED\x10\x00\x12\x10\n\x0c\x43LOCK_SERVER\x10\x01\x12\x0e\n\nCLOCK_DATA\x10\x02*\\\n\x0b\x41headPolicy\x12\x1c\n\x18\x41HEAD_POLICY_UNSPECIFIED\x10\x00\x12\x17\n\x13\x41HEAD_POLICY_REFUSE\x10\x01\x12\x16\n\x12\x41HEAD_POLICY_CLAMP\x10\x02*S\n\x08Ordering\x12\x18\n\x14ORDERING_UNSPECIFIED\x10\x00\x12\x14\n\x10ORDERING_ARRIVAL\x10\x01\x12\x17\n\x13ORDERING_EVENT_TIME\x10\x02*p\n\x08Identity\x12\x18\n\x14IDENTITY_UNSPECIFIED\x10\x00\x12\x15\n\x11IDENTITY_MULTISET\x10\x01\x12\x18\n\x14IDENTITY_STRING_KEYS\x10\x02\x12\x19\n\x15IDENTITY_INTEGER_KEYS\x10\x03\x42\x16Z\x14\x64ynhull/v1;dynhullv1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -34,28 +34,30 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'dynhull_proto.v1.hull_pb2',
 if not _descriptor._USE_C_DESCRIPTORS:
   _globals['DESCRIPTOR']._loaded_options = None
   _globals['DESCRIPTOR']._serialized_options = b'Z\024dynhull/v1;dynhullv1'
-  _globals['_FRAME']._serialized_start=1485
-  _globals['_FRAME']._serialized_end=1554
-  _globals['_CLOCK']._serialized_start=1556
-  _globals['_CLOCK']._serialized_end=1620
-  _globals['_AHEADPOLICY']._serialized_start=1622
-  _globals['_AHEADPOLICY']._serialized_end=1714
-  _globals['_ORDERING']._serialized_start=1716
-  _globals['_ORDERING']._serialized_end=1799
-  _globals['_IDENTITY']._serialized_start=1801
-  _globals['_IDENTITY']._serialized_end=1913
+  _globals['_FRAME']._serialized_start=1630
+  _globals['_FRAME']._serialized_end=1699
+  _globals['_CLOCK']._serialized_start=1701
+  _globals['_CLOCK']._serialized_end=1765
+  _globals['_AHEADPOLICY']._serialized_start=1767
+  _globals['_AHEADPOLICY']._serialized_end=1859
+  _globals['_ORDERING']._serialized_start=1861
+  _globals['_ORDERING']._serialized_end=1944
+  _globals['_IDENTITY']._serialized_start=1946
+  _globals['_IDENTITY']._serialized_end=2058
   _globals['_HULL']._serialized_start=109
-  _globals['_HULL']._serialized_end=498
-  _globals['_HULLCONFIG']._serialized_start=501
-  _globals['_HULLCONFIG']._serialized_end=817
-  _globals['_HISTORY']._serialized_start=819
-  _globals['_HISTORY']._serialized_end=891
-  _globals['_QUARANTINE']._serialized_start=894
-  _globals['_QUARANTINE']._serialized_end=1030
-  _globals['_LONLAT']._serialized_start=1032
-  _globals['_LONLAT']._serialized_end=1077
-  _globals['_WINDOW']._serialized_start=1080
-  _globals['_WINDOW']._serialized_end=1271
-  _globals['_MEASURES']._serialized_start=1274
-  _globals['_MEASURES']._serialized_end=1483
+  _globals['_HULL']._serialized_end=514
+  _globals['_HULLCONFIG']._serialized_start=517
+  _globals['_HULLCONFIG']._serialized_end=833
+  _globals['_HISTORY']._serialized_start=835
+  _globals['_HISTORY']._serialized_end=907
+  _globals['_ERASURE']._serialized_start=909
+  _globals['_ERASURE']._serialized_end=1036
+  _globals['_QUARANTINE']._serialized_start=1039
+  _globals['_QUARANTINE']._serialized_end=1175
+  _globals['_LONLAT']._serialized_start=1177
+  _globals['_LONLAT']._serialized_end=1222
+  _globals['_WINDOW']._serialized_start=1225
+  _globals['_WINDOW']._serialized_end=1416
+  _globals['_MEASURES']._serialized_start=1419
+  _globals['_MEASURES']._serialized_end=1628
 # @@protoc_insertion_point(module_scope)

@@ -133,7 +133,7 @@ class GetHistoryRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ...) -> None: ...
 
 class GetHistoryResponse(_message.Message):
-    __slots__ = ("history", "first_revision", "first_time", "last_revision", "last_time", "bytes", "batches", "moves")
+    __slots__ = ("history", "first_revision", "first_time", "last_revision", "last_time", "bytes", "batches", "moves", "erasures")
     HISTORY_FIELD_NUMBER: _ClassVar[int]
     FIRST_REVISION_FIELD_NUMBER: _ClassVar[int]
     FIRST_TIME_FIELD_NUMBER: _ClassVar[int]
@@ -142,6 +142,7 @@ class GetHistoryResponse(_message.Message):
     BYTES_FIELD_NUMBER: _ClassVar[int]
     BATCHES_FIELD_NUMBER: _ClassVar[int]
     MOVES_FIELD_NUMBER: _ClassVar[int]
+    ERASURES_FIELD_NUMBER: _ClassVar[int]
     history: _hull_pb2.History
     first_revision: int
     first_time: _timestamp_pb2.Timestamp
@@ -150,7 +151,22 @@ class GetHistoryResponse(_message.Message):
     bytes: int
     batches: int
     moves: int
-    def __init__(self, history: _Optional[_Union[_hull_pb2.History, _Mapping]] = ..., first_revision: _Optional[int] = ..., first_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., last_revision: _Optional[int] = ..., last_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., bytes: _Optional[int] = ..., batches: _Optional[int] = ..., moves: _Optional[int] = ...) -> None: ...
+    erasures: _containers.RepeatedCompositeFieldContainer[_hull_pb2.Erasure]
+    def __init__(self, history: _Optional[_Union[_hull_pb2.History, _Mapping]] = ..., first_revision: _Optional[int] = ..., first_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., last_revision: _Optional[int] = ..., last_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., bytes: _Optional[int] = ..., batches: _Optional[int] = ..., moves: _Optional[int] = ..., erasures: _Optional[_Iterable[_Union[_hull_pb2.Erasure, _Mapping]]] = ...) -> None: ...
+
+class EraseHistoryRequest(_message.Message):
+    __slots__ = ("name", "keys")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    keys: _points_pb2.Keys
+    def __init__(self, name: _Optional[str] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
+
+class EraseHistoryResponse(_message.Message):
+    __slots__ = ("erasure",)
+    ERASURE_FIELD_NUMBER: _ClassVar[int]
+    erasure: _hull_pb2.Erasure
+    def __init__(self, erasure: _Optional[_Union[_hull_pb2.Erasure, _Mapping]] = ...) -> None: ...
 
 class SetQuarantineRequest(_message.Message):
     __slots__ = ("name", "quarantine")

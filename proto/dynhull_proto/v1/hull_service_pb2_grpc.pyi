@@ -98,6 +98,13 @@ class HullServiceStub:
     """
     GetHistory: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.GetHistoryRequest, _hull_service_pb2.GetHistoryResponse]
     """What is there of the past of a hull."""
+    EraseHistory: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.EraseHistoryRequest, _hull_service_pb2.EraseHistoryResponse]
+    """Erases keys from the past of a hull, which then is as if they had never been in it: its segments are replaced by others,
+    all of them at once. What the hull has now stays: FAILED_PRECONDITION if it has one of the keys, also in quarantine;
+    remove it first. A hull without a history forgets all of its past. Backups that were made before keep the keys.
+
+    The caller needs to be allowed to write the hull, and to read its past.
+    """
     ListHeld: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]
     """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
     Batch.drops let them in and drop them.
@@ -306,6 +313,13 @@ class HullServiceAsyncStub(HullServiceStub):
     """
     GetHistory: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.GetHistoryRequest, _hull_service_pb2.GetHistoryResponse]  # type: ignore[assignment]
     """What is there of the past of a hull."""
+    EraseHistory: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.EraseHistoryRequest, _hull_service_pb2.EraseHistoryResponse]  # type: ignore[assignment]
+    """Erases keys from the past of a hull, which then is as if they had never been in it: its segments are replaced by others,
+    all of them at once. What the hull has now stays: FAILED_PRECONDITION if it has one of the keys, also in quarantine;
+    remove it first. A hull without a history forgets all of its past. Backups that were made before keep the keys.
+
+    The caller needs to be allowed to write the hull, and to read its past.
+    """
     ListHeld: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.ListHeldRequest, _hull_service_pb2.ListHeldResponse]  # type: ignore[assignment]
     """Lists the positions in quarantine by key, in pages. FAILED_PRECONDITION if the hull is not keyed. Batch.releases and
     Batch.drops let them in and drop them.
@@ -559,6 +573,19 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_hull_service_pb2.GetHistoryResponse, _abc.Awaitable[_hull_service_pb2.GetHistoryResponse]]:
         """What is there of the past of a hull."""
+
+    @_abc_1.abstractmethod
+    def EraseHistory(
+        self,
+        request: _hull_service_pb2.EraseHistoryRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_hull_service_pb2.EraseHistoryResponse, _abc.Awaitable[_hull_service_pb2.EraseHistoryResponse]]:
+        """Erases keys from the past of a hull, which then is as if they had never been in it: its segments are replaced by others,
+        all of them at once. What the hull has now stays: FAILED_PRECONDITION if it has one of the keys, also in quarantine;
+        remove it first. A hull without a history forgets all of its past. Backups that were made before keep the keys.
+
+        The caller needs to be allowed to write the hull, and to read its past.
+        """
 
     @_abc_1.abstractmethod
     def ListHeld(

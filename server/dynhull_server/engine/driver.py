@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import Future
 from functools import partial
 from typing import Any, Protocol, assert_never
@@ -52,6 +52,8 @@ PAST_THREADS = 2
 TICK = 0.1
 # Seconds that a commit may take before it is reported as failing: a disk that hangs raises no error.
 STUCK = 10.0
+# Each step of a snapshot or sweep is followed by a pause of this many times its duration.
+PAUSE_FACTOR = 4.0
 # Seconds between looks at the commit in progress.
 WATCH_SECONDS = 1.0
 
@@ -273,6 +275,20 @@ class Driver:
         done: asyncio.Future[None] = self._loop.create_future()
         self._commits.submit(changes, lambda error, _: self._from_thread(partial(_settle, done, error)))
         return done
+
+    async def commit_steps(self, steps: Iterator[Any], run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> None:
+        """Commit steps one after another, each made by `run` after the commit of the one before.
+
+        Batches have priority on the disk: pauses follow.
+        """
+        clock = self.machine.clock
+        while True:
+            begun = clock.monotonic()
+            step = await run(partial(next, steps, None))
+            if step is None:
+                return
+            await self.commit([step])
+            await clock.sleep(PAUSE_FACTOR * (clock.monotonic() - begun))
 
     async def settled(self) -> None:
         """Wait for the commits that have begun; raises the error if their outcome cannot be decided."""

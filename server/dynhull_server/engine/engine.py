@@ -132,7 +132,7 @@ class Engine:
         every(house.CHECKPOINT_SECONDS, "checkpoint", house.checkpoint)
         every(house.SNAPSHOT_SECONDS, "snapshots", partial(house.snapshots, snapshot_points))
         every(house.SWEEP_SECONDS, "sweep", house.sweep)
-        every(house.HISTORY_SECONDS, "history", house.file_history)
+        every(self.hulls.filing.SECONDS, "history", self.hulls.filing.round)
         if sync_seconds is not None:
             every(sync_seconds, "sync", house.sync)
 

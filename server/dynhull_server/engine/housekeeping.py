@@ -1,19 +1,11 @@
 """Background work on the storage: snapshots, which shorten a restart; checkpoints, syncs and sweeps."""
 
-from collections.abc import Awaitable, Callable, Iterator
-from functools import partial
-from typing import Any
-
 from ..state.errors import HullNotFoundError
 from ..storage.port import Storage
 from .division import Divisions, StoredShard
 from .driver import Driver
 from .hulls import Hulls
 from .live_hull import LiveHull
-
-# Batches have priority on the disk: each step of a snapshot or sweep is followed by a pause of this many times its
-# duration.
-PAUSE_FACTOR = 4.0
 
 
 class Housekeeping:
@@ -22,14 +14,12 @@ class Housekeeping:
     CHECKPOINT_SECONDS = 0.25
     SNAPSHOT_SECONDS = 1.0
     SWEEP_SECONDS = 5.0
-    HISTORY_SECONDS = 1.0
 
     def __init__(self, driver: Driver, hulls: Hulls, storage: Storage, divisions: Divisions | None) -> None:
         self._driver = driver
         self._hulls = hulls
         self._storage = storage
         self._divisions = divisions
-        self._clock = driver.machine.clock
 
     async def checkpoint(self) -> None:
         """Checkpoint the storage."""
@@ -41,11 +31,7 @@ class Housekeeping:
 
     async def sweep(self) -> None:
         """Remove the data of deleted hulls."""
-        await self._carry_out(self._storage.sweep(), self._driver.on_disk)
-
-    async def file_history(self) -> None:
-        """Make segments of what the journal need not have any longer, and remove those that are not to be kept."""
-        await self._carry_out(self._storage.file_history(self._driver.time()), self._driver.in_history)
+        await self._driver.commit_steps(self._storage.sweep(), self._driver.on_disk)
 
     async def snapshots(self, least_points: int) -> None:
         """Write a snapshot of every hull that needs one, one after another.
@@ -76,21 +62,12 @@ class Housekeeping:
     async def _snapshot(self, hull: LiveHull) -> None:
         unsaved = hull.unsaved
         _, kept = await hull.read(lambda state: state.kept(), rows=hull.counts.points)
-        await self._carry_out(self._storage.snapshot(hull.number, kept), self._driver.on_disk)
+        await self._driver.commit_steps(self._storage.snapshot(hull.number, kept), self._driver.on_disk)
         hull.saved(unsaved)
 
     async def _snapshot_of_shard(self, shard: StoredShard) -> None:
         taken = shard.take()
         if taken is not None:
             kept, unsaved = taken
-            await self._carry_out(self._storage.snapshot(shard.number, kept), self._driver.on_disk)
+            await self._driver.commit_steps(self._storage.snapshot(shard.number, kept), self._driver.on_disk)
             shard.saved(unsaved)
-
-    async def _carry_out(self, steps: Iterator[Any], run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> None:
-        while True:
-            begun = self._clock.monotonic()
-            step = await run(partial(next, steps, None))
-            if step is None:
-                return
-            await self._driver.commit([step])
-            await self._clock.sleep(PAUSE_FACTOR * (self._clock.monotonic() - begun))

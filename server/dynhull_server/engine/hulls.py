@@ -27,6 +27,7 @@ from .driver import Driver
 from .feed import HullFeeds
 from .feed_many import PrefixFeed
 from .fences import Fences
+from .filing import Filing
 from .layers import COPIES
 from .live_hull import LiveHull
 from .past import PastHull, PastHulls, Place
@@ -53,6 +54,7 @@ class Hulls:
         pasts: finds and rebuilds earlier revisions.
         series: the measures that are kept.
         feeds: reads the batches of each.
+        filing: writes the segments of their past.
     """
 
     def __init__(self, driver: Driver, storage: Storage, fences: Fences, divisions: Divisions | None) -> None:
@@ -68,6 +70,7 @@ class Hulls:
         self._changing: set[asyncio.Task[None]] = set()
         self._turn_of_settings = asyncio.Lock()
         self.pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
+        self.filing = Filing(driver, storage, self.pasts)
         self._live: dict[Hull, LiveHull] = {}
         self._incarnation = driver.machine.token()  # that of hulls in memory; others find theirs in the storage
         self._standing = standing(self._incarnation, driver.published)
@@ -107,9 +110,9 @@ class Hulls:
     async def replayed(self, live: LiveHull, first: int, last: int) -> ReplayedHull:
         """A hull at its first revision, on its way to its last one. Raises the errors of `PastHulls.state`."""
         hull = self._same(live)
-        state = await self.pasts.own(hull, first)
+        state, erasures = await self.pasts.own(hull, first)
         around = self._driver, hull, self._recalls, self._fences, self._copies
-        return ReplayedHull(*around, live, self.pasts, state, last)
+        return ReplayedHull(*around, live, self.pasts, state, erasures, last)
 
     def _same(self, live: LiveHull) -> Hull:
         """The hull of the core, or raise HullNotFoundError if there is another one of that name by now."""

@@ -124,6 +124,11 @@ class LiveHull:
         return self._hull.committed
 
     @property
+    def erased(self) -> bool:
+        """Whether it may lack keys that were erased from its past: not as it is now."""
+        return False
+
+    @property
     def vertex_count(self) -> int:
         """The number of vertices when they were last read."""
         return self._hull.vertex_count

@@ -4,7 +4,7 @@ import asyncio
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager, asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, TypeVar
 from weakref import WeakValueDictionary
@@ -26,7 +26,7 @@ from ..state.hull_state import Counts, HullState
 from ..state.records import CommitStamp, Keys, Record
 from ..state.root_state import state_of
 from ..state.tracks import Moves, Tracker
-from ..storage.past import Hole, Moment, Past, created
+from ..storage.past import Erasure, Hole, Moment, Past, created
 from .divided_hull import DividedHull
 from .driver import Driver
 from .fences import Fences
@@ -44,11 +44,25 @@ MOST_KEPT, NEAR = 4, 1024
 
 @dataclass(slots=True, eq=False)
 class _Rebuilt:
-    """A rebuilt hull that nobody reads at present, and about the number of rows that it takes."""
+    """A rebuilt hull that nobody reads at present.
+
+    Attributes:
+        hull: the hull.
+        state: its state at a revision.
+        rows: about the number of rows that it takes.
+        erasures: the erasures from its past before it was read.
+        round: how often everything had been forgotten before.
+    """
 
     hull: Hull
     state: HullState
     rows: int
+    erasures: tuple[Erasure, ...]
+    round: int
+
+
+class _ErasedMeanwhileError(Exception):
+    """Keys were erased while a hull was rebuilt: what was read first may have them, and what was read last not."""
 
 
 class PastHulls:
@@ -74,6 +88,7 @@ class PastHulls:
         self._kept: list[_Rebuilt] = []  # the last used at the end
         self._turns: WeakValueDictionary[tuple[int, int], asyncio.Lock] = WeakValueDictionary()
         self.outcomes: Counter[Outcome] = Counter()
+        self._round = 0
 
     async def moment(self, live: LiveHull, revision: int | None, time: int, field: str = "at_") -> Moment:
         """The revision that is asked for: a number, or None for the last one committed at or before a time.
@@ -86,6 +101,11 @@ class PastHulls:
             MomentForgottenError: that time is before the oldest that is kept, or later than now.
         """
         self._require_past(live)
+        found = await self._moment(live, revision, time, field)
+        erasures = await self.ask(live.name, partial(self._past.erasures, live.number))
+        return replace(found, erased=any(each.concerns(found.revision) for each in erasures))
+
+    async def _moment(self, live: LiveHull, revision: int | None, time: int, field: str) -> Moment:
         number, newest = live.number, live.counts.revision
         if revision is None:
             await self._settled(time, field)
@@ -124,17 +144,36 @@ class PastHulls:
             # After any other end a thread may still read it.
             self._keep(rebuilt)
 
-    async def own(self, hull: Hull, revision: int) -> HullState:
-        """The state of a hull at a revision, for one who changes it. Raises the errors of `state`."""
-        return (await self._reach(hull, revision)).state
+    async def own(self, hull: Hull, revision: int) -> tuple[HullState, tuple[Erasure, ...]]:
+        """The state of a hull at a revision, for one who changes it, and what had been erased from its past.
 
-    async def batches(self, live: LiveHull, after: int, until: int) -> list[Record]:
+        Raises the errors of `state`.
+        """
+        rebuilt = await self._reach(hull, revision)
+        return rebuilt.state, rebuilt.erasures
+
+    async def batches(
+        self, live: LiveHull, after: int, until: int, erasures: tuple[Erasure, ...] | None = None
+    ) -> list[Record]:
         """The batches that follow revision `after`, none after `until`, as many as are applied in some milliseconds.
+
+        For a state to be applied to, `erasures` are those before it was read.
 
         Raises:
             RevisionForgottenError: they are not kept any more.
+            NotStoredError: they cannot be read at present, or do not fit the state, since keys were erased meanwhile.
         """
-        found: list[Record] = await self._onwards(live, after, partial(self._past.batches, live.number, after, until))
+
+        def read() -> list[Record]:
+            records = self._past.batches(live.number, after, until)
+            if erasures is not None and self._past.erasures(live.number) != erasures:
+                raise _ErasedMeanwhileError
+            return records
+
+        try:
+            found: list[Record] = await self._onwards(live, after, read)
+        except _ErasedMeanwhileError:
+            raise NotStoredError("keys were erased from the past meanwhile: begin again") from None
         return found
 
     async def tracker(self, live: LiveHull, keys: Keys, revision: int) -> Tracker:
@@ -195,23 +234,29 @@ class PastHulls:
         """A hull at a revision, from a kept one or anew."""
         rebuilt = self._take(hull, revision)
         self.outcomes["anew" if rebuilt is None else "kept"] += 1
-        if rebuilt is None:
-            rebuilt = await self._begin(hull, revision)
-        while rebuilt.state.counts.revision < revision:
-            await self.ask(hull.name, partial(self._step, rebuilt, revision))
+        while rebuilt is None or rebuilt.state.counts.revision < revision:
+            try:
+                if rebuilt is None:
+                    rebuilt = await self._begin(hull, revision)
+                else:
+                    await self.ask(hull.name, partial(self._step, rebuilt, revision))
+            except _ErasedMeanwhileError:
+                rebuilt = None
         return rebuilt
 
     async def _begin(self, hull: Hull, revision: int) -> _Rebuilt:
         """The newest stored state at or before a revision."""
+        number, round_ = hull.row.number, self._round
 
         def begin() -> _Rebuilt:
-            kept = self._past.state(hull.row.number, revision)
+            erasures = self._past.erasures(number)
+            kept = self._past.state(number, revision)
             rows = len(kept.contents)
             self._require_room(rows)
             if not kept.revision:
                 kept.committed = created(hull.row)
             state = state_of(self._driver.limits, hull.row.settings, kept, self._driver.machine.clock.monotonic())
-            return _Rebuilt(hull, state, rows)
+            return _Rebuilt(hull, state, rows, erasures, round_)
 
         rebuilt: _Rebuilt = await self.ask(hull.name, begin)
         return rebuilt
@@ -219,7 +264,10 @@ class PastHulls:
     def _step(self, rebuilt: _Rebuilt, revision: int) -> None:
         """Apply the next batches."""
         state = rebuilt.state
-        records = self._past.gathered(rebuilt.hull.row.number, state.counts.revision, revision)
+        number = rebuilt.hull.row.number
+        records = self._past.gathered(number, state.counts.revision, revision)
+        if self._past.erasures(number) != rebuilt.erasures:
+            raise _ErasedMeanwhileError
         rebuilt.rows += sum(1 + len(each.rows) for each in records)
         self._require_room(rebuilt.rows)
         state.catch_up(records, self._driver.machine.clock.monotonic())
@@ -243,8 +291,13 @@ class PastHulls:
         found.rows = found.state.counts.points
         return found
 
+    def forget(self) -> None:
+        """Forget what was rebuilt: keys have been erased that it may have."""
+        self._round += 1
+        self._kept.clear()
+
     def _keep(self, rebuilt: _Rebuilt) -> None:
-        if rebuilt.state.torn:
+        if rebuilt.state.torn or rebuilt.round != self._round:
             return
         rebuilt.rows = rebuilt.state.counts.points
         self._kept.append(rebuilt)
@@ -313,6 +366,7 @@ class PastHull(LiveHull):
         self._revision = moment.revision
         self._counts: Counts | None = None
         self._stamp = moment.committed
+        self._erased = moment.erased
         self._size = 0
 
     async def begin(self) -> None:
@@ -335,6 +389,11 @@ class PastHull(LiveHull):
     def committed(self) -> CommitStamp | None:
         """The commit of its revision; None where it is not known."""
         return self._stamp
+
+    @property
+    def erased(self) -> bool:
+        """Whether it may lack keys that were erased from its past."""
+        return self._erased
 
     @property
     def vertex_count(self) -> int:

@@ -4,13 +4,14 @@ from collections import deque
 from collections.abc import AsyncGenerator
 from functools import partial
 
-from ..state.errors import HullNotFoundError, HullUnsuitableError, RevisionForgottenError
+from ..state.errors import HullNotFoundError, HullUnsuitableError, NotStoredError, RevisionForgottenError
 from ..state.fences.model.config import FenceConfig
 from ..state.fences.model.records import FenceEvent
 from ..state.fences.past import PastFence, changes_of
 from ..state.hull import Hull
-from ..state.records import CommitStamp, Record
-from ..storage.past import Moment, Past
+from ..state.hull_state import HullState
+from ..state.records import CommitStamp, HullRow, Record
+from ..storage.past import Erasure, Moment, Past
 from ..storage.port import DamagedError
 from .driver import Driver
 from .fences import Fences
@@ -24,6 +25,14 @@ STEP_ROWS = 4096
 When = tuple[int | None, int]
 
 
+class _ReadHull(Hull):
+    """A hull as it was, and what had been erased from its past before that was read."""
+
+    def __init__(self, row: HullRow, state: HullState, erasures: tuple[Erasure, ...]) -> None:
+        super().__init__(row, state)
+        self.erasures = erasures
+
+
 class _Batches:
     """The batches of one hull after a revision, read some at a time.
 
@@ -33,7 +42,7 @@ class _Batches:
         until: the last one that counts.
     """
 
-    def __init__(self, past: Past, hull: Hull, until: int) -> None:
+    def __init__(self, past: Past, hull: _ReadHull, until: int) -> None:
         self.hull = hull
         self._past = past
         self._until = until
@@ -65,7 +74,10 @@ class _Batches:
     def _next(self) -> list[Record]:
         number, after = self.hull.row.number, self._after
         try:
-            return self._past.batches(number, after, self._until)
+            records = self._past.batches(number, after, self._until)
+            if self._past.erasures(number) != self.hull.erasures:
+                raise NotStoredError("keys were erased from the past meanwhile: begin again")
+            return records
         except DamagedError:
             oldest = self._past.oldest_moment(number)
             if after >= oldest.revision:
@@ -187,7 +199,7 @@ class PastFences:
 
         return await self._pasts.ask(config.subjects, begin), hulls
 
-    async def _start(self, hulls: list[Hull], start: When | None) -> tuple[int | None, list[Hull]]:
+    async def _start(self, hulls: list[Hull], start: When | None) -> tuple[int | None, list[_ReadHull]]:
         """The time at which it begins, and the hulls as they were then.
 
         None in place of the time if it begins at a revision: then the other hull is as it was at that or before.
@@ -231,8 +243,8 @@ class PastFences:
     async def _moment(self, hull: Hull, when: When, field: str) -> Moment:
         return await self._pasts.moment(self._hulls.of(hull), *when, f"{field}_")
 
-    async def _as_of(self, hull: Hull, moment: Moment) -> Hull:
-        return Hull(hull.row, await self._pasts.own(hull, moment.revision))
+    async def _as_of(self, hull: Hull, moment: Moment) -> _ReadHull:
+        return _ReadHull(hull.row, *await self._pasts.own(hull, moment.revision))
 
 
 def _commit_of(hull: Hull) -> CommitStamp:

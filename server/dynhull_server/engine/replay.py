@@ -17,6 +17,7 @@ from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
 from ..state.records import FOREVER, CommitStamp, Record
+from ..storage.past import Erasure
 from .driver import Driver
 from .fences import Fences
 from .live_hull import LiveHull
@@ -68,6 +69,7 @@ class ReplayedHull(LiveHull):
         live: the hull of now.
         pasts: reads the batches.
         state: its state at the first revision, for itself alone.
+        erasures: what had been erased from its past before that was read.
         last: the last revision.
     """
 
@@ -81,12 +83,14 @@ class ReplayedHull(LiveHull):
         live: LiveHull,
         pasts: PastHulls,
         state: HullState,
+        erasures: tuple[Erasure, ...],
         last: int,
     ) -> None:
         super().__init__(driver, hull, recalls, fences, copies)
         self._live = live
         self._pasts = pasts
         self._state = state
+        self._erasures = erasures
         self._last = last
         self._ahead: deque[Record] = deque()
 
@@ -127,7 +131,8 @@ class ReplayedHull(LiveHull):
         if not self._ahead:
             if self.counts.revision >= self._last:
                 return None
-            self._ahead.extend(await self._pasts.batches(self._live, self.counts.revision, self._last))
+            after = self.counts.revision
+            self._ahead.extend(await self._pasts.batches(self._live, after, self._last, self._erasures))
         return self._time_of(self._ahead[0])
 
     async def advance(self, until: int | None) -> None:

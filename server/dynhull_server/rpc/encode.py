@@ -41,7 +41,7 @@ from ..state.records import (
     QuarantineRules,
     Times,
 )
-from ..storage.past import StoredHistory
+from ..storage.past import Erasure, StoredHistory
 
 # Makes the measures of some vertices.
 Measure = Callable[[Points], Awaitable[HullMeasures]]
@@ -144,6 +144,15 @@ def encode_history(settings: HullSettings) -> hull_pb2.History | None:
     return message
 
 
+def encode_erasure(erasure: Erasure) -> hull_pb2.Erasure:
+    """What was erased from the past of a hull."""
+    message = hull_pb2.Erasure(
+        first_revision=erasure.first, last_revision=erasure.last, keys=erasure.keys, moves=erasure.moves
+    )
+    message.time.FromMicroseconds(erasure.time)
+    return message
+
+
 def encode_found_history(hull: LiveHull, found: StoredHistory) -> hull_service_pb2.GetHistoryResponse:
     """What is there of the past of a hull."""
     message = hull_service_pb2.GetHistoryResponse(
@@ -153,6 +162,7 @@ def encode_found_history(hull: LiveHull, found: StoredHistory) -> hull_service_p
         bytes=found.bytes,
         batches=found.batches,
         moves=found.moves,
+        erasures=[encode_erasure(each) for each in found.erasures],
     )
     if found.first.committed is not None:
         message.first_time.FromMicroseconds(found.first.committed.time)
@@ -187,6 +197,7 @@ def encode_hull(hull: LiveHull, counts: Counts) -> hull_pb2.Hull:
         center=encode_center(counts.center),
         quarantine=encode_quarantine(counts.rules),
         held_count=counts.held,
+        erased=hull.erased,
     )
     message.create_time.FromDatetime(hull.created)
     if counts.clock is not None:

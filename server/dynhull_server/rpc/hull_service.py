@@ -158,6 +158,16 @@ class HullService:
         hull, found = await self._hulls.history(self._read(call, request.name).name)
         return encode.encode_found_history(hull, found)
 
+    async def EraseHistory(self, request: pb.EraseHistoryRequest, call: Call) -> pb.EraseHistoryResponse:
+        name = self._written(call, request.name)
+        call.access.require_past(name)
+        hull = self._hulls.get(name)
+        keys = hull.keys(decode_keys(request.keys, "keys"))
+        if not len(keys):
+            raise decode.InvalidFieldError("keys", "", "at least one key is required")
+        erasure = await self._hulls.filing.erase(hull, keys)
+        return pb.EraseHistoryResponse(erasure=None if erasure is None else encode.encode_erasure(erasure))
+
     # Writes
 
     async def Apply(self, request: pb.ApplyRequest, call: Call) -> pb.ApplyResponse:

@@ -43,6 +43,7 @@ FINISHED = {
     "SetQuarantine",
     "Reshard",
     "SetHistory",
+    "EraseHistory",
     "ListHulls",
     "Apply",
     "ApplyTogether",

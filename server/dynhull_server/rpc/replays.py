@@ -42,7 +42,7 @@ class Replays:
         with self._places.take(call.owner):
             with call.cutoff():
                 first, last = await self._ends(request, live)
-                hull = await self._hulls.replayed(live, first, last)
+                hull = await self._hulls.replayed(live, first.revision, last)
             origin = None if hull.committed is None else hull.committed.time
             if (start := decode_end(request, "start")) is not None and start[0] is None:
                 origin = start[1]
@@ -51,7 +51,7 @@ class Replays:
                 decode_view(request, hull),
                 pace,
                 origin=origin,
-                resumed=request.HasField("resume"),
+                resumed=request.HasField("resume") and not first.erased,  # the reader may have keys that are no more
                 outline_only=request.outline_only,
             )
             measure = hull.measures if request.include_measures else None
@@ -66,15 +66,15 @@ class Replays:
                         encode.encode_changed(hull, message)
                     await call.write_within(self._max_lag, pb.ReplayResponse(event=message))
 
-    async def _ends(self, request: pb.ReplayRequest, live: LiveHull) -> tuple[int, int]:
+    async def _ends(self, request: pb.ReplayRequest, live: LiveHull) -> tuple[Moment, int]:
         """The first revision and the last one."""
         if not request.HasField("resume"):
             first, last = await ends(request, live, self._hulls.pasts)
-            return first.revision, last
+            return first, last
         if request.resume.uid != live.uid:
             raise HullReplacedError(live.name, live.uid)
         first = await self._hulls.pasts.moment(live, request.resume.revision, 0, "resume.")
-        return first.revision, await last_of(request, live, self._hulls.pasts, first.revision)
+        return first, await last_of(request, live, self._hulls.pasts, first.revision)
 
 
 async def ends(request: pb.ReplayRequest | pb.TrackRequest, live: LiveHull, pasts: PastHulls) -> tuple[Moment, int]:

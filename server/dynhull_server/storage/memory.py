@@ -24,7 +24,7 @@ from ..state.fences.model.records import (
 from ..state.records import Append, CommitStamp, Contents, Create, Delete, HullRow, Kept, Keys, Record
 from ..state.tracks import KeyChanges
 from .of_keys import changes_of_keys, contents_of_keys
-from .past import Hole, Moment, StoredHistory, created
+from .past import Erasure, Hole, Moment, StoredHistory, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 from .segments.columns import columns_of
 
@@ -210,6 +210,16 @@ class MemoryStorage:
     def file_history(self, now: int) -> Iterator[StorageStep]:
         """There are no segments."""
         del now
+        yield from ()
+
+    def erasures(self, number: int) -> tuple[Erasure, ...]:
+        """None: what is before two snapshots is forgotten."""
+        del number
+        return ()
+
+    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator[StorageStep]:
+        """Nothing is left before the snapshots."""
+        del number, keys, until, now
         yield from ()
 
     def snapshot(self, number: int, kept: Kept) -> Iterator[StorageStep]:

@@ -18,15 +18,39 @@ class Moment:
         revision: the revision.
         committed: its commit; None where formats before 11 did not store it. The commit of revision 0 has the number 0,
             and the time at which the hull was created.
+        erased: whether the hull may lack keys that it had then, because they were erased from its past.
     """
 
     revision: int
     committed: CommitStamp | None
+    erased: bool = False
 
 
 def created(row: HullRow) -> CommitStamp:
     """The commit of revision 0 of a hull."""
     return CommitStamp(0, round(row.created * 1_000_000))
+
+
+@dataclass(frozen=True, slots=True)
+class Erasure:
+    """Keys were erased from the past of a hull. Which ones is not kept.
+
+    Attributes:
+        first, last: the revisions as of which the hull may lack some of them.
+        time: when, in microseconds since 1970.
+        keys: the number of keys.
+        moves: the number of times that the batches have put, removed or held them.
+    """
+
+    first: int
+    last: int
+    time: int
+    keys: int
+    moves: int
+
+    def concerns(self, revision: int) -> bool:
+        """Whether the hull may lack keys as of a revision."""
+        return self.first <= revision <= self.last
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +60,7 @@ class StoredHistory:
     Attributes:
         first, last: the oldest revision that can be read, and the newest one.
         bytes, batches, moves: of segments: the size of their files, their batches, and the points and keys in these.
+        erasures: the erasures that concern it, the oldest first.
     """
 
     first: Moment
@@ -43,6 +68,7 @@ class StoredHistory:
     bytes: int = 0
     batches: int = 0
     moves: int = 0
+    erasures: tuple[Erasure, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +126,13 @@ class Past(Protocol):
 
     def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What some of the batches after a revision do to some keys, and the last revision of these batches."""
+
+    def erasures(self, number: int) -> tuple[Erasure, ...]:
+        """The erasures that concern what is there of a hull, the oldest first.
+
+        Who reads a state and the batches after it begins anew when these differ afterwards from what they were before:
+        otherwise a key might be in the state, and not in the batch that removes it.
+        """
 
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from ..state.fences.model.records import FenceEvent, FenceRow, Inside, KeptFence
-from ..state.records import CommitStamp, HullRow, Kept, Record
+from ..state.records import CommitStamp, HullRow, Kept, Keys, Record
 from .past import Past
 from .refusals import Meaning
 
@@ -206,6 +206,24 @@ class Storage(Past, Protocol):
         Raises:
             OSError: the disk is full, or fails: the journal keeps what is not in segments.
             DamagedError: a row of the journal is damaged.
+        """
+
+    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator["StorageStep"]:
+        """Erase keys from the past of a hull up to revision `until`, as of which it does not have them.
+
+        Two snapshots as of that revision, or later ones, are there. Commit each step before the next is taken; one of
+        them erases everything. Before it a kill leaves all as it was, and after it no key comes back. Run only one at a
+        time, and not beside `file_history`, on a thread that may take its time.
+
+        Args:
+            number: the hull. If it is not there any more, nothing is left to do.
+            keys: the keys.
+            until: the revision.
+            now: the time in microseconds since 1970.
+
+        Raises:
+            OSError: the disk is full, or fails.
+            DamagedError: the data is damaged.
         """
 
     def cut(self, number: int, last: int) -> "StorageStep | None":

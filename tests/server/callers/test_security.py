@@ -75,6 +75,9 @@ EVERY_CALL = {
     "IntersectLines": lambda stub, name: stub.IntersectLines(pb.IntersectLinesRequest(name=name)),
     "GetHull": lambda stub, name: stub.GetHull(pb.GetHullRequest(name=name)),
     "GetHistory": lambda stub, name: stub.GetHistory(pb.GetHistoryRequest(name=name)),
+    "EraseHistory": lambda stub, name: stub.EraseHistory(
+        pb.EraseHistoryRequest(name=name, keys=points_pb2.Keys(integers=[1]))
+    ),
     "SetHistory": lambda stub, name: stub.SetHistory(pb.SetHistoryRequest(name=name)),
     "GetSeries": lambda stub, name: stub.GetSeries(pb.GetSeriesRequest(name=name)),
     "Watch": lambda stub, name: next(stub.Watch(pb.WatchRequest(name=name))),
@@ -103,6 +106,7 @@ WRITES = {
     "Reshard",
     "GetProducer",
     "SetHistory",
+    "EraseHistory",
 }
 
 

@@ -19,6 +19,8 @@ from dynhull_server.state.errors import (
     NotStoredError,
     RevisionForgottenError,
 )
+from dynhull_server.storage.memory import MemoryStorage
+from dynhull_server.storage.past import Erasure
 from dynhull_server.storage.port import DamagedError
 
 BATCHES = 12
@@ -57,6 +59,23 @@ def events_of(
 
 def revisions(events: list[Event]) -> list[int]:
     return [event.counts.revision for event in events]
+
+
+def test_it_ends_when_keys_are_erased_that_it_may_have():
+    async def life() -> None:
+        async with written() as (engine, _):
+            live = engine.hulls.get(NAME)
+            events = events_of(await engine.hulls.replayed(live, 0, live.counts.revision), AT_ONCE)
+            await anext(events)
+            erased = (Erasure(1, 5, 0, 1, 1),)
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(MemoryStorage, "erasures", lambda *_: erased)
+                with pytest.raises(NotStoredError, match="erased"):
+                    async for _ in events:
+                        pass
+                assert len(await played(engine, AT_ONCE)) == BATCHES + 1
+
+    asyncio.run(life())
 
 
 def test_each_revision_is_an_event_or_each_that_changes_the_outline():

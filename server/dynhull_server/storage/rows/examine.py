@@ -18,7 +18,7 @@ from .fence_examine import FenceExamination, FoundFences
 from .group import AnyStep, Cut, DropSnapshot
 from .hull_rows import found_hulls, values
 from .ledger import HullRows, Ledger, StoredSnapshot
-from .segment_rows import segment_checksum, segment_from, segment_weight
+from .segment_rows import erasure_from, segment_checksum, segment_from, segment_weight
 from .tables import COLUMNS, FENCES_SINCE, SEGMENTS_SINCE, Reader
 from .totals import Totals, totals_from
 
@@ -225,10 +225,13 @@ class _Examination:
             try:
                 if segment_checksum(*row[:-1]) != stored:
                     raise ValueError("its checksum differs")
-                scanned.rows.segments.append(segment_from(place, first, last, file, facts))
+                if file:
+                    scanned.rows.segments.append(segment_from(place, first, last, file, facts))
+                else:
+                    scanned.rows.erasures.append(erasure_from(place, first, last, facts))
                 scanned.rows.weigh(segment_weight(row))
             except (ValueError, TypeError, struct.error) as error:
-                text = f"the row of a segment with revisions {first} to {last} is damaged ({error})"
+                text = f"the row of the past of revisions {first} to {last} is damaged ({error})"
                 self._findings.blame(scanned.rows, text, fatal=True)
         self._ledger.segment_ids = count(newest + 1)
 

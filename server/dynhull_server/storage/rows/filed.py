@@ -94,6 +94,11 @@ class Filed:
             columns, _, _ = keys_from_parquet(self._archive.read(name, facts.bytes, facts.digest), name, keys)
         return last, changes_of_keys(columns.between(after, last), keys)
 
+    def forget(self, file: str) -> None:
+        """Forget what a file had, which is there no more."""
+        with self._turn:
+            self._open.pop(file, None)
+
     def _batches(self, segment: StoredSegment) -> Batches:
         with self._turn:
             batches = self._open.get(segment.file)

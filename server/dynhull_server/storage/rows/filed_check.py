@@ -7,7 +7,7 @@ from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive, is_installed
 from .filed import read_batches, read_state
 from .filing import run_from_start
-from .group import RetireSegment
+from .group import DropErasure, RetireSegment
 from .ledger import HullRows, Ledger
 from .segment_rows import StoredSegment
 
@@ -44,10 +44,11 @@ def history_bytes(ledger: Ledger) -> int:
     return sum(segment.size for hull in ledger.hulls.values() for segment in hull.segments)
 
 
-def leaving_out(ledger: Ledger) -> Iterator[RetireSegment]:
+def leaving_out(ledger: Ledger) -> Iterator[RetireSegment | DropErasure]:
     """The steps that leave a copy without any segment."""
     for number, hull in ledger.hulls.items():
         yield from (RetireSegment(number, segment) for segment in hull.segments)
+        yield from (DropErasure(number, stored) for stored in hull.erasures)
 
 
 def adopting(ledger: Ledger, source: Path, target: Path, notes: list[str]) -> Iterator[RetireSegment]:

@@ -11,7 +11,7 @@ from .chunks import state
 from .ledger import HullRows
 from .past_rows import columns_between
 from .reading import newest_snapshot
-from .segment_rows import SegmentFacts, StoredSegment
+from .segment_rows import SegmentFacts, StoredErasure, StoredSegment
 from .tables import Reader
 
 # Points and keys after which a segment ends, even if what is due does not.
@@ -110,6 +110,12 @@ def outdated(hull: HullRows, now: int, archive: Archive) -> list[StoredSegment]:
         if room < 0 or segment.facts.last_time < oldest:
             return hull.segments[: run_from_start(hull, place + 1)]
     return []
+
+
+def past_erasures(hull: HullRows) -> list[StoredErasure]:
+    """The erasures that concern nothing of what is still there."""
+    oldest = hull.segments[0].first - 1 if hull.segments else hull.oldest
+    return [each for each in hull.erasures if each.erasure.last < oldest]
 
 
 def oldest_of_all(hulls: Mapping[int, HullRows], most_bytes: int) -> Iterator[tuple[int, StoredSegment]]:

@@ -13,7 +13,15 @@ from .encoding import checksum, encode, weight
 from .fence_ledger import FenceChanges, FenceStep
 from .hull_rows import values
 from .ledger import HullRows, Ledger, StoredSnapshot
-from .segment_rows import StoredSegment, Values, segment_values, segment_weight, unused_values
+from .segment_rows import (
+    StoredErasure,
+    StoredSegment,
+    Values,
+    erasure_values,
+    segment_values,
+    segment_weight,
+    unused_values,
+)
 from .tables import Insert, Remove, Statement
 
 if TYPE_CHECKING:
@@ -90,6 +98,23 @@ class RetireSegment:
 
 
 @dataclass(frozen=True, slots=True)
+class EraseKeys:
+    """Step: segments without some keys take the place of those that had them."""
+
+    number: int
+    replaced: tuple[tuple[StoredSegment, StoredSegment], ...]
+    stored: StoredErasure
+
+
+@dataclass(frozen=True, slots=True)
+class DropErasure:
+    """Step: nothing is left of what an erasure was about."""
+
+    number: int
+    stored: StoredErasure
+
+
+@dataclass(frozen=True, slots=True)
 class Cut:
     """Step: deletes the newest row of batches of a hull, which is damaged; the hull ends at revision `last`."""
 
@@ -130,7 +155,7 @@ class DropDeadSegment:
     place: int
 
 
-SegmentStep = SetHistory | NameFile | CloseSegment | RetireSegment | DropDeadSegment
+SegmentStep = SetHistory | NameFile | CloseSegment | RetireSegment | EraseKeys | DropErasure | DropDeadSegment
 AnyStep = (
     Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull | SegmentStep | FenceStep
 )
@@ -211,6 +236,10 @@ class Group:
                 self._close_segment(change)
             case RetireSegment():
                 self._retire_segment(change)
+            case EraseKeys():
+                self._erase(change)
+            case DropErasure():
+                self._drop_erasure(change)
             case DropDeadSegment():
                 self._drop_dead_segment(change.place)
             case _:
@@ -278,6 +307,7 @@ class Group:
             dead["batches"] += rows.ids
             dead["snapshots"].extend(snapshot.id for snapshot in rows.snapshots)
             dead["segments"].extend(segment.id for segment in rows.segments)
+            dead["segments"].extend(stored.id for stored in rows.erasures)
             for snapshot in rows.snapshots:
                 dead["chunks"].extend(snapshot.chunks)
 
@@ -317,10 +347,13 @@ class Group:
         if now is None or now.rows.filed + 1 != segment.first:  # deleted meanwhile
             self._effects.append(lambda: self._ledger.dead["segments"].append(segment.id))
             return
-        values = segment_values(segment, step.number)
+        self._add_segment(now, segment)
+
+    def _add_segment(self, now: "_Now", segment: StoredSegment) -> None:
+        values = segment_values(segment, now.rows.row.number)
         self._replace_segment(values)
         self._weigh(now, segment_weight(values))
-        self._effects.append(lambda: now.rows.segments.append(segment))
+        self._effects.append(lambda: insort(now.rows.segments, segment, key=lambda each: each.first))
 
     def _retire_segment(self, step: RetireSegment) -> None:
         now, segment = self._hull(step.number), step.segment
@@ -330,6 +363,27 @@ class Group:
         self._weigh(now, -segment_weight(segment_values(segment, step.number)))
         self._effects.append(lambda: now.rows.segments.remove(segment))
         self._effects.append(lambda: self._ledger.dead["segments"].append(segment.id))
+
+    def _erase(self, step: EraseKeys) -> None:
+        now = self._hull(step.number)
+        if now is None:  # deleted meanwhile
+            self._effects.append(lambda: self._ledger.dead["segments"].extend(new.id for _, new in step.replaced))
+            return
+        for old, new in step.replaced:
+            self._retire_segment(RetireSegment(step.number, old))
+            self._add_segment(now, new)
+        values = erasure_values(step.stored, step.number)
+        self.statements.append(Insert("segments", values))
+        self._weigh(now, segment_weight(values))
+        self._effects.append(lambda: now.rows.erasures.append(step.stored))
+
+    def _drop_erasure(self, step: DropErasure) -> None:
+        now = self._hull(step.number)
+        if now is None or step.stored not in now.rows.erasures:
+            return
+        self.statements.append(Remove("segments", (step.stored.id,)))
+        self._weigh(now, -segment_weight(erasure_values(step.stored, step.number)))
+        self._effects.append(lambda: now.rows.erasures.remove(step.stored))
 
     def _drop_dead_segment(self, place: int) -> None:
         dead = self._ledger.dead["segments"]

@@ -10,7 +10,7 @@ from typing import Self
 from ...state.records import HullRow
 from .event_directory import EventDirectory
 from .fence_runs import FenceRows, FenceRuns, Staged
-from .segment_rows import StoredSegment
+from .segment_rows import StoredErasure, StoredSegment
 from .totals import Totals
 
 KEPT = 2  # snapshots per hull; the older one serves if the newer is damaged
@@ -62,6 +62,7 @@ class HullRows:
         last: the newest revision.
         snapshots: the snapshots, ordered by revision.
         segments: what the journal has dropped, ordered by revision.
+        erasures: what was erased from it, the oldest first.
     """
 
     row: HullRow
@@ -71,6 +72,7 @@ class HullRows:
     last: int = 0
     snapshots: list[StoredSnapshot] = field(default_factory=list)
     segments: list[StoredSegment] = field(default_factory=list)
+    erasures: list[StoredErasure] = field(default_factory=list)
 
     @property
     def oldest(self) -> int:
@@ -104,7 +106,7 @@ class HullRows:
 
     def copy(self) -> Self:
         """A copy of the present state."""
-        columns = self.firsts[:], self.ids[:], self.last, self.snapshots[:], self.segments[:]
+        columns = self.firsts[:], self.ids[:], self.last, self.snapshots[:], self.segments[:], self.erasures[:]
         return type(self)(self.row, self.sum, *columns)
 
     def between(self, after: int, until: int) -> "array[int]":

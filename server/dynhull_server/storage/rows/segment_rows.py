@@ -2,12 +2,15 @@
 
 A row of no hull names files that are to be removed: those that are being written, so that a start after a kill finds
 them; or those whose time has come.
+
+A row without a file says that keys were erased.
 """
 
 import json
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from ..past import Erasure
 from .encoding import checksum, weight
 
 NO_HULL = 0
@@ -65,6 +68,14 @@ class StoredSegment:
         return self.facts.bytes + self.facts.state_bytes
 
 
+@dataclass(frozen=True, slots=True)
+class StoredErasure:
+    """The row of an erasure, and its number."""
+
+    id: int
+    erasure: Erasure
+
+
 Values = tuple[int, int, int, int, str, str, int]
 
 
@@ -76,6 +87,18 @@ def segment_values(segment: StoredSegment, number: int) -> Values:
 def unused_values(place: int, file: str) -> Values:
     """The columns of a row that names files which nobody needs."""
     return _values(place, NO_HULL, 0, 0, file, "")
+
+
+def erasure_values(stored: StoredErasure, number: int) -> Values:
+    """The columns of the row of an erasure from the past of a hull, with their checksum."""
+    erasure = stored.erasure
+    facts = json.dumps({"time": erasure.time, "keys": erasure.keys, "moves": erasure.moves})
+    return _values(stored.id, number, erasure.first, erasure.last, "", facts)
+
+
+def erasure_from(place: int, first: int, last: int, facts: str) -> StoredErasure:
+    """The inverse of `erasure_values`. ValueError or TypeError for what is none."""
+    return StoredErasure(place, Erasure(first, last, **json.loads(facts)))
 
 
 def segment_from(place: int, first: int, last: int, file: str, facts: str) -> StoredSegment:

@@ -18,24 +18,27 @@ from ...state.fences.model.records import FenceEvent, Inside, KeptFence
 from ...state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
 from ...state.tracks import KeyChanges
 from ..of_keys import changes_of_keys, contents_of_keys
-from ..past import Hole, Moment, StoredHistory, created
+from ..past import Erasure, Hole, Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from ..segments.archive import NEEDS, Archive, is_installed
 from . import chunks
 from .divided import newest_rows
 from .encoding import weight
+from .erasing import Erasing
 from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
 from .filed import Filed, holes
-from .filing import oldest_of_all, outdated, read_due
+from .filing import oldest_of_all, outdated, past_erasures, read_due
 from .group import (
     Chunk,
     CloseSegment,
     DropBatches,
     DropDead,
     DropDeadSegment,
+    DropErasure,
     DropSnapshot,
+    EraseKeys,
     Finish,
     Group,
     NameFile,
@@ -54,6 +57,7 @@ from .past_rows import (
     state_until,
 )
 from .reading import commit_of, read_each, read_hull, read_records
+from .segment_rows import StoredErasure, StoredSegment
 from .staging import staging
 from .tables import Reader
 
@@ -62,6 +66,7 @@ log = logging.getLogger(__name__)
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
 
 Picked = TypeVar("Picked")
+Found = TypeVar("Found")
 
 
 class Lent(Reader, Protocol):
@@ -167,57 +172,97 @@ class RowStorage(ABC):
 
     def oldest_moment(self, number: int, *, timed: bool = False) -> Moment:
         """The oldest revision that can be read."""
-        with self._of_hull(number) as (reader, hull):
-            return self._oldest_moment(reader, hull, timed=timed)
-
-    def _oldest_moment(self, reader: Reader, hull: HullRows, *, timed: bool) -> Moment:
-        found = None if self._filed is None else self._filed.oldest_moment(hull, timed=timed)
-        return found or oldest_moment(reader, hull, timed=timed)
+        return self._of_past(
+            number,
+            lambda filed, hull: filed.oldest_moment(hull, timed=timed),
+            lambda reader, hull: oldest_moment(reader, hull, timed=timed),
+        )
 
     def moment(self, number: int, time: int) -> Moment | None:
         """The last revision committed at or before a time."""
         with self._of_hull(number) as (reader, hull):
             found = moment_at(reader, hull, time)
-            return self._filed.moment(hull, time) if found is None and self._filed is not None else found
+        if found is not None:
+            return found
+        return self._of_past(number, lambda filed, hull: filed.moment(hull, time), lambda *_: None)
 
     def state(self, number: int, until: int) -> Kept:
         """The newest snapshot of a revision not after `until`, without the batches after it."""
-        with self._of_hull(number) as (reader, hull):
-            if self._filed is not None and until < hull.oldest:
-                return self._filed.state(hull, until)
-            return state_until(reader, hull, until)
+        return self._of_past(
+            number,
+            lambda filed, hull: filed.state(hull, until) if until < hull.oldest else None,
+            lambda reader, hull: state_until(reader, hull, until),
+        )
 
     def batches(self, number: int, after: int, until: int) -> list[Record]:
         """The batches that follow a revision."""
-        with self._of_hull(number) as (reader, hull):
-            if self._filed is not None and after < hull.oldest:
-                return self._filed.batches(hull, after, until)
-            return batches_after(reader, hull, after, until)
+        return self._of_past(
+            number,
+            lambda filed, hull: filed.batches(hull, after, until) if after < hull.oldest else None,
+            lambda reader, hull: batches_after(reader, hull, after, until),
+        )
 
     def gathered(self, number: int, after: int, until: int) -> list[Record]:
         """What the batches that follow a revision come to."""
-        with self._of_hull(number) as (reader, hull):
-            if self._filed is not None and after < hull.oldest:
-                return self._filed.gathered(hull, after, until)
-            return gathered_after(reader, hull, after, until)
+        return self._of_past(
+            number,
+            lambda filed, hull: filed.gathered(hull, after, until) if after < hull.oldest else None,
+            lambda reader, hull: gathered_after(reader, hull, after, until),
+        )
 
     def key_state(self, number: int, keys: Keys, until: int) -> tuple[int, npt.NDArray[np.int32], Contents]:
         """What the newest snapshot has of some keys."""
-        with self._of_hull(number) as (reader, hull):
-            if self._filed is not None and until < hull.oldest:
-                kept = self._filed.key_state(hull, keys, until)
-            else:
-                kept = state_until(reader, hull, until)
-            return kept.revision, *contents_of_keys(kept.contents, keys)
+        kept = self._of_past(
+            number,
+            lambda filed, hull: filed.key_state(hull, keys, until) if until < hull.oldest else None,
+            lambda reader, hull: state_until(reader, hull, until),
+        )
+        return kept.revision, *contents_of_keys(kept.contents, keys)
 
     def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What some of the batches after a revision do to some keys."""
-        with self._of_hull(number) as (reader, hull):
-            if self._filed is not None and after < hull.oldest:
-                return self._filed.key_changes(hull, keys, after, until)
+
+        def in_journal(reader: Reader, hull: HullRows) -> tuple[int, KeyChanges]:
             require_kept(hull, after)
             columns = columns_between(reader, hull, after, min(until, hull.last), GATHERED_ROWS)
             return int(columns.revision[-1]), changes_of_keys(columns, keys)
+
+        return self._of_past(
+            number,
+            lambda filed, hull: filed.key_changes(hull, keys, after, until) if after < hull.oldest else None,
+            in_journal,
+        )
+
+    def erasures(self, number: int) -> tuple[Erasure, ...]:
+        """The erasures that concern what is there of a hull."""
+        with self._visible:
+            return tuple(each.erasure for each in self._settled().hulls[number].erasures)
+
+    def _of_past(
+        self,
+        number: int,
+        in_files: Callable[[Filed, HullRows], Found | None],
+        in_journal: Callable[[Reader, HullRows], Found],
+    ) -> Found:
+        """What is found in the segments of a hull; in the journal where that is None.
+
+        No rows are held as of a moment while files are read, which may take long. If these are replaced or removed
+        meanwhile, or the journal drops what it had, it is looked for again.
+        """
+        while True:
+            with self._visible:
+                hull = self._settled().hulls[number].copy()
+            try:
+                found = None if self._filed is None else in_files(self._filed, hull)
+                if found is not None:
+                    return found
+                with self._of_hull(number) as (reader, rows):
+                    return in_journal(reader, rows)
+            except DamagedError:
+                with self._visible:
+                    now = self._settled().hulls[number]
+                if (now.segments, now.oldest) == (hull.segments, hull.oldest):
+                    raise
 
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
         """A reader, and the rows of a hull as of the same moment; KeyError if no hull has that number."""
@@ -307,13 +352,13 @@ class RowStorage(ABC):
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""
         with self._of_hull(number) as (reader, hull):
-            first = self._oldest_moment(reader, hull, timed=False)
+            filed = None if self._filed is None else self._filed.oldest_moment(hull, timed=False)
+            first = filed or oldest_moment(reader, hull, timed=False)
             last = Moment(hull.last, commit_of(reader, hull, hull.last) if hull.last else created(hull.row))
             facts = [segment.facts for segment in hull.segments]
             size = sum(segment.size for segment in hull.segments)
-            return StoredHistory(
-                first, last, size, sum(each.batches for each in facts), sum(each.moves for each in facts)
-            )
+            batches, moves = sum(each.batches for each in facts), sum(each.moves for each in facts)
+            return StoredHistory(first, last, size, batches, moves, tuple(each.erasure for each in hull.erasures))
 
     def holes(self) -> list[Hole]:
         """What could not be read of hulls that are there, when it was last needed."""
@@ -345,6 +390,8 @@ class RowStorage(ABC):
             yield from self._trim(number)
             for segment in outdated(hull, now, archive) if hull else ():
                 yield RetireSegment(number, segment)
+            for stored in past_erasures(hull) if hull else ():
+                yield DropErasure(number, stored)
         if archive.most_bytes:
             with self._visible:
                 gone = list(oldest_of_all(self._settled().hulls, archive.most_bytes))
@@ -360,7 +407,42 @@ class RowStorage(ABC):
         """The hulls that have a past, or are to have one."""
         with self._visible:
             hulls = self._settled().hulls.values()
-            return [hull.row.number for hull in hulls if hull.segments or hull.row.settings.history]
+            return [hull.row.number for hull in hulls if hull.segments or hull.erasures or hull.row.settings.history]
+
+    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator[StorageStep]:
+        """File what the journal has of the keys, then replace the segments that have them."""
+        archive = self._archive
+        if archive is None:
+            return
+        while (hull := self._ledger.hulls.get(number)) and hull.due > hull.filed:
+            yield from self._close_segment(number, archive)
+        yield from self._trim(number)
+        with self._visible:
+            found = self._settled().hulls.get(number)
+        if found is not None:
+            yield from self._erase(Erasing(found.copy(), keys, until, archive), now)
+        yield from self._remove_files(archive)
+
+    def _erase(self, erasing: Erasing, now: int) -> Iterator[StorageStep]:
+        """Write what takes the place of segments with the keys, then replace them all at once."""
+        number, uid = erasing.hull.row.number, erasing.hull.row.uid
+        replaced: list[tuple[StoredSegment, StoredSegment]] = []
+        places: set[int] = set()
+        try:
+            for segment, due in erasing.segments():
+                place, file = next(self._ledger.segment_ids), erasing.archive.name(uid, due.first, due.last)
+                places.add(place)
+                self._filing.add(place)
+                yield NameFile(place, file)
+                replaced.append((segment, due.write(erasing.archive, place, file)))
+            if replaced:
+                stored = StoredErasure(next(self._ledger.segment_ids), erasing.done(now))
+                yield EraseKeys(number, tuple(replaced), stored)
+        except BaseException:
+            self._ledger.dead["segments"].extend(places)  # if they are nobody's
+            raise
+        finally:
+            self._filing -= places
 
     def _close_segment(self, number: int, archive: Archive) -> Iterator[StorageStep]:
         with self._reading(lambda ledger: ledger.hulls[number].copy()) as (reader, hull):
@@ -381,9 +463,14 @@ class RowStorage(ABC):
         while ids := [each for each in self._ledger.dead["segments"] if each not in self._filing]:
             with self._reading(lambda ledger: ledger.hulls.copy()) as (reader, hulls):
                 rows = list(reader.some("segments", "hull, file", array("q", ids[:1])))
-            for number, file in rows:
-                if number not in hulls:
+            if any(number in hulls for number, _ in rows):  # its commit was taken for a failure, and was none
+                self._ledger.dead["segments"].remove(ids[0])
+                continue
+            for _, file in rows:
+                if file:
                     archive.remove(file)
+                    if self._filed is not None:
+                        self._filed.forget(file)
             yield DropDeadSegment(ids[0])
 
     def cut(self, number: int, last: int) -> StorageStep | None:

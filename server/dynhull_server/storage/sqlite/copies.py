@@ -442,6 +442,7 @@ def _report(findings: Findings, notes: list[str]) -> Report:
         if hull.segments:
             size = sum(segment.size for segment in hull.segments)
             summary += f", {size:,} bytes of past from revision {hull.segments[0].first} on"
+            summary += f", from which keys were erased {len(hull.erasures)} times" if hull.erasures else ""
         if hull.snapshots:
             summary += f", snapshots at {', '.join(str(snapshot.revision) for snapshot in hull.snapshots)}"
         is_shard = hull.row.settings.shard is not None

@@ -1,0 +1,120 @@
+"""What the journal drops becomes segments; and what is erased from them."""
+
+import asyncio
+from functools import partial
+
+import numpy as np
+
+from dynhull.keys import key_list
+
+from ..state.contents.keyed import Keyed
+from ..state.core import not_stored
+from ..state.errors import (
+    HullNotFoundError,
+    HullUnsuitableError,
+    NotStoredError,
+    OutcomeUnknownError,
+    words_for_callers,
+)
+from ..state.hull_state import HullState
+from ..state.records import Kept, Keys
+from ..storage.past import Erasure
+from ..storage.port import NotCommittedError, Storage
+from .driver import Driver
+from .live_hull import LiveHull
+from .past import PastHulls
+from .recalls import UNREADABLE
+
+# The journal keeps what is after the older of two snapshots.
+SNAPSHOTS = 2
+
+
+class Filing:
+    """The segments of the hulls of a server, which one at a time writes.
+
+    Args:
+        driver: has the threads, and commits.
+        storage: keeps them.
+        pasts: reads them.
+    """
+
+    SECONDS = 1.0
+
+    def __init__(self, driver: Driver, storage: Storage, pasts: PastHulls) -> None:
+        self._driver = driver
+        self._storage = storage
+        self._pasts = pasts
+        self._turn = asyncio.Lock()
+        self._erasing: set[asyncio.Task[Erasure | None]] = set()
+
+    async def round(self) -> None:
+        """Make segments of what the journal need not have any longer, and remove those that are not to be kept."""
+        async with self._turn:
+            await self._driver.commit_steps(self._storage.file_history(self._driver.time()), self._driver.in_history)
+
+    async def erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
+        """Erase keys from the past of a hull, even if the caller goes away. None if it has none of them.
+
+        What the journal has is filed first, so that it has nothing of them any more. The journal of a hull without a
+        history forgets all of its past.
+
+        Raises:
+            HullNotFoundError: the hull was deleted meanwhile.
+            HullUnsuitableError: the hull has one of the keys at present, or nothing is kept of its past.
+            NotStoredError: the storage has failed, and the past has the keys, as before.
+            OutcomeUnknownError: it has failed, and perhaps they are erased.
+        """
+        if not self._storage.keeps:
+            raise HullUnsuitableError(hull.name, "has no past: this server keeps no batches")
+        if hull.settings.divided:
+            raise HullUnsuitableError(hull.name, "is divided among shards, and has no past")
+        erasing = asyncio.get_running_loop().create_task(self._erase(hull, keys))
+        self._erasing.add(erasing)
+        erasing.add_done_callback(self._erasing.discard)
+        return await asyncio.shield(erasing)
+
+    async def _erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
+        unsaved = hull.unsaved
+        _, found = await hull.read(partial(_without, keys), rows=hull.counts.points)
+        if not isinstance(found, Kept):
+            reason = f"has the key {found!r} now: remove it first, since what is erased is the past"
+            raise HullUnsuitableError(hull.name, reason, field="keys")
+        try:
+            async with self._turn:
+                for _ in range(SNAPSHOTS):
+                    steps = self._storage.snapshot(hull.number, found)
+                    await self._driver.commit_steps(steps, self._driver.on_disk)
+                hull.saved(unsaved)
+                before = await self._erasures(hull)
+                steps = self._storage.erase(hull.number, keys, found.revision, self._driver.time())
+                await self._driver.commit_steps(steps, self._driver.in_history)
+                after = await self._erasures(hull)
+        except KeyError:
+            raise HullNotFoundError(hull.name) from None
+        except NotCommittedError as error:
+            raise not_stored(error) from error
+        except (*UNREADABLE, OSError) as error:
+            raise NotStoredError(words_for_callers(error)) from error
+        except Exception as error:
+            raise OutcomeUnknownError(words_for_callers(error)) from error
+        finally:
+            self._pasts.forget()
+        return next((each for each in after if each not in before), None)
+
+    async def _erasures(self, hull: LiveHull) -> tuple[Erasure, ...]:
+        found: tuple[Erasure, ...] = await self._driver.on_disk(partial(self._storage.erasures, hull.number))
+        return found
+
+
+def _without(keys: Keys, state: HullState) -> Kept | int | str:
+    """The hull as it is; or the first of some keys that it has, also in quarantine."""
+    contents = state.contents
+    assert isinstance(contents, Keyed)  # the keys are those of such a hull
+    listed = key_list(keys)
+    for place in np.flatnonzero(contents.find(keys).present).tolist():
+        return listed[place]  # type: ignore[no-any-return]
+    if contents.quarantine is not None:
+        for key in listed:
+            if key in contents.quarantine:
+                return key  # type: ignore[no-any-return]
+    return state.kept()

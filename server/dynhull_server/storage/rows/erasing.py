@@ -1,0 +1,130 @@
+"""Erasing keys from segments: the same segments without them, in other files."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull.keys import key_list, take_keys
+
+from ...state.records import Contents, HeldRows, KeyRows, Keys, Record
+from ..past import Erasure
+from ..segments.archive import Archive
+from ..segments.columns import columns_of
+from .filed import read_batches, read_state
+from .filing import Due
+from .ledger import HullRows
+from .segment_rows import StoredSegment
+
+
+class Erasing:
+    """Some keys that are erased from the past of a hull, up to a revision.
+
+    Args:
+        hull: the hull.
+        keys: the keys.
+        until: the revision.
+        archive: has the files.
+
+    Attributes:
+        hull, archive: the same.
+    """
+
+    def __init__(self, hull: HullRows, keys: Keys, until: int, archive: Archive) -> None:
+        self.hull = hull
+        self.archive = archive
+        self._keys = set(key_list(keys))
+        self._until = until
+        self._first = until
+        self._moves = 0
+
+    def segments(self) -> Iterator[tuple[StoredSegment, Due]]:
+        """The segments that have one of the keys, and of what to make those that have none.
+
+        Raises:
+            DamagedError: a file is not as it was written.
+            StorageError: it cannot be read at present.
+        """
+        for segment in self.hull.segments:
+            if segment.first - 1 > self._until:
+                return
+            before = read_state(self.archive, segment) if segment.facts.state_bytes else None
+            found = [] if before is None else [before.contents.keys, held_keys(before.contents)]
+            in_state = any(self._among(keys).any() for keys in found if keys is not None)
+            if before is not None and in_state:
+                before = replace(before, contents=self._without(before.contents))
+                self._first = min(self._first, segment.first - 1)
+            moves = self._moves
+            batches = read_batches(self.archive, segment).between(segment.first - 1, segment.last)
+            records = [self._record(each) if each.revision <= self._until else each for each in batches]
+            if in_state or self._moves > moves:
+                yield segment, Due(self.hull.row, columns_of(records, self.hull.row.settings.identity), before)
+
+    def done(self, now: int) -> Erasure:
+        """What has been erased, at a time."""
+        return Erasure(self._first, self._until, now, len(self._keys), self._moves)
+
+    def _among(self, keys: Keys) -> npt.NDArray[np.bool_]:
+        """Which keys are to be erased."""
+        return np.fromiter((key in self._keys for key in key_list(keys)), np.bool_, len(keys))
+
+    def _record(self, record: Record) -> Record:
+        rows = record.rows
+        if not isinstance(rows, KeyRows):
+            return record
+        put, removed = self._among(rows.keys), self._among(rows.removes)
+        count = int(put.sum() + removed.sum())
+        held = rows.held
+        if held is not None:
+            holds, drops = self._among(held.rows.keys), self._among(held.dropped)
+            count += int(holds.sum() + drops.sum())
+            held = replace(held, rows=_held(held.rows, ~holds), dropped=_keys(held.dropped, ~drops))
+        if not count:
+            return record
+        self._moves += count
+        self._first = min(self._first, record.revision)
+        left = replace(
+            rows,
+            keys=_keys(rows.keys, ~put),
+            points=rows.points[~put],
+            removes=_keys(rows.removes, ~removed),
+            times=None if rows.times is None else rows.times[~put],
+            deadlines=None if rows.deadlines is None else rows.deadlines[~put],
+            held=held,
+        )
+        return replace(record, rows=left)
+
+    def _without(self, contents: Contents) -> Contents:
+        assert contents.keys is not None  # only hulls with keys are asked about
+        left = ~self._among(contents.keys)
+        held = contents.held
+        return Contents(
+            contents.points[left],
+            _keys(contents.keys, left),
+            None if contents.times is None else contents.times[left],
+            None if contents.deadlines is None else contents.deadlines[left],
+            None if held is None else _held(held, ~self._among(held.keys)),
+        )
+
+
+def held_keys(contents: Contents) -> Keys | None:
+    """The keys in quarantine."""
+    return None if contents.held is None else contents.held.keys
+
+
+def _keys(keys: Keys, left: npt.NDArray[np.bool_]) -> Keys:
+    return keys if left.all() else take_keys(keys, np.flatnonzero(left))
+
+
+def _held(held: HeldRows, left: npt.NDArray[np.bool_]) -> HeldRows:
+    return HeldRows(
+        _keys(held.keys, left),
+        held.points[left],
+        held.times[left],
+        held.deadlines[left],
+        held.speeds[left],
+        held.growths[left],
+        held.revisions[left],
+        held.confirmed[left],
+    )

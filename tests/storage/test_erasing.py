@@ -1,0 +1,248 @@
+"""Keys are erased from the past of a hull: all of it at once, in every file, and nothing else is lost."""
+
+import gc
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from filed_fleet import KEYS, SECOND, Fleet, read_back
+from folders import no_progress, same
+
+from dynhull.keys import PackedKeys, take_keys
+from dynhull_server.state.contents import replayed
+from dynhull_server.state.records import FOREVER, NO_TIME, Append, HeldChange, HeldRows, Kept, KeyRows, Record
+from dynhull_server.storage.port import DamagedError
+from dynhull_server.storage.segments.archive import Archive
+from dynhull_server.storage.sqlite import copies
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+GONE = [KEYS[0], KEYS[3]]
+NONE = PackedKeys.pack([])
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    fleet = Fleet(tmp_path).fill()
+    yield fleet
+    fleet.storage.close()
+
+
+def leave(fleet):
+    """The keys leave the hull; then the journal has nothing that is older. Returns the revision."""
+    revision = len(fleet.records) + 1
+    held = HeldRows(
+        PackedKeys.pack(GONE[:1]),
+        np.ones((1, 2)),
+        *(np.array([each]) for each in (NO_TIME, FOREVER)),
+        np.array([1.5]),
+        np.array([np.nan]),
+        np.array([revision]),
+        np.array([0]),
+    )
+    dropped = KeyRows(NONE, np.empty((0, 2)), PackedKeys.pack(GONE), held=HeldChange(held, NONE))
+    last = KeyRows(
+        NONE,
+        np.empty((0, 2)),
+        NONE,
+        held=HeldChange(
+            replace(held, **{name: getattr(held, name)[:0] for name in HeldRows.__slots__}), PackedKeys.pack(GONE[:1])
+        ),
+    )
+    records = [Record(revision, dropped, cause="batch"), Record(revision + 1, last, cause="quarantine")]
+    fleet.time += SECOND
+    stamp = fleet.storage.commit([Append(1, records)], fleet.time)
+    fleet.records += [replace(each, committed=stamp) for each in records]
+    contents = replayed(Kept(records=fleet.records), fleet.settings).stored()
+    for _ in range(2):
+        fleet.carry_out(fleet.storage.snapshot(1, Kept(revision + 1, contents)))
+    return revision + 1
+
+
+def erase(fleet, until):
+    fleet.carry_out(fleet.storage.erase(1, PackedKeys.pack(GONE), until, fleet.time))
+
+
+def without(records, until):
+    """The batches as they are once the keys are erased from them."""
+    left = []
+    for record in records:
+        rows = record.rows
+        if record.revision <= until:
+            stay = np.array([key not in GONE for key in rows.keys], bool)
+            rows = KeyRows(take_keys(rows.keys, np.flatnonzero(stay)), rows.points[stay], NONE, held=rows.held)
+            if rows.held is not None:
+                held = {name: getattr(rows.held.rows, name)[:0] for name in HeldRows.__slots__}
+                rows = replace(rows, held=HeldChange(HeldRows(**held), NONE))
+        left.append(replace(record, rows=rows))
+    return left
+
+
+def holds(folder, key):
+    """The files of a folder that have a key, however they are compressed: those are read, too."""
+    import pyarrow.parquet as pq
+
+    return [each for each in folder.rglob("*.parquet*") if key in pq.read_table(each).column("key").to_pylist()]
+
+
+def test_a_key_is_in_no_file_and_in_no_revision_any_more(fleet):
+    until = leave(fleet)
+    assert len(holds(fleet.archive.path, GONE[0])) > 4
+    before = fleet.files
+    erase(fleet, until)
+    fleet.put(4)  # a key that comes back is a new one
+    for _ in range(2):
+        fleet.snapshot()
+    fleet.file()
+    expected = without(fleet.records, until)
+    for _ in range(2):
+        found = read_back(fleet.storage, len(expected))
+        same(found, expected)
+        assert [each.committed for each in found] == [each.committed for each in expected]
+        for revision in range(0, len(expected), 3):
+            kept = fleet.storage.state(1, revision)
+            wanted = replayed(Kept(records=expected[: kept.revision]), fleet.settings).stored()
+            same(kept.contents, wanted if kept.revision else kept.contents)
+        (erasure,) = fleet.storage.erasures(1)
+        assert (erasure.first, erasure.last, erasure.time, erasure.keys) == (1, until, fleet.time - 4 * SECOND, 2)
+        assert (
+            erasure.moves
+            == sum(
+                key in GONE
+                for each in fleet.records[:until]
+                for keys in (each.rows.keys, each.rows.removes)
+                for key in keys
+            )
+            + 2
+        )
+        assert fleet.storage.history(1).erasures == (erasure,)
+        fleet.storage.close()
+        fleet.storage = fleet.make()
+        assert fleet.storage.open(no_progress).notes == []
+    kept_on = [each for each in fleet.files if each in before]
+    assert all(not holds(fleet.archive.path / each, GONE[0]) for each in kept_on)
+    later = [file.name for key in GONE for file in holds(fleet.archive.path, key)]
+    assert all(int(name.split("-")[1]) > until for name in later)
+    assert copies.check(fleet.folder / "data", no_progress, fleet.archive.path).notes == []
+
+
+def test_what_does_not_have_the_key_stays_as_it_is(fleet):
+    until = leave(fleet)
+    before = fleet.files
+    fleet.carry_out(fleet.storage.erase(1, PackedKeys.pack(["somebody else"]), until, fleet.time))
+    assert set(before) <= set(fleet.files)
+    assert fleet.storage.erasures(1) == ()
+    erase(fleet, until)
+    once = fleet.files
+    erase(fleet, until)
+    assert fleet.files == once
+    assert len(fleet.storage.erasures(1)) == 1
+
+
+def test_a_kill_at_any_point_leaves_the_past_as_it_was_or_without_the_key(tmp_path):
+    fleet = Fleet(tmp_path).fill(2)
+    until = leave(fleet)
+    fleet.file()
+    taken = []
+
+    def look():
+        copy = tmp_path / f"copy {len(taken)}"
+        for part in ("data", "history"):
+            shutil.copytree(tmp_path / part, copy / part)
+        taken.append(copy)
+
+    write, remove = fleet.archive.write, fleet.archive.remove
+
+    def watched(function):
+        def looking(*arguments):
+            look()
+            return function(*arguments)
+
+        return looking
+
+    fleet.archive.write, fleet.archive.remove = watched(write), watched(remove)
+    for step in fleet.storage.erase(1, PackedKeys.pack(GONE), until, fleet.time):
+        look()
+        fleet.storage.commit([step], fleet.time)
+    look()
+    fleet.storage.close()
+    outcomes = []
+    for copy in taken:
+        left = Archive(copy / "history")
+        storage = SQLiteStorage(copy / "data", archive=left)
+        storage.open(no_progress)
+        erased = len(storage.erasures(1))
+        outcomes.append(erased)
+        same(read_back(storage, until), without(fleet.records, until) if erased else fleet.records)
+        for step in storage.file_history(fleet.time):
+            storage.commit([step], fleet.time)
+        facts = [segment.facts for segment in storage._ledger.hulls[1].segments]
+        assert len(list(left.path.rglob("*.parquet*"))) == len(facts) + sum(each.state_bytes > 0 for each in facts)
+        assert bool(erased) == (not holds(left.path, GONE[0]))
+        storage.close()
+        assert copies.check(copy / "data", no_progress, left.path).notes == []
+    assert outcomes == sorted(outcomes)
+    assert {0, 1} == set(outcomes)
+
+
+def test_a_commit_that_is_found_after_all_keeps_its_files(fleet):
+    """The outcome of the commit that replaces the files is unknown at first, and whoever erases has given up."""
+    until = leave(fleet)
+    steps = fleet.storage.erase(1, PackedKeys.pack(GONE), until, fleet.time)
+    for step in steps:
+        fleet.storage.commit([step], fleet.time)
+        if type(step).__name__ == "EraseKeys":
+            break
+    steps.close()
+    del steps
+    gc.collect()
+    fleet.file()
+    same(read_back(fleet.storage, until), without(fleet.records, until))
+    fleet.storage.close()
+    fleet.storage = fleet.make()
+    assert fleet.storage.open(no_progress).notes == []
+    same(read_back(fleet.storage, until), without(fleet.records, until))
+
+
+def test_who_reads_meanwhile_gets_the_one_or_the_other(fleet, monkeypatch):
+    """The files are replaced between a look at the rows and the read of the file that they name."""
+    until = leave(fleet)
+    fleet.file()
+    read = fleet.archive.read
+
+    def erased_first(*file):
+        monkeypatch.setattr(fleet.archive, "read", read)
+        erase(fleet, until)
+        return read(*file)
+
+    monkeypatch.setattr(fleet.archive, "read", erased_first)
+    same(read_back(fleet.storage, until), without(fleet.records, until))
+    (fleet.archive.path / fleet.files[0]).unlink()
+    fleet.storage.close()
+    fleet.storage = fleet.make()
+    fleet.storage.open(no_progress)
+    with pytest.raises(DamagedError, match="missing"):
+        read_back(fleet.storage, until)
+
+
+def test_an_erasure_is_forgotten_with_what_it_was_about(fleet):
+    until = leave(fleet)
+    erase(fleet, until)
+    copy = fleet.folder / "backup"
+    list(copies.copy_all([(fleet.folder / "data", copy)], no_progress, history=fleet.archive.path))
+    backup = SQLiteStorage(copy, archive=Archive(copy / "history"))
+    backup.open(no_progress)
+    assert backup.erasures(1) == fleet.storage.erasures(1)
+    same(read_back(backup, until), without(fleet.records, until))
+    backup.close()
+    fleet.put(4)
+    fleet.snapshot()
+    fleet.snapshot()
+    fleet.storage.commit([fleet.storage.set_history(1, 1, 0)])
+    fleet.time += SECOND
+    fleet.file()
+    fleet.file()
+    assert fleet.storage.erasures(1) == ()
+    fleet.storage.close()
+    fleet.storage = fleet.make()
+    assert fleet.storage.open(no_progress).notes == []
