@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from dynhull_cli.plural import plural
+from dynhull_server.backups import past_place
 from dynhull_server.storage.databases import is_database
 
 SOURCE_HELP = "A data folder, or the address of a database; no server may be using it."
@@ -16,11 +17,11 @@ def move(
     source: Annotated[str, typer.Argument(metavar="FROM", help=SOURCE_HELP)],
     target: Annotated[str, typer.Argument(metavar="TO", help=TARGET_HELP)],
     history_dir: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "--history-dir",
-            help="The folder of the past of the hulls in the database, if they have any.",
-            file_okay=False,
+            help="The folder of the past of the hulls in the database, or s3://BUCKET/PREFIX, if they have any.",
+            callback=past_place,
         ),
     ] = None,
 ) -> None:

@@ -9,11 +9,28 @@ import typer
 from dynhull_cli.connected import Connect, connecting
 
 from .storage.databases import is_database
+from .storage.segments.place import is_store, require_store
 
 DATA = Path("dynhull-data")
+
+
+def past_place(place: str | None) -> str | None:
+    """Where the past is, unless that cannot be."""
+    if place is not None and is_store(place):
+        try:
+            require_store(place)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+    return place
+
+
 HistoryDir = Annotated[
-    Path | None,
-    typer.Option("--history-dir", help="The folder of the past of the hulls. Default: `history` in the data folder."),
+    str | None,
+    typer.Option(
+        "--history-dir",
+        help="The folder of the past of the hulls, or s3://BUCKET/PREFIX. Default: `history` in the data folder.",
+        callback=past_place,
+    ),
 ]
 WithoutHistory = Annotated[
     bool, typer.Option("--without-history", help="Leave the past of the hulls out: as much as the journal drops.")

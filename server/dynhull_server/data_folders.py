@@ -26,7 +26,7 @@ def copy_folder(
     *,
     accept_loss: bool = False,
     restores: bool = False,
-    history: Path | None = None,
+    history: str | None = None,
     without_history: bool = False,
 ) -> None:
     """Copy a data folder, and print what was lost and how many hulls it has; of one with workers, each part."""
@@ -49,7 +49,7 @@ def copy_folder(
             write_manifest(target, workers, complete=True)  # at the end: without it, the copy is refused
 
 
-def check_folder(data: Path, history: Path | None = None) -> bool:
+def check_folder(data: Path, history: str | None = None) -> bool:
     """Examine a data folder and print a report, of one with workers on each part; returns whether all is intact."""
     with _errors_reported():
         parts = parts_of(data)
@@ -65,7 +65,7 @@ def check_folder(data: Path, history: Path | None = None) -> bool:
     return True
 
 
-def _check_part(data: Path, history: Path | None) -> bool:
+def _check_part(data: Path, history: str | None) -> bool:
     with _errors_reported(), progress_bar("rows") as progress:
         report = copies.check(data, progress, history)
     for hull in report.hulls:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from .settings import Settings
 from .storage.segments.archive import HISTORY, Archive
+from .storage.segments.objects import archive_at
 
 MICROSECONDS = 1_000_000
 
@@ -15,9 +16,9 @@ def archive_of(settings: Settings, data: Path | None = None) -> Archive | None:
         settings: the settings.
         data: its data folder; None for one whose hulls are in a database.
     """
-    path = settings.history_dir
-    if path is None and data is not None:
-        path = data / HISTORY
-    if path is None:
+    place = settings.history_dir
+    if place is None and data is not None:
+        place = str(data / HISTORY)
+    if place is None:
         return None
-    return Archive(path, settings.max_history_bytes, round(settings.max_history_age * MICROSECONDS))
+    return archive_at(place, settings.max_history_bytes, round(settings.max_history_age * MICROSECONDS))

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from .storage.databases import examples, is_database, kind_of, names
 from .storage.durability import Durability
+from .storage.segments.place import is_store, require_store
 
 PREFIX = "DYNHULL_"  # of environment variables
 # Former names of settings, which are still accepted.
@@ -98,10 +99,10 @@ class Settings(BaseModel):
         description="Least number of points written to a hull between snapshots; also at least as many as it has.",
     )
 
-    history_dir: Path | None = Field(
+    history_dir: str | None = Field(
         None,
-        description="Folder for the past of hulls that keep theirs; by default `history` in the data folder. Servers "
-        "of one database share it.",
+        description="Folder for the past of hulls that keep theirs, or an object store, s3://BUCKET/PREFIX; by default "
+        "`history` in the data folder. Servers of one database share it.",
     )
     max_history_age: float = Field(
         0.0,
@@ -281,6 +282,11 @@ class Settings(BaseModel):
             raise ValueError("--history-dir keeps what --in-memory does not store: give one of them")
         if self.history_dir is not None and find_spec("pyarrow") is None:
             raise ValueError("--history-dir needs pyarrow: pip install 'dynhull[history]'")
+        if self.history_dir is not None and is_store(self.history_dir):
+            try:
+                require_store(self.history_dir)
+            except ValueError as error:  # which does not repeat what may be secret
+                raise ValueError(f"--history-dir {error}") from None
         protected = self.tls_cert and self.tokens
         for host in (self.host, *([] if self.metrics_port is None else [self.metrics_host])):
             if not is_loopback(host) and not protected and not self.insecure:

@@ -8,6 +8,7 @@ from folders import no_progress
 from dynhull.keys import PackedKeys
 from dynhull_server.state.contents import replayed
 from dynhull_server.state.records import FOREVER, Append, Create, HullRow, HullSettings, Kept, KeyRows, Record
+from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
@@ -28,6 +29,11 @@ class Fleet:
         self.storage = self.make()
         self.storage.open(no_progress)
         self.storage.commit([Create(HullRow(1, "fleet", "0123", 12.5, settings))], BEGIN)
+
+    def make_reader(self):
+        """The storage again, which has not read any file."""
+        self.storage._filed = Filed(self.archive)
+        return self.storage
 
     def put(self, commits):
         """Commits of two batches each, a second apart."""

@@ -64,7 +64,7 @@ class Moved:
         self.notes += findings.notes
 
 
-def to_database(folder: Path, database: Database, progress: Progress, history: Path | None = None) -> Moved:
+def to_database(folder: Path, database: Database, progress: Progress, history: str | Path | None = None) -> Moved:
     """Copy a folder into a database, in one transaction.
 
     Args:
@@ -102,7 +102,7 @@ def to_database(folder: Path, database: Database, progress: Progress, history: P
     return moved
 
 
-def to_folder(database: Database, folder: Path, progress: Progress, history: Path | None = None) -> Moved:
+def to_folder(database: Database, folder: Path, progress: Progress, history: str | Path | None = None) -> Moved:
     """Copy a database into a folder, which has a part for each partition if there are several.
 
     Args:
@@ -142,7 +142,7 @@ def to_folder(database: Database, folder: Path, progress: Progress, history: Pat
     return moved
 
 
-def _move_history(ledger: Ledger, source: Path | None, target: Path | None) -> None:
+def _move_history(ledger: Ledger, source: str | Path | None, target: str | Path | None) -> None:
     """Copy the files of all segments. Raises StorageError if there are some, and no folder, or one is damaged."""
     size = history_bytes(ledger)
     if not size:

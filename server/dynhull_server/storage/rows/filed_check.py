@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive, is_installed
+from ..segments.objects import archive_at
 from .filed import read_batches, read_state
 from .filing import run_from_start
 from .group import DropErasure, RetireSegment
@@ -51,7 +52,7 @@ def leaving_out(ledger: Ledger) -> Iterator[RetireSegment | DropErasure]:
         yield from (DropErasure(number, stored) for stored in hull.erasures)
 
 
-def adopting(ledger: Ledger, source: Path, target: Path, notes: list[str]) -> Iterator[RetireSegment]:
+def adopting(ledger: Ledger, source: Path | str, target: Path | str, notes: list[str]) -> Iterator[RetireSegment]:
     """Copy the files of all segments; the steps that leave those out whose files are not there any more, or damaged.
 
     What lies before one that is left out is left out, too, so that the past has no gap.
@@ -62,7 +63,7 @@ def adopting(ledger: Ledger, source: Path, target: Path, notes: list[str]) -> It
         target: the folder for them.
         notes: receives what is left out.
     """
-    before, after = Archive(source), Archive(target)
+    before, after = archive_at(source), archive_at(target)
     copied = False
     for number, hull in ledger.hulls.items():
         gone = 0

@@ -64,6 +64,7 @@ from .tables import Reader
 log = logging.getLogger(__name__)
 
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
+LOOK = 3_600_000_000  # microseconds between looks for files that belong to nobody
 
 Picked = TypeVar("Picked")
 Found = TypeVar("Found")
@@ -94,6 +95,7 @@ class RowStorage(ABC):
         self._unsettled = False
         self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
         self._filing: set[int] = set()  # rows of segments that are being written
+        self._looked = 0  # when it was looked for files that belong to nobody
 
     @property
     @abstractmethod
@@ -402,6 +404,20 @@ class RowStorage(ABC):
                 )
                 yield RetireSegment(number, segment)
         yield from self._remove_files(archive)
+        if now - self._looked >= LOOK:
+            self._looked = now
+            self._remove_orphans(archive)
+
+    def _remove_orphans(self, archive: Archive) -> None:
+        """Remove the files that owners before this one have written after it became the owner."""
+        for number in self._with_past():
+            with self._visible:
+                hull = self._settled().hulls.get(number)
+                files = set() if hull is None else {each.file for each in hull.segments}
+            if hull is not None:
+                for file in archive.orphans(hull.row.uid, self.epoch):
+                    if file not in files:
+                        archive.remove(file)
 
     def _with_past(self) -> list[int]:
         """The hulls that have a past, or are to have one."""
@@ -430,7 +446,7 @@ class RowStorage(ABC):
         places: set[int] = set()
         try:
             for segment, due in erasing.segments():
-                place, file = next(self._ledger.segment_ids), erasing.archive.name(uid, due.first, due.last)
+                place, file = next(self._ledger.segment_ids), erasing.archive.name(uid, due.first, due.last, self.epoch)
                 places.add(place)
                 self._filing.add(place)
                 yield NameFile(place, file)
@@ -447,7 +463,7 @@ class RowStorage(ABC):
     def _close_segment(self, number: int, archive: Archive) -> Iterator[StorageStep]:
         with self._reading(lambda ledger: ledger.hulls[number].copy()) as (reader, hull):
             due = read_due(reader, hull)
-        place, file = next(self._ledger.segment_ids), archive.name(hull.row.uid, due.first, due.last)
+        place, file = next(self._ledger.segment_ids), archive.name(hull.row.uid, due.first, due.last, self.epoch)
         self._filing.add(place)
         try:
             yield NameFile(place, file)

@@ -47,9 +47,9 @@ class Archive:
         self.most_bytes = most_bytes
         self.most_age = most_age
 
-    def name(self, uid: str, first: int, last: int) -> str:
-        """A name for the files of a segment that no other one has."""
-        return f"{uid.partition('.')[0]}/{first:019}-{last:019}-{token_hex(4)}"
+    def name(self, uid: str, first: int, last: int, epoch: int = 0) -> str:
+        """A name for the files of a segment that no other one has; `epoch` is that of the owner of the hull."""
+        return f"{uid}/{first:019}-{last:019}-{epoch}-{token_hex(8)}"
 
     def write(self, file: str, content: bytes) -> Written:
         """Write a file so that it is whole and on the disk under its name, or not there.
@@ -63,7 +63,7 @@ class Archive:
                 folder.mkdir(parents=True, exist_ok=True)
                 make_durable(folder.parent)
         write_durably(path, content)
-        return Written(len(content), _digest(content))
+        return Written(len(content), digest_of(content))
 
     def read(self, file: str, size: int, digest: str) -> bytes:
         """All bytes of a file.
@@ -74,14 +74,24 @@ class Archive:
         """
         path = self.path / file
         try:
-            content = path.read_bytes()
+            content = self.content(file, size)
         except FileNotFoundError:
             raise DamagedError(f"{path} is missing: restore a backup") from None
         except OSError as error:
             raise StorageError(f"{path} cannot be read: {error}") from error
-        if len(content) != size or _digest(content) != digest:
+        if len(content) != size or digest_of(content) != digest:
             raise DamagedError(f"{path} is not as it was written: it was cut, changed or exchanged: restore a backup")
         return content
+
+    def content(self, file: str, size: int = 0) -> bytes:
+        """All bytes of a file, which had a size, whatever they are.
+
+        Raises:
+            FileNotFoundError: it is not there.
+            OSError: it cannot be read at present.
+        """
+        del size
+        return (self.path / file).read_bytes()
 
     def remove(self, file: str) -> None:
         """Remove the files of a segment; those that are not there are passed over.
@@ -103,14 +113,22 @@ class Archive:
             OSError: they are not there, or cannot be copied.
         """
         for each in other.files(file):
-            target = self.path / each
-            target.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                os.link(other.path / each, target)
-            except FileNotFoundError:
-                raise
-            except OSError:  # another file system, or one without links
-                self.write(each, (other.path / each).read_bytes())
+            if not self._link(other, each):
+                self.write(each, other.content(each))
+
+    def _link(self, other: "Archive", file: str) -> bool:
+        """Have a file of another archive as a link; whether that is possible."""
+        if type(self) is not Archive or type(other) is not Archive:
+            return False
+        target = self.path / file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            os.link(other.path / file, target)
+        except FileNotFoundError:
+            raise
+        except OSError:  # another file system, or one without links
+            return False
+        return True
 
     def files(self, file: str) -> Iterator[str]:
         """The names of the files of a segment that are there."""
@@ -118,11 +136,17 @@ class Archive:
         if (self.path / (file + STATE)).exists():
             yield file + STATE
 
+    def orphans(self, uid: str, epoch: int) -> list[str]:
+        """Segments of a hull that may have been written after another owner had taken it: none in a folder."""
+        del uid, epoch
+        return []
+
     def sync(self) -> None:
         """Make the names of all files durable."""
         for folder in [self.path.parent, self.path, *(each for each in self.path.iterdir() if each.is_dir())]:
             make_durable(folder)
 
 
-def _digest(content: bytes) -> str:
+def digest_of(content: bytes) -> str:
+    """The hash of the bytes of a file."""
     return blake2b(content, digest_size=DIGEST_BYTES).hexdigest()

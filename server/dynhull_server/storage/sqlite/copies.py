@@ -21,7 +21,8 @@ from ..rows.ledger import Ledger
 from ..rows.reading import read_hull
 from ..rows.tables import FORMAT, Insert, UnreadableError
 from ..rows.totals import STOPPED, Totals
-from ..segments.archive import HISTORY, Archive
+from ..segments.archive import HISTORY
+from ..segments.objects import archive_at
 from .disk import Disk, OpenMode
 from .examination import examine, format_of, load
 from .folder import DATABASE, UNFINISHED, UNFINISHED_WORDS, Folder
@@ -85,7 +86,7 @@ class HullInFolder:
     notes: list[str]
 
 
-def check(path: Path, progress: Progress, history: Path | None = None) -> Report:
+def check(path: Path, progress: Progress, history: str | Path | None = None) -> Report:
     """Examine all data of a folder without changing anything. A server may be writing to it.
 
     Args:
@@ -102,7 +103,7 @@ def check(path: Path, progress: Progress, history: Path | None = None) -> Report
         if report.fatal:
             return report
         fences = check_fences(opened.reader, findings.ledger)
-    holes = list(damaged_segments(findings.ledger.hulls.values(), Archive(history or path / HISTORY)))
+    holes = list(damaged_segments(findings.ledger.hulls.values(), archive_at(history or path / HISTORY)))
     if holes:
         with _opened(path) as opened:  # what has become too old meanwhile is no hole
             there = load(opened.connection, opened.version).hulls
@@ -148,7 +149,7 @@ def copy_all(
     *,
     accept_loss: bool = False,
     restores: bool = False,
-    history: Path | None = None,
+    history: str | Path | None = None,
     without_history: bool = False,
 ) -> Iterator[tuple[Path, Report]]:
     """Copy folders of one server, including their logs, each as of one moment. Yields each copy, and a report on it.
@@ -398,7 +399,7 @@ def _finish(
     opened: _Opened,
     lasts: Mapping[int, int],
     incarnation: str,
-    past: tuple[Path, Path] | None,
+    past: tuple[Path | str, Path] | None,
     *,
     restores: bool,
 ) -> Report:

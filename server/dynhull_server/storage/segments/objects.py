@@ -1,0 +1,201 @@
+"""The past in an object store: the files of segments as objects, each written once under a key of its own.
+
+A store has no rename and no sync, and what a server has sent before another one took its place may arrive later. So no
+key is used twice: it has the uid of the hull, the revisions, the epoch of the owner, and a random number. Only the row
+in the journal makes an object part of the past.
+
+A store may hang for as long as it likes. Every call has a thread of its own, a limited number at a time, and is given
+up after some time, so that no thread of the disk and no commit ever waits for a store.
+"""
+
+from __future__ import annotations
+
+import errno
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as TooLongError
+from functools import partial
+from pathlib import Path
+from threading import BoundedSemaphore, Lock, Thread
+from time import time
+from typing import TYPE_CHECKING, Any, TypeVar
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from .archive import BATCHES, STATE, Archive, Written, digest_of
+from .place import is_store, require_store
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from pyarrow.fs import FileSystem
+
+Result = TypeVar("Result")
+
+CONNECT_SECONDS, SILENT_SECONDS = 5.0, 5.0
+# Seconds for a call, and bytes in each further one.
+CALL_SECONDS, SLOWEST_BYTES = 30.0, 250_000
+CALLS = 8  # at a time, also of those that were given up and hang
+ORPHAN_SECONDS = 86_400.0
+
+
+def archive_at(place: str | Path, most_bytes: int = 0, most_age: int = 0) -> Archive:
+    """The past in a folder, or in an object store."""
+    if is_store(place):
+        require_store(str(place))
+        return ObjectArchive(str(place), most_bytes, most_age)
+    return Archive(Path(place), most_bytes, most_age)
+
+
+class ObjectArchive(Archive):
+    """An object store with the files of segments.
+
+    Args:
+        place: its address, without credentials.
+        most_bytes, most_age: as of other archives.
+        seconds: for a call.
+    """
+
+    def __init__(self, place: str, most_bytes: int = 0, most_age: int = 0, seconds: float = CALL_SECONDS) -> None:
+        parts = urlsplit(place)
+        root = f"{parts.netloc}{unquote(parts.path)}".rstrip("/")
+        super().__init__(Path(root), most_bytes, most_age)
+        self._options = {name: values[-1] for name, values in parse_qs(parts.query).items()}
+        self._seconds = seconds
+        self._places = BoundedSemaphore(CALLS)
+        self._making = Lock()
+        self._made: FileSystem | None = None
+
+    def write(self, file: str, content: bytes) -> Written:
+        """Write an object, and read it: what comes back is what was sent.
+
+        Raises:
+            OSError: the store refuses it, does not answer, or keeps something else.
+        """
+        key = self._key(file)
+
+        def put() -> None:
+            with self._store().open_output_stream(key) as stream:
+                stream.write(content)
+
+        self._ask(file, put, len(content))
+        if self.content(file, len(content)) != content:
+            raise OSError(errno.EIO, "the object store does not keep what it is sent", file)
+        return Written(len(content), digest_of(content))
+
+    def content(self, file: str, size: int = 0) -> bytes:
+        """All bytes of an object, whatever they are.
+
+        Raises:
+            FileNotFoundError: it is not there.
+            OSError: the store refuses, or does not answer.
+        """
+        key = self._key(file)
+
+        def get() -> bytes:
+            with self._store().open_input_file(key) as stream:
+                found: bytes = stream.read()
+            return found
+
+        return self._ask(file, get, size)
+
+    def remove(self, file: str) -> None:
+        """Remove the objects of a segment; those that are not there are passed over.
+
+        Raises:
+            OSError: one cannot be removed.
+        """
+        for end in (BATCHES, STATE):
+            self._ask(file, partial(self._removed, self._key(file + end)))
+
+    def files(self, file: str) -> Iterator[str]:
+        """The names of the objects of a segment that are there."""
+        yield file + BATCHES
+        if self._ask(file, lambda: self._is_there(self._key(file + STATE))):
+            yield file + STATE
+
+    def orphans(self, uid: str, epoch: int) -> list[str]:
+        """Segments that owners before an epoch have written, older than a day, whether a hull has them or not.
+
+        Raises:
+            OSError: the store refuses, or does not answer.
+        """
+        from pyarrow.fs import FileSelector, FileType
+
+        folder = f"{self.path}/{uid}"
+        before = time() - ORPHAN_SECONDS
+
+        def look() -> set[str]:
+            found = self._store().get_file_info(FileSelector(folder, allow_not_found=True))
+            return {
+                each.base_name.partition(".")[0]
+                for each in found
+                if each.type == FileType.File and each.mtime is not None and each.mtime.timestamp() < before
+            }
+
+        return sorted(f"{uid}/{name}" for name in self._ask(uid, look) if _epoch(name) < epoch)
+
+    def sync(self) -> None:
+        """Nothing is left to do: a store that has taken an object keeps it."""
+
+    def _key(self, file: str) -> str:
+        return f"{self.path}/{file}"
+
+    def _store(self) -> FileSystem:
+        with self._making:
+            if self._made is None:
+                from pyarrow.fs import S3FileSystem
+
+                # One request for each object: no parts are left of one that was given up.
+                self._made = S3FileSystem(
+                    connect_timeout=CONNECT_SECONDS,
+                    request_timeout=SILENT_SECONDS,
+                    allow_delayed_open=True,
+                    background_writes=False,
+                    **self._options,
+                )
+            return self._made
+
+    def _removed(self, key: str) -> None:
+        try:
+            self._store().delete_file(key)
+        except FileNotFoundError:
+            return
+        except OSError:
+            if self._is_there(key):  # not only the mark of its folder could not be written
+                raise
+
+    def _is_there(self, key: str) -> bool:
+        from pyarrow.fs import FileType
+
+        return bool(self._store().get_file_info(key).type != FileType.NotFound)
+
+    def _ask(self, what: str, function: Callable[[], Result], size: int = 0) -> Result:
+        """The result of a function that asks the store, in a thread of its own.
+
+        Raises:
+            OSError: there is none in time, or too many calls hang; or what the function raises.
+        """
+        seconds = self._seconds + size / SLOWEST_BYTES
+        late = OSError(errno.ETIMEDOUT, f"the object store has not answered for {seconds:.0f} s", what)
+        if not self._places.acquire(timeout=seconds):
+            raise late
+        answer: Future[Result] = Future()
+        # It must not keep the process from ending.
+        Thread(target=self._call, args=(function, answer), name="object store", daemon=True).start()
+        try:
+            return answer.result(seconds)
+        except TooLongError:
+            raise late from None
+
+    def _call(self, function: Callable[[], Any], answer: Future[Any]) -> None:
+        try:
+            answer.set_result(function())
+        except BaseException as error:
+            answer.set_exception(error)
+        finally:
+            self._places.release()
+
+
+def _epoch(name: str) -> int:
+    """The epoch in the name of a segment; that of one without it is that of nobody."""
+    parts = name.split("-")
+    return int(parts[2]) if len(parts) == 4 and parts[2].isdigit() else 0
