@@ -345,21 +345,19 @@ def test_positions_of_few_decimals_take_few_bytes():
 
 def test_a_move_that_is_a_batch_of_its_own_takes_few_bytes_too():
     """Fifty of them share a commit, whose number and time each row has."""
-    rng = np.random.default_rng(0)
-    points, keys = (
-        rng.uniform([-10, 40], [10, 60], (100, 2)),
-        [PackedKeys.pack([f"vehicle {i:05}"]) for i in range(100)],
-    )
-    none, times = PackedKeys.pack([]), BEGIN + np.cumsum(rng.integers(800, 3000, 400))
-    for decimals, most in ((7, 8), (None, 14.3)):
-        records = []
-        for revision in range(1, 16_001):
-            who = int(rng.integers(100))
-            points[who] += rng.normal(0, 1e-4, 2)
-            place = points[who : who + 1].copy() if decimals is None else np.round(points[who : who + 1], decimals)
-            commit = CommitStamp(revision // 50, int(times[revision // 50]))
-            records.append(Record(revision, KeyRows(keys[who], place, none), cause="batch", committed=commit))
-        assert len(to_parquet(columns_of(records, "str"), {})) / len(records) < most
+    rng, moves, vehicles = np.random.default_rng(0), 2**16, 1000
+    who = np.sort(rng.integers(0, vehicles, moves))  # by key, with steps from one place to the next
+    points = np.cumsum(rng.normal(0, 1e-4, (moves, 2)), 0) + rng.uniform([-10, 40], [10, 60], (vehicles, 2))[who]
+    order = rng.permutation(moves)
+    keys = PackedKeys.pack([f"vehicle {i:05}" for i in who[order].tolist()])
+    commits = np.arange(moves) // 50
+    times = BEGIN + np.cumsum(rng.integers(800, 3000, moves // 50 + 1))
+    plain = columns_of([Record(1, KeyRows(keys, points[order], PackedKeys.pack([])), cause="batch")], "str")
+    columns = replace(plain, revision=np.arange(moves), place=np.zeros(moves, np.int64))
+    columns = replace(columns, commit=commits, committed=times[commits])
+    for decimals, most in ((7, 9.1), (None, 15.5)):
+        columns.points = points[order] if decimals is None else np.round(points[order], decimals)
+        assert len(to_parquet(columns, {})) / moves < most
 
 
 def test_a_copy_has_the_past_or_says_that_it_has_not(tmp_path):
