@@ -534,6 +534,8 @@ class Core:
             for leg, state in found:
                 if leg.before is not None and state is not None:
                     leg.before.state = state
+            if trip.quiet is not None:
+                trip.quiet.look_again(trip.legs)
             if trip.fences is not None:
                 self._fences.give_back(trip, trip.fences, event.restored)
             assert trip.failure is not None  # a trip is examined only after a failure

@@ -1,6 +1,6 @@
 """One trip: requests that run together, and whose changes are committed together."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, assert_never
@@ -31,6 +31,7 @@ from .root_state import RootState, state_of
 from .together import apply_together
 
 if TYPE_CHECKING:
+    from .fences.index.line import Line
     from .fences.model.records import KeptFence
     from .fences.trip.part import FencePart
 
@@ -42,6 +43,24 @@ class Reservation:
     number: int
     refusal: Exception | None
     limits: Limits
+
+
+@dataclass(slots=True)
+class Quiet:
+    """Alarms that look at the hulls of a trip, and as a rule have nothing to say.
+
+    Attributes:
+        line: the alarms.
+        part: makes the part of the trip that concerns them, once one may have something to say.
+    """
+
+    line: "Line"
+    part: "Callable[[], FencePart]"
+
+    def look_again(self, names: Iterable[str]) -> None:
+        """Look at hulls as the storage has them, after a commit that failed."""
+        for _, watched in self.line.watching(names):
+            watched.look_again()
 
 
 class Trip:
@@ -59,6 +78,7 @@ class Trip:
         legs: the hulls by name.
         applied: whether any batch was applied, or a fence has changed in memory.
         torn: whether the requests were applied in part, because memory ran out in the middle of one.
+        quiet: the alarms at its hulls, as long as none has been touched; None where it has none, or has `fences`.
         queues: the queues that it occupies; only the core looks into them.
         failure: the error of the commit, or None.
         unknown: whether it may have been committed despite the failure.
@@ -76,6 +96,7 @@ class Trip:
         "pause",
         "places",
         "queues",
+        "quiet",
         "requests",
         "torn",
         "unknown",
@@ -94,6 +115,7 @@ class Trip:
         self.requests = requests
         self.places = places
         self.fences = fences
+        self.quiet: Quiet | None = None
         self.pause = pause
         self.applied = self.torn = self.unknown = False
         self.failure: Exception | None = None
@@ -103,7 +125,6 @@ class Trip:
 
     def run(self) -> None:
         """Run the requests; their results and errors are stored in them."""
-        fences = self.fences
         for request in self.requests:
             try:
                 if type(request) is WriteBatch:
@@ -116,13 +137,13 @@ class Trip:
                     request.result = self._do(request)
             except Exception as error:  # any error is the answer to the caller
                 refuse(request, error)
-            if fences is not None:
-                self.applied |= fences.applied
-                self.torn |= fences.torn
+            if self.fences is not None:
+                self.applied |= self.fences.applied
+                self.torn |= self.fences.torn
             if self.torn:  # later requests would see a part of a batch
                 break
-        if fences is not None:
-            fences.settle(self.requests)
+        if self.fences is not None:
+            self.fences.settle(self.requests)
 
     def changes(self) -> list[Change]:
         """The changes to commit."""
@@ -188,16 +209,30 @@ class Trip:
             hull = self._new_hull(request, leg)
         elif hull.divided:  # it is created by the same trip, so the batch came before the hull
             raise HullNotFoundError(leg.name)
-        fences = self.fences
-        expired = None if fences is None else partial(fences.expired, hull, request.write.arrived)
+        expired = None
+        if self.fences is not None or self.quiet is not None:
+            expired = partial(self._expired_before, hull, request.write.arrived)
         applied = write(request, hull, self._now, leg.records, expired)
         self.torn = hull.state.torn
+        fences = self._fences_at(hull, request.write.arrived)
         if fences is not None:
             fences.wrote(leg, hull, applied, request.write.arrived)
         if applied is None:
             return
         leg.after = hull
         self._count(leg, applied)
+
+    def _expired_before(self, hull: Hull, now: int) -> None:
+        """Points have left a hull, as a revision of its own, before its batch."""
+        fences = self._fences_at(hull, now)
+        if fences is not None:
+            fences.expired(hull, now)
+
+    def _fences_at(self, hull: Hull, now: int) -> "FencePart | None":
+        """What the trip does to fences, now that a hull has perhaps a new revision."""
+        if self.quiet is not None and self.quiet.line.touched(hull, now):
+            self.fences, self.quiet = self.quiet.part(), None
+        return self.fences
 
     def _write_together(self, request: WriteTogether) -> None:
         """Apply a batch to each hull. All requests of such a trip name the same hulls, perhaps in another order."""

@@ -71,3 +71,26 @@ def test_a_batch_whose_commit_fails_raises_an_alarm_if_it_is_there(tmp_path: Pat
             assert await standing(engine) == expected
 
     asyncio.run(life())
+
+
+@pytest.mark.parametrize("fault", ["refused", "before", "after"])
+def test_a_batch_that_was_not_committed_is_not_what_was_before(tmp_path: Path, fault: str) -> None:
+    """Also where alarms had nothing to say about it."""
+
+    async def life() -> None:
+        async with engine_on(tmp_path) as (engine, storage):
+            await engine.hulls.create("fleet/a", HullSettings("str"))
+            await engine.alarms.create("size", SIZE)
+            await square(engine, "fleet/a", 1)
+            storage.fault = fault
+            if fault == "after":
+                await square(engine, "fleet/a", 1.5)
+            else:
+                with pytest.raises(NotStoredError):
+                    await square(engine, "fleet/a", 1.5)
+            await square(engine, "fleet/a", 2)
+            (event,) = await engine.alarms.get("size").events(0, 10)
+            assert event.previous == (2.25 if fault == "after" else 1.0, 3.0)
+            assert (event.distance, event.subject_revision) == (4.0, 3 if fault == "after" else 2)
+
+    asyncio.run(life())

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from ..fences.model.records import Delay, Subject
     from ..hull import Hull
 
+# No hull has so many changes.
+NEVER = -1
+
 
 class Watched:
     """An alarm at one hull.
@@ -35,7 +38,18 @@ class Watched:
         fresh: whether it has not been compared so far.
     """
 
-    __slots__ = ("_changes", "_points", "_rule", "_vertices", "fresh", "hull", "moved", "planned", "raised", "standing")
+    __slots__ = (
+        "_changes",
+        "_points",
+        "_rule",
+        "_vertices",
+        "fresh",
+        "hull",
+        "moved",
+        "planned",
+        "raised",
+        "standing",
+    )
 
     def __init__(self, rule: AlarmRule, hull: "Hull", moved: int) -> None:
         self.hull = hull
@@ -81,13 +95,26 @@ class Watched:
         return before
 
     def touched(self, now: int) -> bool:
-        """Whether a new revision of the hull may mean anything for the alarm: as a rule it does not."""
-        if self.fresh or not self._rule.silence:
-            return self.fresh or self._differs
-        if self.raised or not self._differs:
-            return self._differs
-        self.moved, self._points = max(self.moved, now), self.hull.state.counts.revision
-        return False
+        """Whether a new revision of the hull changes anything for the alarm; takes note of it if it does not."""
+        if self.fresh or not self._differs:
+            return self.fresh
+        rule, before = self._rule, (self._vertices, self._points)
+        if rule.silence and self.raised:
+            return True
+        self._look()
+        if rule.silence:
+            self.moved = max(self.moved, now)
+            return False
+        changes = self.holds(rule.clears) if self.raised else self.holds(rule.raises) != self.waits
+        if changes:  # `changed` says what was before
+            self._changes, (self._vertices, self._points) = NEVER, before
+        return changes
+
+    def look_again(self) -> None:
+        """Take note of the hull as the storage has it: what it was noted for has not been committed."""
+        self._look()
+        if self.hull.committed is not None:
+            self.moved = self.hull.committed.time
 
     @property
     def _differs(self) -> bool:

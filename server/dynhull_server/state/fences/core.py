@@ -1,6 +1,7 @@
 """What the core does for fences: their part of trips, and what follows once that is committed or fails."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from ..events import Effect, Examine, Tick, WakeFences
 from ..leg import Leg
@@ -8,7 +9,7 @@ from ..queues import Queue, Queues, names_of
 from ..registry import Registry
 from ..requests import CreateHull, Request, WriteBatch
 from ..schedule import Schedule
-from ..trip import Trip
+from ..trip import Quiet, Trip
 from .model.fence import Fence
 from .model.records import KeptFence
 from .model.requests import CreateFence, FenceRequest, PassTime
@@ -17,6 +18,9 @@ from .recovery.rollback import give_back, reading
 from .trip.comparison import Ground
 from .trip.deadlines import MOST_DUE
 from .trip.part import FencePart
+
+# Rows that the alarms at the hulls of a trip weigh, at most, if it is not to be planned with them.
+QUIET_WEIGHT = 1024
 
 
 class FenceCore:
@@ -45,6 +49,9 @@ class FenceCore:
 
     def trip(self, queues: Sequence[Queue], requests: list[Request], now: float, pause: float) -> Trip:
         """A trip on hulls with fences, or one that gives them a fence."""
+        quiet = self._quiet_trip(queues, requests, now, pause)
+        if quiet is not None:
+            return quiet
         names: dict[str, None] = {}
         fences: dict[str, Fence | None] = {}
         numbers: dict[str, int] = {}
@@ -72,6 +79,22 @@ class FenceCore:
         room = limits.max_alarm_hulls - (self._registry.watched if creates else 0)
         ground = Ground(legs, lines, fences, numbers, self._registry.tallies, limits, room)
         return Trip(legs, requests, now, pause, places, FencePart(ground, requests))
+
+    def _quiet_trip(self, queues: Sequence[Queue], requests: list[Request], now: float, pause: float) -> Trip | None:
+        """A trip of batches to hulls with alarms alone, which gets a part for these once one is touched; else None."""
+        line, hulls, registry = queues[0].line, self._registry.hulls, self._registry
+        if line is None or len(queues) > 1 or not line.has_only_alarms:
+            return None
+        names = {request.name: None for request in requests if type(request) is WriteBatch and request.name in hulls}
+        if any(type(request) is not WriteBatch or request.name not in names for request in requests):
+            return None
+        if sum(map(line.weight, names)) > QUIET_WEIGHT:
+            return None
+        legs = {name: Leg(name, hulls[name], keeps=self._keeps) for name in names}
+        trip = Trip(legs, requests, now, pause, {})
+        ground = partial(Ground, legs, [line], {}, {}, registry.tallies, registry.limits.fences)
+        trip.quiet = Quiet(line, lambda: FencePart(ground(), requests))
+        return trip
 
     def _reserve(self, request: CreateFence, numbers: dict[str, int]) -> None:
         number = self._registry.reserve_fence(alarm=request.config.rule is not None)

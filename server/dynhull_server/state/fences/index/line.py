@@ -128,6 +128,16 @@ class Line:
                 if pair.near != before:
                     yield fence, pair, (Cause.AREA if area else 0) | (Cause.MOVED if other else 0)
 
+    @property
+    def has_only_alarms(self) -> bool:
+        """Whether nothing but alarms depends on its hulls."""
+        return not (self.subjects or self.areas or self.pairs)
+
+    def touched(self, hull: Hull, now: int) -> bool:
+        """Whether a new revision of a hull may mean anything for one of the alarms at it: as a rule it does not."""
+        found = [watched.touched(now) for _, watched in self.watching([hull.name])]
+        return any(found)
+
     def watching(self, names: Iterable[str]) -> Iterator[tuple[Fence, Watched]]:
         """The alarms at the hulls with these names."""
         for name in names:

@@ -133,7 +133,9 @@ class FencePart:
             if hull is not leg.after:  # it was not created after all
                 self._dismiss(hull.name)
         elif not applied.duplicate:
-            self._comparison.compare([hull], now, None, {hull.name: of_batch(hull, applied, leg.records or ())})
+            compared = any(hull.name in line.subjects for line in self.lines)
+            changed = {hull.name: of_batch(hull, applied, leg.records or ())} if compared else {}
+            self._comparison.compare([hull], now, None, changed)
 
     def expired(self, hull: Hull, now: int) -> None:
         """Make the events of points that have left."""
