@@ -127,6 +127,8 @@ class ReplayPlace(HullPlace):
     def end(self, error: DynhullError) -> Sequence[Event]:
         """Prepare the next connection after one has ended; raises the error if there is none."""
         self.lost = error
+        if error.reason == "STORAGE_FAILED":  # a segment is missing or damaged: the next connection would not find it
+            raise error from None
         self._continue_later(error)
         if self._origin is not None and self.request.speed:
             time, begun = self._origin
