@@ -167,8 +167,8 @@ class Driver:
             lambda error: self._from_thread(partial(self._commit_reported, error)),
             lambda error: self._from_thread(partial(self.supervisor.died, "commits", error)),
         )
-        self._ticked = self.commit_time()
         self._started = True
+        self._look()  # at what has become due while nothing was served
         self.supervisor.every(TICK, "clock", self._tick)
         self.supervisor.every(WATCH_SECONDS, "commit watch", self._watch_commits)
 
@@ -419,11 +419,16 @@ class Driver:
             self._idle.set()
 
     async def _tick(self) -> None:
+        time = self._look()
+        if self.supervisor.fails("expiry") and not self.core.expiring(time):  # `expiring` is O(hulls)
+            self.supervisor.succeeded("expiry")
+
+    def _look(self) -> int:
+        """Have the core look at the clock. Returns the time."""
         now = self.machine.clock.monotonic()
         time, self._ticked = self.time(), self.commit_time()
         self.dispatch(Tick(now, time, self._expiries))
-        if self.supervisor.fails("expiry") and not self.core.expiring(time):  # `expiring` is O(hulls)
-            self.supervisor.succeeded("expiry")
+        return time
 
     async def _watch_commits(self) -> None:
         """Report a commit that hangs."""

@@ -116,6 +116,7 @@ class Core:
         self._queues = Queues(self._registry)
         self._schedule = Schedule(self._registry)
         self._fences = FenceCore(self._registry, self._queues, self._schedule, keeps=keeps)
+        self._own: Any = None  # who gets the answers to the core's own requests
         self._trips = 0
         self._undecided = 0
         self._stopping = False
@@ -231,6 +232,8 @@ class Core:
     # Requests
 
     def _asked(self, request: HullRequest | WriteBatch, effects: list[Effect]) -> None:
+        if self._schedule.fences and type(request) is WriteBatch:
+            self._pass_time(request.write.arrived, effects)
         queue = self._queues.of(request.name)
         hull = queue.hull
         if hull is not None and hull.divided and isinstance(request, DIVIDED):
@@ -249,6 +252,8 @@ class Core:
                 self._queues.rest(queue)
 
     def _arrived(self, event: Arrived, effects: list[Effect]) -> None:
+        if self._schedule.fences:
+            self._pass_time(event.batches[0].write.arrived, effects)
         queue = self._queues.of(event.batches[0].name)
         if queue.hull is not None and queue.hull.divided:
             self._divide(queue.hull, list(event.batches), effects)
@@ -270,6 +275,8 @@ class Core:
         effects.append(Reply(refused))
 
     def _asked_together(self, request: Together, effects: list[Effect]) -> None:
+        if type(request) is WriteTogether:
+            self._pass_time(request.parts[0].arrived, effects)
         self._go_on(self._queues.put(request, [part.name for part in request.parts]), effects)
 
     def _asked_of_fence(self, request: FenceRequest, effects: list[Effect]) -> None:
@@ -586,14 +593,19 @@ class Core:
 
     def _tick(self, event: Tick, effects: list[Effect]) -> None:
         """Update the time, and begin what hulls and fences have planned for it."""
-        self._now = event.now
-        for each in () if self._stopping else self._schedule.take(event.time):
-            if isinstance(each, Fence):
-                request = self._fences.due(each, event)
-                if request is not None:
-                    self._asked_of_fence(request, effects)
-            else:
-                self._asked(Expire(event.to, each, event.time, rows=each.counts.points), effects)
+        self._now, self._own = event.now, event.to
+        self._pass_time(event.time, effects)
+        for hull in () if self._stopping else self._schedule.take(event.time):
+            self._asked(Expire(event.to, hull, event.time, rows=hull.counts.points), effects)
+
+    def _pass_time(self, time: int, effects: list[Effect]) -> None:
+        """Have fences make what time has made up to now, before what comes now."""
+        if self._stopping or self._own is None:
+            return
+        for fence in self._schedule.take_fences(time):
+            request = self._fences.due(fence, time, self._own)
+            if request is not None:
+                self._asked_of_fence(request, effects)
 
     def _stop(self, _: Stopping, effects: list[Effect]) -> None:
         self._stopping = True

@@ -165,7 +165,6 @@ class Torture:
 
     def keep(self, commit: Commit) -> None:
         self.storage.commit(commit.changes)
-        self.world.trip()
         for request in commit.ticket.requests:
             if request.error is None:
                 self.world.committed(request)

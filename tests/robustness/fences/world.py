@@ -75,7 +75,6 @@ class FenceModel:
     beyond: set[Subject] = field(default_factory=set)
     delays: dict[Subject, Delayed] = field(default_factory=dict)
     stays: dict[Subject, int] = field(default_factory=dict)  # since when who has not made a dwell event
-    told: set[Subject] = field(default_factory=set)  # in the present trip
     time: int = NO_TIME
     near: bool = False
     events: list[FenceEvent] = field(default_factory=list)
@@ -85,7 +84,7 @@ class FenceModel:
     def take_along(self, source: Subject, to: Subject) -> bool:
         """A subject has another name. Returns whether it is inside, as the events say."""
         inside = source in self.inside
-        for known in (self.inside, self.beyond, self.told):
+        for known in (self.inside, self.beyond):
             if source in known:
                 known.remove(source)
                 known.add(to)
@@ -122,11 +121,6 @@ class World:
         return shape_of_hull(p for other, p in others.items() if not (area.without_self and other == key))
 
     # Changes, each with the events that follow from it
-
-    def trip(self) -> None:
-        """Requests follow that are committed together."""
-        for fence in self.fences.values():
-            fence.told.clear()
 
     def committed(self, request: Any) -> None:
         self.time = request.parts[0].arrived if isinstance(request, WriteTogether) else _time_of(request)
@@ -371,16 +365,25 @@ class World:
         self._tell(fence, kind, subject, None, place, delay.cause | more, first=delay.since)
 
     def _pass_time(self, name: str) -> None:
-        fence = self.fences[name]
-        if fence.config.min_dwell:
-            for subject in sorted(fence.delays, key=_in_order):
-                if self.time - fence.delays[subject].since >= fence.config.min_dwell:
+        """Each event comes when it is due."""
+        fence, now = self.fences[name], self.time
+        config = fence.config
+        while True:
+            times = [each.since + config.min_dwell for each in fence.delays.values() if config.min_dwell]
+            waits = [each.reports >= config.confirmations for each in fence.delays.values() if config.min_dwell]
+            times = [time for time, ripe in zip(times, waits, strict=True) if ripe]
+            times += [since + config.dwell for since in fence.stays.values() if config.dwell]
+            if not times or min(times) > now:
+                break
+            self.time = min(times)
+            for subject in sorted(fence.delays, key=_in_order) if config.min_dwell else ():
+                if self.time - fence.delays[subject].since >= config.min_dwell:
                     self._end(fence, subject, int(Cause.TIME))
-        if fence.config.dwell:
             for subject, since in sorted(fence.stays.items(), key=lambda each: _in_order(each[0])):
-                if self.time - since >= fence.config.dwell and subject not in fence.told:
+                if config.dwell and self.time - since >= config.dwell:
                     place = self.positions[subject[0]][subject[1]]
                     self._tell(fence, EventType.DWELL, subject, None, place, int(Cause.TIME), first=since)
+        self.time = now
 
     def _tell(
         self,
@@ -418,7 +421,6 @@ class World:
         )
 
     def _follow(self, fence: FenceModel, kind: EventType, subject: Subject) -> None:
-        fence.told.add(subject)
         if kind is EventType.ENTER:
             fence.inside.add(subject)
             fence.stays[subject] = fence.time

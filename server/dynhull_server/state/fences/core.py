@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
-from ..events import Effect, Examine, Tick, WakeFences
+from ..events import Effect, Examine, WakeFences
 from ..leg import Leg
 from ..queues import Queue, Queues, names_of
 from ..registry import Registry
@@ -163,12 +164,12 @@ class FenceCore:
 
     # Time
 
-    def due(self, fence: Fence, tick: Tick) -> PassTime | None:
+    def due(self, fence: Fence, time: int, to: Any) -> PassTime | None:
         """The request for the events of those who have been inside of a fence for long enough; None if nobody has."""
         due = fence.next_due
-        if due is None or due > tick.time:
+        if due is None or due > time:
             self._schedule.plan_fence(fence)
             return None
         # It is looked at again even if the request is refused, because the storage cannot be read.
-        self._schedule.look_again(fence, tick.time)
-        return PassTime(tick.to, fence.name, tick.time, fence, rows=min(fence.waiting, MOST_DUE))
+        self._schedule.look_again(fence, time)
+        return PassTime(to, fence.name, time, fence, rows=min(fence.waiting, MOST_DUE))

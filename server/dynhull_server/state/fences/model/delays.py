@@ -42,6 +42,10 @@ class Delays:
         """Since when the one waits that has waited longest, of those that wait for time only."""
         return self._ripening[0][0] if self._ripening else None
 
+    def first_after(self, time: int) -> int | None:
+        """As `first`, of those who wait since after a time."""
+        return next((since for since, _, _ in self._ripening.irange((time + 1,))), None)
+
     @property
     def newest(self) -> int:
         """Since when the one waits that has waited shortest; 0 if none does. O(n)."""

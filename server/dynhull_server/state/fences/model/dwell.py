@@ -45,6 +45,10 @@ class Dwelling:
         """Since when the one counts that has waited longest; None if nobody waits."""
         return next((time for time, _ in self._waiting.values()), None)
 
+    def first_after(self, time: int) -> int | None:
+        """Since when the one counts that has waited longest, of those since after a time. O(others)."""
+        return next((since for since, _ in self._waiting.values() if since > time), None)
+
     def __len__(self) -> int:
         """The number of subjects that wait."""
         return len(self._waiting)

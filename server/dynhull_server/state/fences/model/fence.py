@@ -130,6 +130,18 @@ class Fence:
             times.append(due)
         return min(times, default=None)
 
+    def due_after(self, time: int) -> int | None:
+        """When a time that subjects wait for will have passed next, of those that have not at a time; None for none.
+
+        O(those that have).
+        """
+        times = []
+        if self.dwelling is not None and (since := self.dwelling.first_after(time - self.row.config.dwell)) is not None:
+            times.append(since + self.row.config.dwell)
+        if self.delays is not None and (since := self.delays.first_after(time - self.row.config.min_dwell)) is not None:
+            times.append(since + self.row.config.min_dwell)
+        return min(times, default=None)
+
     @property
     def waiting(self) -> int:
         """The number of subjects that wait for a time."""
