@@ -15,7 +15,7 @@ TRIANGLE = "POLYGON ((0 0, 4 0, 4 3, 0 0))"
 
 def test_the_help_lists_the_commands() -> None:
     shown = dynhull("fences").stdout
-    for command in ("create", "list", "show", "inside", "watch", "ack", "replace", "delete"):
+    for command in ("create", "list", "show", "inside", "watch", "ack", "between", "replace", "delete"):
         assert f"│ {command} " in shown
         assert dynhull("fences", command, "--help").exit_code == 0
 
