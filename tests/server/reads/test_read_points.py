@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -125,7 +126,7 @@ def test_what_cannot_be_read_says_so(client: HullClient, address: str, name: str
 class Tearing(Proxy):
     """Ends all connections after so many bytes, once."""
 
-    left = 0
+    left = 400_000
 
     def passed(self, data: bytes) -> bytes:
         if 0 < self.left <= len(data):
@@ -140,15 +141,10 @@ def test_a_connection_that_breaks_leaves_the_file_of_yesterday(
     client.apply(hull, insert=np.random.default_rng(4).normal(size=(60_000, 2)))  # a megabyte, and 128 KiB a part
     file = tmp_path / "points.csv"
     file.write_text("of yesterday")
-    way = Tearing(address)
-    try:
-        way.left = 400_000
+    with closing(Tearing(address)) as way:
         torn = dynhull("export", hull, file, "--address", way.address)
         assert torn.exit_code == 3, torn.stdout
-        way.left = 400_000
-        with HullClient(way.address) as other, pytest.raises(UnavailableError):
-            list(other.read_points(hull))
-    finally:
-        way.close()
+    with closing(Tearing(address)) as way, HullClient(way.address) as other, pytest.raises(UnavailableError):
+        list(other.read_points(hull))
     assert list(tmp_path.iterdir()) == [file]
     assert file.read_text() == "of yesterday"
