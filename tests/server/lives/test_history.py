@@ -56,7 +56,7 @@ def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_pa
 
         write_until_filed(client, "fleet", client.history("fleet").batches + 1)
         newest = max(tmp_path.rglob("*.batches.parquet"))  # nobody has read it
-        first, last, _ = newest.name.split("-")
+        first, last, *_ = newest.name.split("-")
         content = newest.read_bytes()
         newest.unlink()
         with pytest.raises(DynhullError, match=f"revisions {int(first)} to {int(last)} cannot be read"):
