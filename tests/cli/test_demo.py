@@ -7,6 +7,7 @@ import sys
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 from urllib.parse import quote_plus
@@ -22,12 +23,13 @@ from patience import PATIENCE, wait_until
 from typer.testing import Result
 
 from dynhull_cli.demo import show
+from dynhull_cli.demo.again import play_again
 from dynhull_cli.demo.live import Stop, create, play
 from dynhull_cli.demo.replay import replay
 from dynhull_cli.demo.scene import Frame
 from dynhull_cli.demo.server import server_process
 from dynhull_cli.demo.table import Table
-from dynhull_client import HullClient
+from dynhull_client import HullClient, RevisionForgottenError
 
 
 def demo(*arguments: object) -> Result:
@@ -44,8 +46,8 @@ def test_hours_of_flights(tmp_path):
     done = demo("--day", "2013-03-08", "--hours", 2, "--out", picture)
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[-1] == "VERIFIED 120/120"
-    assert re.fullmatch(r"EVENTS ([1-9]\d*)/\1", lines[-2])
+    assert lines[-2:] == ["REPLAYED 120/120", "VERIFIED 120/120"]
+    assert re.fullmatch(r"EVENTS ([1-9]\d*)/\1", lines[-4])
     assert any(line.strip().startswith("near/LAX enter ") for line in lines)
     hours = [line for line in lines if " km²  " in line]
     assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(2)]
@@ -102,8 +104,8 @@ for line in range(1, 200):
 
 def test_the_processes_end_with_a_demo_that_is_killed() -> None:
     program = (
-        "import sys; from dynhull_cli.demo.server import SERVE, running\n"
-        "with running('server', *SERVE, apart=True) as server: print(server.addresses[0], flush=True); sys.stdin.read()"
+        "import sys; from dynhull_cli.demo.server import IN_MEMORY, SERVE, running\n"
+        "with running('server', *SERVE, IN_MEMORY, apart=True) as server: print(server.addresses[0], flush=True); sys.stdin.read()"
     )
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
@@ -148,7 +150,7 @@ def test_the_positions_of_the_last_half_hour(tmp_path):
     done = demo("--day", "2013-03-08", "--hours", 1, "--window", "30m", "--out", tmp_path / "window.png")
     assert done.exit_code == 0, done.stderr
     assert "positions of the last 30m" in done.stdout
-    assert done.stdout.splitlines()[-1] == "VERIFIED 60/60"
+    assert done.stdout.splitlines()[-2:] == ["REPLAYED 60/60", "VERIFIED 60/60"]
 
 
 def test_points_of_ones_own(tmp_path):
@@ -161,7 +163,7 @@ def test_points_of_ones_own(tmp_path):
     assert done.exit_code == 0, done.stderr
     assert "1 bad row left out:" in done.stdout
     assert "line 302: east is 'oops', not a number" in done.stdout
-    assert done.stdout.splitlines()[-1] == "VERIFIED 20/20"
+    assert done.stdout.splitlines()[-2:] == ["REPLAYED 20/20", "VERIFIED 20/20"]
     assert is_picture(picture)
 
 
@@ -258,11 +260,46 @@ def test_the_first_difference_is_told():
     assert differences == [None, "the server holds 3 points, 2 were sent"]
 
 
+class Doubled(Scene):
+    """The same, and all frames are sent."""
+
+    def frames(self) -> Iterator[Frame]:
+        for size in (3, 4, 5):
+            points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 2.0]])[:size]
+            yield Frame(str(size), points[max(size - 1, 0) if size > 3 else 0 :], points, list("abcde"[:size]), True)
+
+
+def test_a_past_that_differs_is_told():
+    with server_process() as address, HullClient(address) as client:
+        steps = list(replay(client, Doubled(), history=True))
+        assert list(play_again(client, Doubled(), steps)) == [None] * 3
+        other = replace(steps[1], vertices=steps[0].vertices)
+        missing = replace(steps[2], revision=9)
+        found = list(play_again(client, Doubled(), [steps[0], other, steps[2]]))
+        assert found[0] is found[2] is None
+        assert str(found[1]).startswith(
+            "the past has [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], and [[0.0, 0.0], "
+        )
+        with pytest.raises(RevisionForgottenError):
+            list(play_again(client, Doubled(), [steps[0], missing]))
+
+
+def test_without_pyarrow_nothing_is_played_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = tmp_path / "table.csv"
+    table.write_text("x,y\n1,2\n")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    done = demo("--points", table, "--out", tmp_path / "picture.png")
+    assert done.exit_code == 0, done.stderr
+    *_, past, verified = done.stdout.splitlines()
+    assert past.endswith("which needs pyarrow. Install it with: pip install 'dynhull[history]'")
+    assert verified == "VERIFIED 1/1"
+
+
 @pytest.mark.one_process("faults are put into the process that is started")
 def test_a_wrong_server_is_found_out(tmp_path, monkeypatch):
     @contextmanager
     def wrong_server() -> Iterator[str]:
-        with servers.server_process("--scrub-cpu", "0", wrap=FORGETFUL) as server:
+        with servers.server_process("--scrub-cpu", "0", "--data", str(tmp_path / "data"), wrap=FORGETFUL) as server:
             yield server.address
 
     monkeypatch.setattr(show, "server_process", wrong_server)

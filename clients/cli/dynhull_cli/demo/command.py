@@ -80,7 +80,8 @@ def demo(
     number, where it is, and removes those that have landed. The server names the corners of the hull. A watcher
     follows. After every batch the command compares the live hull with Chan's static recomputation, its keys and their
     positions with those sent, and the watcher's copy with the live hull. Fences around three airports and between the
-    hulls of two airlines report who enters and leaves; every event is compared with a recomputation. It ends with
+    hulls of two airlines report who enters and leaves; every event is compared with a recomputation. Then all is
+    played again, from the past that the server has kept, and compared with what was live. It ends with
     VERIFIED and exit code 0, or with the first difference and exit code 1.
 
     To look at: dynhull demo --live. It prints the address of a dashboard, and of a gateway for HTTP.

@@ -13,7 +13,7 @@ from rich.console import Console
 from dynhull_client import Circle, HullClient
 
 from .scene import Frame, Scene
-from .server import SERVE, Process, running
+from .server import IN_MEMORY, SERVE, Process, running
 
 MINUTE = 60.0  # seconds from a frame to the next
 
@@ -48,7 +48,10 @@ def live(console: Console, scene: Scene, speed: float, begins: Begins) -> None:
     Raises:
         RuntimeError: one of the processes did not start, or has ended.
     """
-    with stopped_by_signals() as stop, running("server", *SERVE, "--metrics-port", "0", lines=2, apart=True) as server:
+    with (
+        stopped_by_signals() as stop,
+        running("server", *SERVE, IN_MEMORY, "--metrics-port", "0", lines=2, apart=True) as server,
+    ):
         address, metrics = server.addresses
         where = "--port", "0", "--address", address
         with (

@@ -26,6 +26,7 @@ class ReplayStep:
         events: the events of the fences.
         alarms: the counts of events so far: equal to the recomputed ones, and recomputed.
         difference: the first thing that differed, None where everything agreed.
+        revision: the revision of the live hull.
     """
 
     frame: Frame
@@ -35,6 +36,7 @@ class ReplayStep:
     events: list[FenceEvent]
     alarms: tuple[int, int]
     difference: str | None
+    revision: int
 
     def corners(self) -> list[str]:
         """The names of the vertices."""
@@ -70,8 +72,8 @@ class Watcher:
         self._follower.stop()
 
 
-def replay(client: HullClient, scene: Scene) -> Iterator[ReplayStep]:
-    """Send every frame as one batch, and check the hull after each.
+def replay(client: HullClient, scene: Scene, *, history: bool = False) -> Iterator[ReplayStep]:
+    """Send every frame as one batch, and check the hull after each. With `history`, its past is kept for ever.
 
     The live hull must equal Chan's recomputation from the points in the server. These must be the points sent: the same
     keys at the same positions or, without keys, as many points with the same hull. The watcher's copy must equal the
@@ -87,6 +89,7 @@ def replay(client: HullClient, scene: Scene) -> Iterator[ReplayStep]:
         clock=clock,
         geographic=scene.center is not None,
         center=scene.center,
+        history=history or None,
     )
     alarms = Alarms(client, scene) if scene.circles or scene.rivals else None
     watcher = Watcher(client, name, keys=scene.keyed)
@@ -104,7 +107,7 @@ def replay(client: HullClient, scene: Scene) -> Iterator[ReplayStep]:
                 difference = difference or wrong or (alarms.surplus() if number == scene.length else None)
                 counts = alarms.agreed, alarms.expected
             area = live.measures.area * scene.area_scale
-            yield ReplayStep(frame, live.vertices, area, live.vertex_keys, events, counts, difference)
+            yield ReplayStep(frame, live.vertices, area, live.vertex_keys, events, counts, difference, live.revision)
     finally:
         watcher.stop()
         if alarms:

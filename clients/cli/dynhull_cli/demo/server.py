@@ -4,11 +4,15 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from tempfile import TemporaryDirectory
 
 from . import child
 
 STOP_SECONDS = 10
-SERVE = "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"
+SERVE = "dynhull_server", "--port", "0", "--log-level", "warning"
+IN_MEMORY = "--in-memory"
+# What is kept goes with the demo, so it need not survive a power failure.
+KEPT = "--durability", "none", "--data"
 
 
 class Process:
@@ -61,6 +65,6 @@ def running(name: str, *arguments: str, lines: int = 1, apart: bool = False) -> 
 
 @contextmanager
 def server_process() -> Iterator[str]:
-    """Start `dynhull serve` on a free port, yield its address, and stop it at the end."""
-    with running("server", *SERVE) as server:
+    """Start `dynhull serve` on a free port, with a folder of its own; yield its address; stop it at the end."""
+    with TemporaryDirectory(prefix="dynhull-demo-") as folder, running("server", *SERVE, *KEPT, folder) as server:
         yield server.addresses[0]

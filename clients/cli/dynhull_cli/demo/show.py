@@ -8,6 +8,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from dynhull_client import FenceEvent, HullClient
 
+from .again import play_again
 from .replay import ReplayStep, replay
 from .scene import Scene
 from .server import server_process
@@ -17,12 +18,14 @@ MOST_CORNERS = 12  # named in a line
 
 def show(console: Console, scene: Scene, out: Path) -> bool:
     """Replay a scene, print its milestones and draw the picture; returns whether every step agreed."""
+    past = find_spec("pyarrow") is not None
     if find_spec("matplotlib") is None:  # say so before the replay, not when the picture is to be drawn
         raise ModuleNotFoundError(name="matplotlib")
     console.print(f"[bold]{scene.title}[/bold]")
     for note in scene.notes:
         console.print(note, markup=False)
-    agreed = 0
+    steps: list[ReplayStep] = []
+    again = 0
     alarms = 0, 0
     events: list[FenceEvent] = []
     largest: ReplayStep | None = None
@@ -33,13 +36,13 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
         HullClient(address) as client,
         Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
     ):
-        for step in progress.track(replay(client, scene), total=scene.length):
+        for step in progress.track(replay(client, scene, history=past), total=scene.length):
             alarms = step.alarms
             events += step.events
             if step.difference:
                 difference = f"{step.frame.clock}: {step.difference}"
                 break
-            agreed += 1
+            steps.append(step)
             if largest is None or step.area > largest.area:
                 largest = step
             if step.frame.milestone:
@@ -47,6 +50,13 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
                 for line in _event_lines(events):
                     console.print(line, markup=False)
                 events.clear()
+        if past and difference is None:
+            played = play_again(client, scene, steps)
+            for step, different in zip(steps, progress.track(played, total=len(steps)), strict=True):
+                if different:
+                    difference = f"{step.frame.clock}, played again: {different}"
+                    break
+                again += 1
     if largest and len(largest.vertices):
         from .picture import draw  # matplotlib takes a while to load, and only the end needs it
 
@@ -55,7 +65,7 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
     sent = "keys and positions" if scene.keyed else "points"
     console.print(
         "Compared after each batch: the live hull with Chan's recomputation, its "
-        f"{sent} with those sent, the watcher's copy with the live hull: {agreed} {scene.step}"
+        f"{sent} with those sent, the watcher's copy with the live hull: {len(steps)} {scene.step}"
     )
     if scene.circles or scene.rivals:
         console.print(
@@ -63,10 +73,17 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
         )
         colour = "green" if alarms[0] == alarms[1] else "red"
         console.print(f"[{colour}]EVENTS {alarms[0]}/{alarms[1]}[/{colour}]")
+    if not past:
+        advice = "Install it with: pip install 'dynhull[history]'"
+        console.print(f"Not played again from the past, which needs pyarrow. {advice}", markup=False)
+    elif len(steps) == scene.length:
+        console.print(f"The past that the server has kept, played again and compared: {again} {scene.step}")
+        colour = "green" if again == scene.length else "red"
+        console.print(f"[{colour}]REPLAYED {again}/{scene.length}[/{colour}]")
     if difference:
         console.print(f"[red]DIFFERENT[/red] at {difference}")
         return False
-    console.print(f"[green]VERIFIED {agreed}/{scene.length}[/green]")
+    console.print(f"[green]VERIFIED {len(steps)}/{scene.length}[/green]")
     return True
 
 
