@@ -105,7 +105,8 @@ for line in range(1, 200):
 def test_the_processes_end_with_a_demo_that_is_killed() -> None:
     program = (
         "import sys; from dynhull_cli.demo.server import IN_MEMORY, SERVE, running\n"
-        "with running('server', *SERVE, IN_MEMORY, apart=True) as server: print(server.addresses[0], flush=True); sys.stdin.read()"
+        "with running('server', *SERVE, IN_MEMORY, apart=True) as server:\n"
+        "    print(server.addresses[0], flush=True); sys.stdin.read()"
     )
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:

@@ -62,29 +62,35 @@ def show(console: Console, scene: Scene, out: Path) -> bool:
 
         draw(out, scene, largest)
         console.print(f"Largest at {largest.frame.clock}: {largest.area:,.0f} {scene.area_unit}. Picture: {out}")
-    sent = "keys and positions" if scene.keyed else "points"
-    console.print(
-        "Compared after each batch: the live hull with Chan's recomputation, its "
-        f"{sent} with those sent, the watcher's copy with the live hull: {len(steps)} {scene.step}"
-    )
-    if scene.circles or scene.rivals:
-        console.print(
-            "Compared with a recomputation from all positions: every enter and exit, in order, with its cause"
-        )
-        colour = "green" if alarms[0] == alarms[1] else "red"
-        console.print(f"[{colour}]EVENTS {alarms[0]}/{alarms[1]}[/{colour}]")
-    if not past:
-        advice = "Install it with: pip install 'dynhull[history]'"
-        console.print(f"Not played again from the past, which needs pyarrow. {advice}", markup=False)
-    elif len(steps) == scene.length:
-        console.print(f"The past that the server has kept, played again and compared: {again} {scene.step}")
-        colour = "green" if again == scene.length else "red"
-        console.print(f"[{colour}]REPLAYED {again}/{scene.length}[/{colour}]")
+    _print_compared(console, scene, len(steps), alarms, again if past else None)
     if difference:
         console.print(f"[red]DIFFERENT[/red] at {difference}")
         return False
     console.print(f"[green]VERIFIED {len(steps)}/{scene.length}[/green]")
     return True
+
+
+def _print_compared(console: Console, scene: Scene, steps: int, alarms: tuple[int, int], again: int | None) -> None:
+    """Say what was compared; `again` is the number of steps that agree with the past, None if it was not kept."""
+    sent = "keys and positions" if scene.keyed else "points"
+    console.print(
+        "Compared after each batch: the live hull with Chan's recomputation, its "
+        f"{sent} with those sent, the watcher's copy with the live hull: {steps} {scene.step}"
+    )
+    if scene.circles or scene.rivals:
+        agreed, expected = alarms
+        console.print(
+            "Compared with a recomputation from all positions: every enter and exit, in order, with its cause"
+        )
+        colour = "green" if agreed == expected else "red"
+        console.print(f"[{colour}]EVENTS {agreed}/{expected}[/{colour}]")
+    if again is None:
+        advice = "Install it with: pip install 'dynhull[history]'"
+        console.print(f"Not played again from the past, which needs pyarrow. {advice}", markup=False)
+    elif steps == scene.length:
+        console.print(f"The past that the server has kept, played again and compared: {again} {scene.step}")
+        colour = "green" if again == scene.length else "red"
+        console.print(f"[{colour}]REPLAYED {again}/{scene.length}[/{colour}]")
 
 
 def _event_lines(events: list[FenceEvent]) -> list[str]:
