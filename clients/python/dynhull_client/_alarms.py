@@ -12,6 +12,7 @@ from ._alarm_messages import Alarm, AlarmStatus, decode_alarm, decode_status, de
 from ._arguments import text, whole
 from ._calls import Call, Pages
 from ._fence_messages import FenceConsumer, decode_consumer
+from ._numbered_place import encode_start
 from ._times import as_microseconds, encode_duration
 
 if TYPE_CHECKING:
@@ -192,14 +193,7 @@ def watch_alarm(
     if consumer is not None and after is not None:
         raise ValueError("give either consumer, which knows its place, or after, not both")
     request = pb.WatchAlarmRequest(name=text("name", name), uid=text("uid", uid))
-    if consumer is not None:
-        request.consumer = text("consumer", consumer)
-    elif after is not None:
-        request.after_sequence = whole("after", after)
-    else:
-        request.only_new = True
-    if progress_interval is not None:
-        request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
+    encode_start(request, consumer, after, progress_interval)
     return WatchingAlarm(request, reconnect, timeout)
 
 

@@ -902,11 +902,16 @@ def watch(
     if directions is not None:
         request.directions.CopyFrom(encoded(directions, "directions"))
     kept = copy if copy is not None else resume
-    if progress_interval is None and kept is not None and kept.max_staleness is not None:
-        progress_interval = kept.max_staleness / MARKS
-    if progress_interval is not None:
-        request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
+    encode_progress(request, progress_interval, kept)
     return Watching(request, copy, follow, reconnect, timeout)
+
+
+def encode_progress(request: pb.WatchRequest | pb.ReplayRequest, interval: float | None, copy: HullCopy | None) -> None:
+    """How often nothing new is said; by default as often as a copy with a `max_staleness` needs it."""
+    if interval is None and copy is not None and copy.max_staleness is not None:
+        interval = copy.max_staleness / MARKS
+    if interval is not None:
+        request.progress_interval.CopyFrom(encode_duration(interval, "progress_interval"))
 
 
 def resumable(request: pb.WatchRequest) -> bool:

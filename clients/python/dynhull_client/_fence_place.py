@@ -1,35 +1,26 @@
 """The state of a watch of a fence between events and connections. No I/O."""
 
-from collections.abc import Sequence
-
 from dynhull_proto.v1 import fence_service_pb2 as pb
 
-from ._errors import DynhullError, FenceNotFoundError
+from ._errors import FenceNotFoundError
 from ._fence_messages import FenceEvent, decode_fence_event
 from ._fences import WatchingFence
-from ._place import Place
+from ._numbered_place import NumberedPlace
 
 
-class FencePlace(Place[FenceEvent]):
+class FencePlace(NumberedPlace[FenceEvent]):
     """What a watch of a fence has received, and what it requests next."""
 
     method = "WatchFence"
+    gone = FenceNotFoundError
     request: pb.WatchFenceRequest
 
     def __init__(self, watching: WatchingFence, retries: int) -> None:
-        super().__init__(watching.timeout, watching.reconnect, retries)
-        self.request = pb.WatchFenceRequest()
-        self.request.CopyFrom(watching.request)
-        self._reports_progress = watching.request.HasField("progress_interval")
+        super().__init__(watching, retries)
         self._conflated = 0  # events that were left out since the last one
-        self._closed = False
 
-    def take(self, message: pb.WatchFenceResponse) -> Sequence[FenceEvent]:
-        """The events of a message. The next connection continues after them, with or without a consumer."""
-        self._connected()
-        name = self.request.name
-        self.request.uid = message.uid or self.request.uid
-        uid = self.request.uid
+    def _events(self, message: pb.WatchFenceResponse) -> list[FenceEvent]:
+        name, uid = self.request.name, self.request.uid
         events = []
         if message.HasField("lost"):
             first, last = message.lost.first_sequence, message.lost.last_sequence
@@ -42,17 +33,7 @@ class FencePlace(Place[FenceEvent]):
             events.append(decode_fence_event(event, name, uid, conflated, after))
         if message.events:
             self._conflated = 0
-        self.request.after_sequence = message.sequence
-        self._closed = any(event.type == "closed" for event in events)
-        if not events and self._reports_progress:
-            events.append(FenceEvent("progress", message.sequence, name, uid, after=message.sequence))
         return events
 
-    def end(self, error: DynhullError) -> Sequence[FenceEvent]:
-        """Prepare the next connection after one has ended; raises the error if there is none."""
-        if self._closed and isinstance(error, FenceNotFoundError):
-            self.ended = True
-        else:
-            self.lost = error
-            self._continue_later(error)
-        return ()
+    def _progress(self, sequence: int) -> FenceEvent:
+        return FenceEvent("progress", sequence, self.request.name, self.request.uid, after=sequence)

@@ -24,8 +24,8 @@ from ._fence_messages import (
     decode_fence,
     decode_inside,
 )
+from ._numbered_place import encode_start
 from ._settings import SPAN, documenting_settings, encode_settings
-from ._times import encode_duration
 
 if TYPE_CHECKING:
     from datetime import timedelta
@@ -236,14 +236,7 @@ def watch_fence(
         conflate=flag("conflate", conflate),
         max_responses_per_second=as_coordinate(max_rate, "max_rate"),
     )
-    if consumer is not None:
-        request.consumer = text("consumer", consumer)
-    elif after is not None:
-        request.after_sequence = whole("after", after)
-    else:
-        request.only_new = True
-    if progress_interval is not None:
-        request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
+    encode_start(request, consumer, after, progress_interval)
     return WatchingFence(request, reconnect, timeout)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ._arguments import positive
-from ._calls import MARKS, Watching, encode_layer, encoded
+from ._calls import Watching, encode_layer, encode_progress, encoded
 from ._hull_place import HullPlace
 from ._past import encode_moment
 from ._times import encode_duration
@@ -98,10 +98,7 @@ def replay(
         request.every.CopyFrom(encode_duration(every, "every"))
     if directions is not None:
         request.directions.CopyFrom(encoded(directions, "directions"))
-    if progress_interval is None and copy is not None and copy.max_staleness is not None:
-        progress_interval = copy.max_staleness / MARKS
-    if progress_interval is not None:
-        request.progress_interval.CopyFrom(encode_duration(progress_interval, "progress_interval"))
+    encode_progress(request, progress_interval, copy)
     return Watching(request, copy, False, reconnect, timeout)
 
 

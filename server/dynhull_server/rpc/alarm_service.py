@@ -1,22 +1,21 @@
 """AlarmService, one method per RPC of dynhull.v1. The .proto files document the methods."""
 
-from contextlib import aclosing
+from functools import partial
 
 from dynhull_proto.v1 import alarm_service_pb2 as pb
 
 from ..engine.alarms import Alarms, calling_them_alarms
 from ..engine.fences import LiveFence
 from ..engine.watch_fence import watch_fence
-from ..state.errors import AlarmReplacedError, SequenceAheadError
 from . import decode
 from .calls import Call
 from .decode_alarm import decode_alarm, decode_alarm_name
 from .decode_batch import decode_timestamp
 from .decode_fence import decode_consumer, decode_start
 from .encode_alarm import encode_alarm, encode_sent_alarm, encode_status, rule_of
-from .encode_fence import encode_consumer
-from .fence_service import oldest_events, oldest_of
+from .fence_service import acknowledged, first_after, oldest_events, sent_as
 from .metrics import Metrics
+from .outgoing import Counted, send_each
 
 
 class AlarmService:
@@ -65,40 +64,16 @@ class AlarmService:
         alarm = self._read(call, request.name)
         start = decode_start(request)
         progress = decode.decode_interval(request)
-        if request.uid and request.uid != alarm.uid:
-            raise AlarmReplacedError(request.name, alarm.uid)
-        after = alarm.fence.last if start.after is None else start.after
-        if start.consumer is not None:
-            with call.cutoff(), calling_them_alarms():
-                consumer = await alarm.acknowledge(start.consumer, None)
-            after = consumer.acknowledged
-        if after > alarm.fence.last:
-            raise SequenceAheadError("after_sequence", after, alarm.fence.last)
+        with calling_them_alarms():
+            after = await first_after(alarm, request.uid, start, call)
         responses = watch_fence(alarm, after, progress_interval=progress)
-        uid, rule = alarm.uid, rule_of(alarm)
-        with self._metrics.watcher() as watcher:
-            async with aclosing(responses):
-                while True:
-                    with call.cutoff():
-                        sent = await anext(responses, None)
-                    if sent is None:
-                        return
-                    call.require_entitled()
-                    message = encode_sent_alarm(sent, uid, rule)
-                    sent.events = []  # as in a watch of a fence
-                    with self._metrics.sending(watcher, "alarm"):
-                        await call.write_within(self._max_watch_lag, message)
-                    uid = ""
+        encoded = sent_as(partial(encode_sent_alarm, rule=rule_of(alarm)), alarm.uid)
+        await send_each(call, responses, encoded, self._max_watch_lag, Counted(self._metrics, "alarm"))
 
     async def AckAlarm(self, request: pb.AckAlarmRequest, call: Call) -> pb.AckAlarmResponse:
         alarm = self._read(call, request.name)
-        name = decode_consumer(request.consumer)
-        if request.sequence > decode.LARGEST_INTEGER:
-            raise SequenceAheadError("sequence", request.sequence, alarm.fence.last)
         with calling_them_alarms():
-            consumer = await alarm.acknowledge(name, request.sequence, request.uid)
-        oldest = await oldest_of(alarm, consumer)
-        return pb.AckAlarmResponse(consumer=encode_consumer(alarm.fence, consumer, oldest))
+            return pb.AckAlarmResponse(consumer=await acknowledged(alarm, request))
 
     async def DeleteAlarmConsumer(
         self, request: pb.DeleteAlarmConsumerRequest, call: Call

@@ -1,7 +1,6 @@
 """Sending the batches of hulls to a caller."""
 
 from collections.abc import AsyncGenerator, Callable
-from contextlib import aclosing
 from typing import TypeVar
 
 from dynhull_proto.v1 import feed_pb2
@@ -18,6 +17,7 @@ from .decode_feed import decode_feed_standings, decode_feed_start
 from .encode_feed import encode_feed, encode_many_feed
 from .many import HullStates
 from .metrics import Metrics
+from .outgoing import Counted, send_each
 from .places import Places
 
 T = TypeVar("T")
@@ -69,11 +69,7 @@ class BatchFeeds:
     async def _send(
         self, call: Call, parts: AsyncGenerator[T, None], encoded: Callable[[T], feed_pb2.FeedResponse]
     ) -> None:
-        with self._metrics.watcher() as watcher:
-            async with aclosing(parts):
-                while True:
-                    with call.cutoff():
-                        message = encoded(await anext(parts))
-                        call.require_entitled()
-                    with self._metrics.sending(watcher, "feed"):
-                        await call.write_within(self._max_lag, message)
+        async def message(part: T) -> feed_pb2.FeedResponse:
+            return encoded(part)
+
+        await send_each(call, parts, message, self._max_lag, Counted(self._metrics, "feed"))

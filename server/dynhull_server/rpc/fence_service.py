@@ -1,22 +1,30 @@
 """FenceService, one method per RPC of dynhull.v1. The .proto files document the methods."""
 
-from contextlib import aclosing
+from collections.abc import Awaitable, Callable
+from itertools import chain, repeat
+from typing import TypeVar
 
+from google.protobuf.message import Message
+
+from dynhull_proto.v1 import alarm_service_pb2, fence_pb2
 from dynhull_proto.v1 import fence_service_pb2 as pb
 
 from ..engine.fences import Fences, LiveFence
 from ..engine.past_fences import PastFences
-from ..engine.watch_fence import watch_fence
+from ..engine.watch_fence import Sent, watch_fence
 from ..state.errors import FenceReplacedError, SequenceAheadError
 from ..state.fences.model.config import FenceConfig
-from ..state.fences.model.records import Consumer, Members
+from ..state.fences.model.records import Consumer, FenceEvent, Members
 from . import decode
 from .calls import Call
-from .decode_fence import decode_consumer, decode_fence, decode_fence_name, decode_start
+from .decode_fence import WatchStart, decode_consumer, decode_fence, decode_fence_name, decode_start
 from .decode_moment import decode_span
 from .encode_fence import encode_consumer, encode_fence, encode_fence_event, encode_members, encode_sent
 from .metrics import Metrics
+from .outgoing import Counted, send_each
 from .places import Places
+
+Response = TypeVar("Response", bound=Message)
 
 # The number of keys in a part of ReadInside.
 KEYS_A_PART = 65_536
@@ -104,41 +112,15 @@ class FenceService:
         start = decode_start(request)
         interval = decode.decode_rate(request.max_responses_per_second, "max_responses_per_second")
         progress = decode.decode_interval(request)
-        if request.uid and request.uid != fence.uid:
-            raise FenceReplacedError(fence.name, fence.uid)
-        after = fence.fence.last if start.after is None else start.after
-        if start.consumer is not None:
-            with call.cutoff():
-                consumer = await fence.acknowledge(start.consumer, None)
-            after = consumer.acknowledged
-        if after > fence.fence.last:
-            raise SequenceAheadError("after_sequence", after, fence.fence.last)
+        after = await first_after(fence, request.uid, start, call)
         responses = watch_fence(
             fence, after, conflate=request.conflate, min_interval=interval, progress_interval=progress
         )
-        uid = fence.uid
-        with self._metrics.watcher() as watcher:
-            async with aclosing(responses):
-                while True:
-                    with call.cutoff():
-                        sent = await anext(responses, None)
-                    if sent is None:
-                        return
-                    call.require_entitled()
-                    message = encode_sent(sent, uid)
-                    sent.events = []  # a client may take long to read the message, which is a tenth of their size
-                    with self._metrics.sending(watcher, "fence"):
-                        await call.write_within(self._max_watch_lag, message)
-                    uid = ""
+        encoded = sent_as(encode_sent, fence.uid)
+        await send_each(call, responses, encoded, self._max_watch_lag, Counted(self._metrics, "fence"))
 
     async def AckFence(self, request: pb.AckFenceRequest, call: Call) -> pb.AckFenceResponse:
-        fence = self._read(call, request.name)
-        name = decode_consumer(request.consumer)
-        if request.sequence > decode.LARGEST_INTEGER:
-            raise SequenceAheadError("sequence", request.sequence, fence.fence.last)
-        consumer = await fence.acknowledge(name, request.sequence, request.uid)
-        oldest = await oldest_of(fence, consumer)
-        return pb.AckFenceResponse(consumer=encode_consumer(fence.fence, consumer, oldest))
+        return pb.AckFenceResponse(consumer=await acknowledged(self._read(call, request.name), request))
 
     async def DeleteConsumer(self, request: pb.DeleteConsumerRequest, call: Call) -> pb.DeleteConsumerResponse:
         fence = self._read(call, request.name)
@@ -151,18 +133,13 @@ class FenceService:
         if config.area_hull is not None:
             call.access.require_past(config.area_hull)
         start, end = decode_span(request)
-        with self._pasts.take(call.owner), self._metrics.watcher() as watcher:
-            async with aclosing(self._past_fences.events(config, start, end)) as found:
-                while True:
-                    with call.cutoff():
-                        events = await anext(found, None)
-                    if events is None:
-                        return
-                    call.require_entitled()
-                    message = pb.FenceEventsBetweenResponse(events=map(encode_fence_event, events))
-                    del events
-                    with self._metrics.sending(watcher, "fence"):
-                        await call.write_within(self._max_watch_lag, message)
+
+        async def encoded(events: list[FenceEvent]) -> pb.FenceEventsBetweenResponse:
+            return pb.FenceEventsBetweenResponse(events=map(encode_fence_event, events))
+
+        with self._pasts.take(call.owner):
+            found = self._past_fences.events(config, start, end)
+            await send_each(call, found, encoded, self._max_watch_lag, Counted(self._metrics, "fence"))
 
     def _read(self, call: Call, name: str) -> LiveFence:
         name = decode_fence_name(name)
@@ -175,6 +152,48 @@ def _require_hulls(call: Call, config: FenceConfig) -> None:
     call.access.require_read(config.subjects)
     if config.area_hull is not None:
         call.access.require_read(config.area_hull)
+
+
+async def first_after(fence: LiveFence, uid: str, start: WatchStart, call: Call) -> int:
+    """The sequence after which a watch of a fence or an alarm begins.
+
+    Raises:
+        FenceReplacedError: it is not that with the uid, which is empty for any.
+        SequenceAheadError: it has not come so far.
+    """
+    if uid and uid != fence.uid:
+        raise FenceReplacedError(fence.name, fence.uid)
+    after = fence.fence.last if start.after is None else start.after
+    if start.consumer is not None:
+        with call.cutoff():
+            consumer = await fence.acknowledge(start.consumer, None)
+        after = consumer.acknowledged
+    if after > fence.fence.last:
+        raise SequenceAheadError("after_sequence", after, fence.fence.last)
+    return after
+
+
+def sent_as(encode: Callable[[Sent, str], Response], uid: str) -> Callable[[Sent], Awaitable[Response]]:
+    """What makes messages of events that are sent; the first names the uid of the fence or alarm."""
+    uids = chain([uid], repeat(""))
+
+    async def encoded(sent: Sent) -> Response:
+        message = encode(sent, next(uids))
+        sent.events = []  # a client may take long to read the message, which is a tenth of their size
+        return message
+
+    return encoded
+
+
+async def acknowledged(
+    fence: LiveFence, request: pb.AckFenceRequest | alarm_service_pb2.AckAlarmRequest
+) -> fence_pb2.FenceConsumer:
+    """A consumer of a fence or an alarm, whose place has been stored."""
+    name = decode_consumer(request.consumer)
+    if request.sequence > decode.LARGEST_INTEGER:
+        raise SequenceAheadError("sequence", request.sequence, fence.fence.last)
+    consumer = await fence.acknowledge(name, request.sequence, request.uid)
+    return encode_consumer(fence.fence, consumer, await oldest_of(fence, consumer))
 
 
 async def oldest_events(fence: LiveFence) -> dict[str, int]:

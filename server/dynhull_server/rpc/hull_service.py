@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import aclosing, contextmanager
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -20,9 +20,9 @@ from ..engine.hulls import Hulls
 from ..engine.live_hull import LiveHull
 from ..engine.roster import Roster
 from ..engine.steps import FEW_ROWS, Run, at_once
-from ..engine.views import ResumedView
+from ..engine.views import Event, ResumedView
 from ..engine.watch import watch
-from ..engine.watch_many import watch_many
+from ..engine.watch_many import ManyPart, watch_many
 from ..state.batch import Applied
 from ..state.errors import (
     HullEmptyError,
@@ -43,6 +43,7 @@ from .decode_settings import decode_center, decode_history, decode_quarantine, d
 from .feeds import BatchFeeds
 from .many import MANY_INTERVAL, HullStates, ManyQuotas, encode_many, require_many
 from .metrics import Metrics
+from .outgoing import Counted, send_each
 from .places import Places
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
@@ -547,16 +548,14 @@ class HullService:
             outline_only=request.outline_only,
         )
         measure = hull.measures if request.include_measures else None
-        with self._metrics.watcher() as watcher:
-            async with aclosing(events):
-                while True:
-                    with call.cutoff():
-                        event = await anext(events)
-                        call.require_entitled()
-                        message = await encode.encode_watched(event, encoding, self._aside, measure)
-                        encode.encode_changed(hull, message)
-                    with self._metrics.sending(watcher, message.WhichOneof("event")):
-                        await call.write_within(self._max_watch_lag, message)
+
+        async def encoded(event: Event) -> pb.WatchResponse:
+            message = await encode.encode_watched(event, encoding, self._aside, measure)
+            encode.encode_changed(hull, message)
+            return message
+
+        counted = Counted(self._metrics, lambda message: message.WhichOneof("event"))
+        await send_each(call, events, encoded, self._max_watch_lag, counted)
 
     async def Replay(self, request: pb.ReplayRequest, call: Call) -> None:
         hull = self._read(call, request.name)
@@ -580,17 +579,16 @@ class HullService:
         with (
             self._quotas.watches.take(call.owner),
             self._hulls.rosters.use(kind, choice, lambda: Roster(states, self._quotas.roster)) as roster,
-            self._metrics.watcher() as watcher,
         ):
-            async with aclosing(watch_many(roster, position, interval)) as parts:
-                while True:
-                    with call.cutoff():
-                        message = encode_many(await anext(parts))
-                        call.require_entitled()
-                        if len(message) > call.max_message_bytes:  # the outline of one hull
-                            raise LimitExceededError("max_message_bytes", call.max_message_bytes)
-                    with self._metrics.sending(watcher, "many"):
-                        await call.write_within(self._max_watch_lag, message)
+
+            async def encoded(part: ManyPart) -> bytes:
+                message = encode_many(part)
+                if len(message) > call.max_message_bytes:  # the outline of one hull
+                    raise LimitExceededError("max_message_bytes", call.max_message_bytes)
+                return message
+
+            parts = watch_many(roster, position, interval)
+            await send_each(call, parts, encoded, self._max_watch_lag, Counted(self._metrics, "many"))
 
     async def Feed(self, request: feed_pb2.FeedRequest, call: Call) -> None:
         choice = decode_feed_choice(request)

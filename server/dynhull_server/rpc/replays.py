@@ -1,7 +1,5 @@
 """Sending the past of a hull to a caller, event by event."""
 
-from contextlib import aclosing
-
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ..engine.hulls import Hulls
@@ -9,12 +7,14 @@ from ..engine.live_hull import LiveHull
 from ..engine.past import PastHulls
 from ..engine.replay import replay
 from ..engine.steps import Run
+from ..engine.views import Event
 from ..state.errors import HullReplacedError
 from ..storage.past import Moment
 from . import decode, encode
 from .calls import Call
 from .decode_moment import decode_end
 from .decode_replay import decode_pace, decode_view
+from .outgoing import send_each
 from .places import Places
 
 
@@ -55,16 +55,13 @@ class Replays:
                 outline_only=request.outline_only,
             )
             measure = hull.measures if request.include_measures else None
-            async with aclosing(events):
-                while True:
-                    with call.cutoff():
-                        event = await anext(events, None)
-                        if event is None:
-                            return
-                        call.require_entitled()
-                        message = await encode.encode_watched(event, encoding, self._aside, measure)
-                        encode.encode_changed(hull, message)
-                    await call.write_within(self._max_lag, pb.ReplayResponse(event=message))
+
+            async def encoded(event: Event) -> pb.ReplayResponse:
+                message = await encode.encode_watched(event, encoding, self._aside, measure)
+                encode.encode_changed(hull, message)
+                return pb.ReplayResponse(event=message)
+
+            await send_each(call, events, encoded, self._max_lag)
 
     async def _ends(self, request: pb.ReplayRequest, live: LiveHull) -> tuple[Moment, int]:
         """The first revision and the last one."""

@@ -1,7 +1,5 @@
 """Sending the ways of keys through the past of a hull."""
 
-from contextlib import aclosing
-
 import numpy as np
 
 from dynhull_proto.v1 import hull_service_pb2 as pb
@@ -19,6 +17,7 @@ from .calls import Call
 from .decode_batch import decode_keys
 from .decode_moment import decode_end
 from .decode_settings import decode_duration
+from .outgoing import send_each
 from .places import Places
 from .replays import ends
 
@@ -48,14 +47,12 @@ class Tracks:
             with call.cutoff():
                 first, last = await ends(request, live, pasts)
                 begin = await self._begin(request, live, first)
-            async with aclosing(tracks(pasts, live, keys, first.revision, last, begin, every)) as parts:
-                while True:
-                    with call.cutoff():
-                        moves = await anext(parts, None)
-                        call.require_entitled()
-                    if moves is None:
-                        return
-                    await call.write_within(self._max_lag, encode_moves(moves, encoding))
+
+            async def encoded(moves: Moves) -> pb.TrackResponse:
+                return encode_moves(moves, encoding)
+
+            parts = tracks(pasts, live, keys, first.revision, last, begin, every)
+            await send_each(call, parts, encoded, self._max_lag)
 
     async def _begin(self, request: pb.TrackRequest, live: LiveHull, first: Moment) -> int | None:
         """The time at which a track begins: that which is asked for, or that of the commit of its first revision."""
