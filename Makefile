@@ -81,6 +81,7 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) $(wildcard tests/kernel/*.cpp tests/kernel/*.hpp)
 	$(BIN)/mypy
 	$(BIN)/mypy tests/surface/typed_program.py
+	if [ -x $(TSC) ]; then $(TSC) --project clients/typescript; else echo 'types of clients/typescript not checked: `make peers`'; fi
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(STUB) dynhull._kernel -o build/_kernel.pyi
 	$(STUB) dynhull_server._native -o build/_native.pyi
@@ -105,6 +106,7 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
 
+TSC = clients/typescript/node_modules/.bin/tsc
 STUB = mkdir -p build && $(BIN)/python -m nanobind.stubgen -q -m
 
 stub: .venv/.check  ## regenerate the types of what is in C++: dynhull/_kernel.pyi, server/dynhull_server/_native.pyi

@@ -1,30 +1,16 @@
 """The contract as other languages' generators read it."""
 
+from importlib import import_module
+from pathlib import Path
+
 import pytest
 
-from dynhull_proto.v1 import (
-    alarm_pb2,
-    alarm_service_pb2,
-    batch_pb2,
-    fence_pb2,
-    fence_service_pb2,
-    hull_pb2,
-    hull_service_pb2,
-    points_pb2,
-)
+from dynhull_proto import v1
 
 FILES = [
-    each.DESCRIPTOR
-    for each in (
-        alarm_pb2,
-        alarm_service_pb2,
-        batch_pb2,
-        fence_pb2,
-        fence_service_pb2,
-        hull_pb2,
-        hull_service_pb2,
-        points_pb2,
-    )
+    import_module(f"{v1.__name__}.{each.stem}").DESCRIPTOR
+    for folder in v1.__path__
+    for each in sorted(Path(folder).glob("*_pb2.py"))
 ]
 
 

@@ -59,9 +59,7 @@ def test_its_own_tests(gateway: Gateway) -> None:
     assert "\n# skipped 0\n" in said
 
 
-def test_its_types_are_right_and_it_packs() -> None:
-    said = node("node_modules/typescript/bin/tsc", "--noEmit")
-    assert said == ""
+def test_it_packs() -> None:
     command = [program("npm"), "pack", "--dry-run", "--json", "--ignore-scripts"]
     packed = subprocess.run(command, cwd=typescript(), capture_output=True, text=True, check=True, timeout=PATIENCE)
     files = {each["path"] for each in json.loads(packed.stdout)[0]["files"]}

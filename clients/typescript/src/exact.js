@@ -93,14 +93,24 @@ export function turn(a, b, c) {
  * @returns {-1 | 0 | 1}
  */
 export function ascent(a, b, direction) {
-  const left = (b[0] - a[0]) * direction[0]
-  const right = (b[1] - a[1]) * direction[1]
+  const certain = certainSign((b[0] - a[0]) * direction[0], (b[1] - a[1]) * direction[1])
+  if (certain) return certain
+  const rise = (scaled(b[0]) - scaled(a[0])) * scaled(direction[0])
+  return signOf(rise + (scaled(b[1]) - scaled(a[1])) * scaled(direction[1]))
+}
+
+/**
+ * The sign of a sum of two products of differences, 0 if their rounding leaves it open.
+ * @param {number} left
+ * @param {number} right
+ * @returns {-1 | 0 | 1}
+ */
+function certainSign(left, right) {
   const sum = left + right
   const size = Math.abs(left) + Math.abs(right)
   // Below, digits may have been lost because a product is too small.
-  if (Math.abs(sum) > size * ERROR && size > 2 ** -900 && size < Infinity) return /** @type {-1 | 1} */ (Math.sign(sum))
-  const rise = (scaled(b[0]) - scaled(a[0])) * scaled(direction[0])
-  return signOf(rise + (scaled(b[1]) - scaled(a[1])) * scaled(direction[1]))
+  const certain = Math.abs(sum) > size * ERROR && size > 2 ** -900 && size < Infinity
+  return certain ? (sum > 0 ? 1 : -1) : 0
 }
 
 /**
@@ -142,12 +152,8 @@ function signOf(value) {
  * @returns {-1 | 0 | 1}
  */
 export function ahead(a, b, c) {
-  const left = (b[0] - a[0]) * (c[0] - a[0])
-  const right = (b[1] - a[1]) * (c[1] - a[1])
-  const size = Math.abs(left) + Math.abs(right)
-  if (Math.abs(left + right) > size * ERROR && size > 2 ** -900 && size < Infinity) {
-    return /** @type {-1 | 1} */ (Math.sign(left + right))
-  }
+  const certain = certainSign((b[0] - a[0]) * (c[0] - a[0]), (b[1] - a[1]) * (c[1] - a[1]))
+  if (certain) return certain
   const [ax, ay] = a.map(scaled)
   return signOf((scaled(b[0]) - ax) * (scaled(c[0]) - ax) + (scaled(b[1]) - ay) * (scaled(c[1]) - ay))
 }

@@ -21,6 +21,8 @@ import { fromWire, isoTime } from "./json.js"
  *   | {op: "remove", key: AnyKey}
  *   | {op: "insert", point: Point, time: string | undefined}
  *   | {op: "delete", point: Point}} Row
+ *
+ * @typedef {{rows: Row[], keys: Set<string>}} Batch rows of one kind, and their keys
  */
 
 /**
@@ -37,7 +39,7 @@ export class Writer {
   #connection
   #name
   #options
-  /** @type {Row[][]} batches that are full, and the last one, which gathers */
+  /** @type {Batch[]} batches that are full, and the last one, which gathers */
   #batches = []
   #rows = 0
   /** @type {DynhullError | null} */
@@ -116,9 +118,13 @@ export class Writer {
   async #add(rows) {
     if (this.#failed) throw this.#failed
     for (const row of rows) {
-      const last = this.#batches.at(-1)
-      if (last === undefined || !fits(last, row, this.#options.batchRows)) this.#batches.push([row])
-      else last.push(row)
+      let last = this.#batches.at(-1)
+      if (last === undefined || !fits(last, row, this.#options.batchRows)) {
+        last = { rows: [], keys: new Set() }
+        this.#batches.push(last)
+      }
+      last.rows.push(row)
+      if ("key" in row) last.keys.add(String(row.key))
     }
     this.#rows += rows.length
     void this.#send()
@@ -131,9 +137,9 @@ export class Writer {
     await null // what the caller adds in the same turn goes together
     try {
       for (let batch = this.#batches.shift(); batch; batch = this.#batches.shift()) {
-        this.applied = await this.#deliver(batch)
+        this.applied = await this.#deliver(batch.rows)
         this.sequence += 1n
-        this.#rows -= batch.length
+        this.#rows -= batch.rows.length
         this.#wake()
       }
     } catch (error) {
@@ -144,14 +150,14 @@ export class Writer {
     }
   }
 
-  /** @param {Row[]} batch */
-  async #deliver(batch) {
+  /** @param {Row[]} rows */
+  async #deliver(rows) {
     const { patience, maySkip, signal } = this.#options
     const until = performance.now() + patience * 1000
     const call = {
       method: "POST",
       query: { may_skip: maySkip || undefined },
-      body: bodyOf(batch),
+      body: bodyOf(rows),
       idempotencyKey: `${this.producer}:${this.sequence + 1n}`,
       signal: signal ?? null,
     }
@@ -182,35 +188,21 @@ export class Writer {
 
 /**
  * Whether a row may join a batch: a batch has a key once, and either puts or inserts.
- * @param {Row[]} batch
+ * @param {Batch} batch
  * @param {Row} row
  * @param {number} most
  */
-function fits(batch, row, most) {
-  const first = batch[0]
-  if (batch.length >= most || first.op !== row.op) return false
+function fits({ rows, keys }, row, most) {
+  const first = rows[0]
+  if (rows.length >= most || first.op !== row.op) return false
   if ("time" in row && "time" in first && (row.time === undefined) !== (first.time === undefined)) return false
-  return !("key" in row) || !keysOf(batch).has(String(row.key))
+  return !("key" in row) || !keys.has(String(row.key))
 }
 
-/** @type {WeakMap<Row[], {keys: Set<string>, seen: number}>} */
-const known = new WeakMap()
-
-/** The keys of a batch that grows. @param {Row[]} batch */
-function keysOf(batch) {
-  const found = known.get(batch) ?? { keys: new Set(), seen: 0 }
-  for (; found.seen < batch.length; found.seen++) {
-    const row = batch[found.seen]
-    if ("key" in row) found.keys.add(String(row.key))
-  }
-  known.set(batch, found)
-  return found.keys
-}
-
-/** @param {Row[]} batch */
-function bodyOf(batch) {
-  const [first] = batch
-  const column = (/** @type {string} */ name) => batch.map((row) => /** @type {any} */ (row)[name])
+/** @param {Row[]} rows */
+function bodyOf(rows) {
+  const [first] = rows
+  const column = (/** @type {string} */ name) => rows.map((row) => /** @type {any} */ (row)[name])
   const times = "time" in first && first.time !== undefined ? { times: column("time") } : {}
   if (first.op === "put") return { keys: column("key"), points: column("point"), ...times }
   if (first.op === "remove") return { remove: column("key"), missing: "count" }
