@@ -207,7 +207,8 @@ class FenceModel:
     def _deleted(self, fence: FenceTruth) -> None:
         """The fence has one more event, which only those see who watch it."""
         closed = self.summary(fence, EventType.CLOSED, 0)
-        fence.events.append(closed._replace(time=fence.events[-1].time if fence.events else NO_TIME))
+        time = fence.events[-1].time if fence.events else NO_TIME
+        fence.events.append(closed._replace(sequence=fence.last + 1, time=time))
         fence.deleted = self._model.commits
         del self.alive[fence.row.name]
 
@@ -444,7 +445,9 @@ class FenceModel:
         if fence is None or fence.row.uid != uid:
             raise self._model.finds(f"an answer names a fence that is not kept: {uid}")
         if sent.lost is not None:
-            if sent.lost[0] != after + 1 or not after < sent.lost[1] < fence.first:
+            # With a fence its events go, but for those that the server still has in memory.
+            first = fence.first if fence.deleted is None else fence.last
+            if sent.lost[0] != after + 1 or not after < sent.lost[1] < first:
                 raise self._model.finds(f"{sent.lost} are called lost after {after}, kept are those from {fence.first}")
             after = sent.lost[1]
         for event in sent.events:
