@@ -258,7 +258,8 @@ class FenceLeg:
         if self.deleted or found is None:
             return self.deleted and found is None
         same = all(found.delays.get(subject) == delay for subject, delay in self.delays.items())
-        return same and (found.row, found.last, found.consumers) == (self.row, self.last, self.consumers)
+        kept = found.row, found.first, found.last, found.consumers
+        return same and kept == (self.row, self.first, self.last, self.consumers)
 
     def publish(self) -> None:
         """Make the changes, which are committed, those of the fence."""
