@@ -2,13 +2,14 @@
 
 A fleet of keyed vehicles makes small steps. Parts, all of them unless `--parts` names some:
 
-* writers: batches of one move that are acknowledged, with a history on and off, in turn.
+* writers: batches of one move that are acknowledged, with a history on and off, in turn; each server is new, and has
+  been there for a while. Rates and processor times are ratios of pairs, with 95 percent intervals.
 * bytes: what a move takes in segments, one and a thousand a batch, of positions with seven decimals and of full
   doubles; the states beside the segments are apart.
 * as-of: a hull with a million points as it was a million batches of one move after the last state, from the journal and
   later from segments, each time the first read of this hull since the start; and again 200 batches later, five times.
-* memory: the resident memory of a server while 100 million moves become the past: the most in the second half, beside
-  the most in the first quarter.
+* memory: the resident memory of a server while 100 million moves become the past, no faster than segments are written:
+  the most in the second half, beside the most in the first quarter.
 * replay: a day of 5,000 vehicles that report every ten seconds, as fast as it is read.
 
 Client and server share the machine. `--scale 0.01` is over in a minute. The folder should lie on the disk that counts.
@@ -16,13 +17,13 @@ Client and server share the machine. `--scale 0.01` is over in a minute. The fol
 
 import argparse
 import asyncio
-import itertools
+import math
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,7 @@ from statistics import median
 
 import grpc
 import numpy as np
+from scipy.stats import t as student
 
 import server
 from dynhull.keys import PackedKeys
@@ -42,6 +44,8 @@ MANY, DAY, VEHICLES, REPORTED = 10**6, 8640, 5000, 10**8
 LOADED = 8192
 NEAR = 1000
 MOVES = 2**18  # of a run of writers, and of what is weighed
+PACE = 250_000  # moves a second
+BEHIND = 5 * 10**6  # moves that segments may lack: those after the last snapshot but one are not due
 PARTS = ("writers", "bytes", "as-of", "memory", "replay")
 
 
@@ -52,6 +56,12 @@ class Served:
     process: subprocess.Popen[str]
     address: str
     stub: HullServiceStub
+
+    @property
+    def processor(self) -> float:
+        """The seconds of processor time that it has taken."""
+        times = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
+        return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
 
     @property
     def megabytes(self) -> float:
@@ -129,15 +139,34 @@ def write_until_filed(served: Served, name: str, moves: int, messages: list[byte
 def writers(folder: Path, scale: float, repeat: int) -> Iterator[str]:
     """With a history of, of without one."""
     messages = Fleet(VEHICLES).some(int(MOVES * scale))
-    rates: dict[bool, list[float]] = {True: [], False: []}
+    pairs: list[tuple[float, float]] = []
     options = "--snapshot-points", str(max(VEHICLES, len(messages) // 10))  # segments are written meanwhile
-    for number, history in itertools.product(range(repeat), (True, False)):
-        with serving(folder / f"writers {number} {history}", *options) as served:
-            create(served, "fleet", history=history)
-            rates[history].append(write(served, "fleet", messages))
-        told(f"writers: {rates[history][-1]:,.0f} batches/s {'with' if history else 'without'} a history")
-    on, off = median(rates[True]), median(rates[False])
-    yield f"writers with a history, of {off:,.0f} batches/s without | >= 0.97 | {on / off:.3f}"
+    off = []
+    for number in range(repeat):
+        found: dict[bool, tuple[float, float]] = {}
+        for history in (True, False) if number % 2 else (False, True):
+            with serving(folder / f"writers {number} {history}", *options) as served:
+                create(served, "fleet", history=history)
+                time.sleep(2)  # what writes segments is loaded
+                before = served.processor
+                found[history] = write(served, "fleet", messages), served.processor - before
+        told(f"writers: {found[True][0]:,.0f} batches/s with a history, {found[False][0]:,.0f} without")
+        pairs.append((found[True][0] / found[False][0], found[True][1] / found[False][1]))
+        off.append(found[False][0])
+    rate, processor = (ratio_of(column) for column in zip(*pairs, strict=True))
+    yield f"writers with a history, of {median(off):,.0f} batches/s without | >= 0.97 | {rate}"
+    yield f"processor time of the server with a history, of that without | | {processor}"
+
+
+def ratio_of(ratios: Sequence[float]) -> str:
+    """The geometric mean of ratios with its 95 percent interval, from the spread of their logarithms."""
+    logs = np.log(ratios)
+    if len(logs) < 2:
+        return f"{ratios[0]:.3f}"
+    half = float(student.ppf(0.975, len(logs) - 1)) * logs.std(ddof=1) / math.sqrt(len(logs))
+    return (
+        " to ".join(f"{math.exp(logs.mean() + each):.3f}" for each in (0, -half, half)).replace(" to ", " (", 1) + ")"
+    )
 
 
 def weighed(folder: Path, scale: float, _: int) -> Iterator[str]:
@@ -211,13 +240,17 @@ def memory(folder: Path, scale: float, _: int) -> Iterator[str]:
     used = []
     with serving(folder / "memory") as served:
         create(served, "fleet")
+        begun = time.monotonic()
         for number in range(rounds):
             write(served, "fleet", messages)
             used.append(served.megabytes)
-            if number % 20 == 0:
-                told(f"memory: {(number + 1) * len(messages) * VEHICLES:,} moves, {used[-1]:.0f} MB")
+            moves = (number + 1) * len(messages) * VEHICLES
+            while (filed := served.stub.GetHistory(pb.GetHistoryRequest(name="fleet")).moves) < moves - BEHIND:
+                time.sleep(1)
+            if number % 20 == 19:
+                told(f"memory: {moves:,} moves, {filed:,} in segments, {used[-1]:.0f} MB")
+            time.sleep(max(0.0, begun + moves / PACE - time.monotonic()))
     early, late = max(used[: max(2, rounds // 4)]), max(used[rounds // 2 :])
-    moves = rounds * len(messages) * VEHICLES
     yield f"memory after {moves:,} moves, of {early:.0f} MB after a quarter, MB | +- 50 | {late - early:+.0f}"
 
 

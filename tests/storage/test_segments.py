@@ -31,6 +31,7 @@ from dynhull_server.state.records import (
     Record,
 )
 from dynhull_server.storage.port import NEWEST, DamagedError
+from dynhull_server.storage.rows import filing, past_rows
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments.archive import BATCHES, Archive
 from dynhull_server.storage.segments.columns import columns_of, records_of
@@ -109,6 +110,22 @@ def test_the_past_is_read_from_segments_and_the_journal(fleet):
     assert history.batches == fleet.storage.oldest(1)
     assert history.bytes == sum((fleet.archive.path / each).stat().st_size for each in fleet.files)
     assert history.moves == sum(len(each.rows) for each in fleet.records[: history.batches])
+
+
+def test_a_segment_has_no_more_than_its_rows_and_those_read_together(tmp_path, monkeypatch):
+    monkeypatch.setattr(filing, "MOST_ROWS", 20)
+    monkeypatch.setattr(past_rows, "STEP_BYTES", 1)  # one commit, which has at most 8 rows
+    fleet = Fleet(tmp_path)
+    for _ in range(5):
+        fleet.put(20)
+        fleet.snapshot()
+    fleet.file()
+    contents = [(fleet.archive.path / each).read_bytes() for each in fleet.files if each.endswith(BATCHES)]
+    rows = [len(from_parquet(content, "a file")[0]) for content in contents]
+    assert len(rows) > 6
+    assert max(rows) < 20 + 8
+    require_all(fleet.storage, fleet.records)
+    fleet.storage.close()
 
 
 def test_a_deleted_hull_has_no_past_and_a_new_one_of_its_name_none_of_it(fleet):

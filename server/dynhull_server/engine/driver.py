@@ -276,10 +276,12 @@ class Driver:
         self._commits.submit(changes, lambda error, _: self._from_thread(partial(_settle, done, error)))
         return done
 
-    async def commit_steps(self, steps: Iterator[Any], run: Callable[[Callable[[], Any]], Awaitable[Any]]) -> None:
+    async def commit_steps(
+        self, steps: Iterator[Any], run: Callable[[Callable[[], Any]], Awaitable[Any]], pause: float = PAUSE_FACTOR
+    ) -> None:
         """Commit steps one after another, each made by `run` after the commit of the one before.
 
-        Batches have priority on the disk: pauses follow.
+        Batches have priority: a pause follows each step, so many times as long as that took.
         """
         clock = self.machine.clock
         while True:
@@ -288,7 +290,7 @@ class Driver:
             if step is None:
                 return
             await self.commit([step])
-            await clock.sleep(PAUSE_FACTOR * (clock.monotonic() - begun))
+            await clock.sleep(pause * (clock.monotonic() - begun))
 
     async def settled(self) -> None:
         """Wait for the commits that have begun; raises the error if their outcome cannot be decided."""

@@ -27,6 +27,9 @@ from .recalls import UNREADABLE
 
 # The journal keeps what is after the older of two snapshots.
 SNAPSHOTS = 2
+# Half of the time segments are written, if there is so much to write: most of it goes on beside the interpreter, and
+# what the journal must keep meanwhile is not to grow without end.
+PAUSE = 1.0
 
 
 class Filing:
@@ -50,7 +53,8 @@ class Filing:
     async def round(self) -> None:
         """Make segments of what the journal need not have any longer, and remove those that are not to be kept."""
         async with self._turn:
-            await self._driver.commit_steps(self._storage.file_history(self._driver.time()), self._driver.in_history)
+            steps = self._storage.file_history(self._driver.time())
+            await self._driver.commit_steps(steps, self._driver.in_history, PAUSE)
 
     async def erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
         """Erase keys from the past of a hull, even if the caller goes away. None if it has none of them.

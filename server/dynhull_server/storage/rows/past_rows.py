@@ -1,6 +1,8 @@
 """Reading hulls as they were, from the rows that there are."""
 
 from array import array
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,8 @@ from .tables import Reader
 
 # About the rows of points that one read has, and the rows of batches that it looks at.
 STEP_POINTS, STEP_ROWS = 8192, 1024
+# Rows of batches are decoded together up to these many bytes of payloads.
+STEP_BYTES = 2**21
 # Those of one that gathers them.
 GATHERED_ROWS = 2**17
 
@@ -105,13 +109,11 @@ def columns_between(reader: Reader, hull: HullRows, after: int, until: int, most
 
     At least those of one row of batches; no further row is read after `most` points and keys.
     """
-    places, parts, count = hull.between(after, until), list[SegmentColumns](), 0
+    parts, count = list[SegmentColumns](), 0
     identity = hull.row.settings.identity
     with as_damage(hull):
-        for start in range(0, len(places), STEP_ROWS):
-            parts.append(
-                columns_of_rows(whole_rows(hull, batch_rows(reader, places[start : start + STEP_ROWS])), identity)
-            )
+        for rows in _few_bytes(whole_rows(hull, batch_rows(reader, hull.between(after, until)))):
+            parts.append(columns_of_rows(rows, identity))
             count += len(parts[-1])
             if count >= most:
                 break
@@ -122,6 +124,19 @@ def columns_between(reader: Reader, hull: HullRows, after: int, until: int, most
         missing = int(columns.revision[gaps[0] - 1]) + 1 if len(gaps) and gaps[0] else after + 1
         raise DamagedError(f"hull {hull.row.name!r}: revision {missing} is missing: restore a backup")
     return columns
+
+
+def _few_bytes(rows: Iterator[tuple[Any, ...]]) -> Iterator[list[tuple[Any, ...]]]:
+    """Rows of batches, some at a time, with no more bytes than one of them or STEP_BYTES."""
+    some, size = list[tuple[Any, ...]](), 0
+    for row in rows:
+        size += len(row[3])
+        if some and (size > STEP_BYTES or len(some) == STEP_ROWS):
+            yield some
+            some, size = [], len(row[3])
+        some.append(row)
+    if some:
+        yield some
 
 
 def require_kept(hull: HullRows, revision: int) -> None:

@@ -84,15 +84,14 @@ def batch_rows(reader: Reader, places: "array[int]") -> Iterator[tuple[Any, ...]
     return reader.some("batches", f"first, last, checksum, payload, {commit_columns(reader.version)}", places)
 
 
-def whole_rows(hull: HullRows, rows: Iterable[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+def whole_rows(hull: HullRows, rows: Iterable[tuple[Any, ...]]) -> Iterator[tuple[Any, ...]]:
     """The rows that `batch_rows` has read. Raises DamagedError if one is damaged."""
-    return [_whole(hull, row) for row in rows]
+    return (_whole(hull, row) for row in rows)
 
 
 def whole_records(hull: HullRows, rows: Iterable[tuple[Any, ...]]) -> Iterator[Record]:
     """The records in rows that `batch_rows` has read. Raises DamagedError for one that is damaged."""
-    for row in rows:
-        first, _, _, payload, *commit = _whole(hull, row)
+    for first, _, _, payload, *commit in whole_rows(hull, rows):
         yield from batch_records(payload, first, *commit)
 
 

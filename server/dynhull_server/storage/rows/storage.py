@@ -21,6 +21,7 @@ from ..of_keys import changes_of_keys, contents_of_keys
 from ..past import Erasure, Hole, Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from ..segments.archive import NEEDS, Archive, is_installed
+from ..segments.parquet import load
 from . import chunks
 from .divided import newest_rows
 from .encoding import weight
@@ -385,8 +386,11 @@ class RowStorage(ABC):
         archive = self._archive
         if archive is None:
             return
+        numbers = self._with_past()
+        if numbers:
+            load()  # before there are batches to wait for it
         yield from self._remove_files(archive)
-        for number in self._with_past():
+        for number in numbers:
             while (hull := self._ledger.hulls.get(number)) and hull.due > hull.filed:
                 yield from self._close_segment(number, archive)
             yield from self._trim(number)

@@ -14,9 +14,11 @@ import numpy as np
 
 from dynhull.keys import PackedKeys, key_list
 
+from ...state.contents.key_rows import select_keys
 from ...state.records import FOREVER, NO_TIME, Identity
 from ..port import DamagedError
 from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
+from .gathered import key_codes
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -30,7 +32,7 @@ FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
 MOST_PLACES = 12
 EXACT = 2**53  # below that every whole number is a double
 SAMPLE = 1000
-LEVEL = 9
+LEVEL = 7  # 9 takes a fifth longer for as many bytes
 # Who asks for the way of a key decompresses one of these: of 2**17 rows they take 2.6 percent fewer bytes, but four
 # times as long.
 GROUP_ROWS = 2**14
@@ -59,6 +61,15 @@ SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
 SHARED = 4  # rows of a commit, on average, from which on its time is an index into those of all
 
 
+def load() -> None:
+    """Load what reads and writes files, if it is there: that takes a tenth of a second of the interpreter, or more."""
+    try:
+        import pyarrow.compute
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        return
+
+
 def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"") -> bytes:
     """SegmentColumns as a file.
 
@@ -70,22 +81,25 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    order, key = _by_key(columns)
+    time = pa.timestamp("us", "UTC")
     columns_of_table = {
-        "revision": pa.array(columns.revision),
-        "commit": _optional(columns.commit, NO_TIME),
-        "committed": _time(columns.committed, NO_TIME),
-        "cause": _words(columns.cause, CAUSES),
-        "kind": _words(columns.kind, KINDS),
-        "op": _words(columns.op, OPS),
-        "key": _key_column(columns),
-        "event_time": _time(columns.event_time, NO_TIME),
-        "expire_time": _time(columns.expire_time, FOREVER),
-        "detail": pa.array(columns.detail, pa.string()),
-        "clock": _time(columns.clock, NO_TIME),
-        "row": pa.array(columns.place.astype(np.int32)),
+        "revision": pa.array(columns.revision[order]),
+        "commit": _optional(columns.commit[order], NO_TIME, pa.int64()),
+        "committed": _optional(columns.committed[order], NO_TIME, time),
+        "cause": _words(columns.cause[order], CAUSES),
+        "kind": _words(columns.kind[order], KINDS),
+        "op": _words(columns.op[order], OPS),
+        "key": key,
+        "event_time": _optional(columns.event_time[order], NO_TIME, time),
+        "expire_time": _optional(columns.expire_time[order], FOREVER, time),
+        "detail": _optional_words(columns.detail, order),
+        "clock": _optional(columns.clock[order], NO_TIME, time),
+        "row": pa.array(columns.place[order].astype(np.int32)),
     }
     fields = {name: pa.field(name, column.type) for name, column in columns_of_table.items()}
-    there = ~np.isnan(columns.points[:, 0])
+    points = columns.points[order]
+    there = ~np.isnan(points[:, 0])
     commits = np.count_nonzero(np.diff(columns.committed)) + 1
     words, split, group_rows = WORDS, SPLIT, GROUP_ROWS
     if commits * SHARED <= len(columns):
@@ -94,7 +108,7 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
     else:
         split += ("committed",)
     for place, name in enumerate("xy"):
-        values, scale = _scaled(np.ascontiguousarray(columns.points[:, place]), there)
+        values, scale = _scaled(np.ascontiguousarray(points[:, place]), there)
         metadata = None if scale is None else {SCALE: str(scale).encode()}
         columns_of_table[name] = values
         fields[name] = pa.field(name, values.type, metadata=metadata)
@@ -102,7 +116,6 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
     head = {FORMAT: str(VERSION).encode(), b"dynhull.identity": columns.identity.encode()} | told
     schema = pa.schema([fields[name] for name in ORDER], {**head, STATE: state} if state else head)
     table = pa.table([columns_of_table[name] for name in ORDER], schema=schema)
-    table = table.sort_by([("key", "ascending"), ("revision", "ascending"), ("row", "ascending")])
     sink = pa.BufferOutputStream()
     pq.write_table(
         table,
@@ -237,16 +250,22 @@ def _details(column: pa.ChunkedArray) -> list[str | None]:
     return [None] * len(column) if column.null_count == len(column) else column.to_pylist()
 
 
-def _optional(values: Integers, none: int) -> pa.Array:
+def _optional(values: Integers, none: int, kind: pa.DataType) -> pa.Array:
+    """Numbers, of which some are none: as a rule all of them, or no one."""
     import pyarrow as pa
 
-    return pa.array(values, mask=values == none)
+    there = np.count_nonzero(values != none)
+    if not there:
+        return pa.nulls(len(values), kind)
+    return pa.array(values, kind, mask=None if there == len(values) else values == none)
 
 
-def _time(values: Integers, none: int) -> pa.Array:
+def _optional_words(words: list[str | None], order: npt.NDArray[np.intp]) -> pa.Array:
     import pyarrow as pa
 
-    return pa.array(values, pa.timestamp("us", "UTC"), mask=values == none)
+    if words.count(None) == len(words):
+        return pa.nulls(len(words), pa.string())
+    return pa.array([words[place] for place in order.tolist()], pa.string())
 
 
 def _words(codes: Codes, words: tuple[str, ...]) -> pa.Array:
@@ -279,20 +298,47 @@ def _integers(table: pa.Table, name: str, none: int) -> Integers:
     return found
 
 
-def _key_column(columns: SegmentColumns) -> pa.Array:
+def _by_key(columns: SegmentColumns) -> tuple[npt.NDArray[np.intp], pa.Array]:
+    """The rows by key, then revision and place, those without a key last; and their keys in this order."""
     import pyarrow as pa
 
-    keys, keyed = columns.keys, columns.keyed
-    if isinstance(keys, PackedKeys):
-        lengths = np.zeros(len(columns), np.int64)
-        lengths[keyed] = np.frombuffer(keys.lengths, np.uint8)
-        offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
-        bits = pa.py_buffer(np.packbits(keyed, bitorder="little"))
-        buffers = [bits, pa.py_buffer(offsets), pa.py_buffer(keys.data)]
-        return pa.Array.from_buffers(pa.string(), len(columns), buffers)
-    integers = np.zeros(len(columns), np.uint64)
-    integers[keyed] = keys
-    return pa.array(integers, mask=~keyed)
+    with_key, rest = np.flatnonzero(columns.keyed), np.flatnonzero(~columns.keyed)
+    none = np.arange(len(columns)) >= len(with_key)
+    if not isinstance(columns.keys, PackedKeys):
+        by_key = np.argsort(columns.keys, kind="stable")
+        integers = np.zeros(len(columns), np.uint64)
+        integers[: len(with_key)] = columns.keys[by_key]
+        return np.concatenate([with_key[by_key], rest]), pa.array(integers, mask=none)
+    ranks, names = _ranked(columns.keys)
+    by_key = np.argsort(ranks, kind="stable")
+    places = np.zeros(len(columns), np.int32)
+    places[: len(with_key)] = ranks[by_key]
+    key = pa.DictionaryArray.from_arrays(pa.array(places, mask=none), names).cast(pa.string())
+    return np.concatenate([with_key[by_key], rest]), key
+
+
+def _ranked(keys: PackedKeys) -> tuple[npt.NDArray[Any], pa.Array]:
+    """For each key its place among the different ones in order, and these: few strings are compared."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    codes = key_codes(keys)
+    newest = np.zeros(int(codes.max(initial=-1)) + 1, np.intp)
+    newest[codes] = np.arange(len(codes))
+    some = np.zeros(len(codes), np.bool_)
+    some[newest] = True
+    different = select_keys(keys, some)
+    assert isinstance(different, PackedKeys)  # as `keys`
+    offsets = np.concatenate(
+        [[0], np.cumsum(np.frombuffer(different.lengths, np.uint8), dtype=np.int32)], dtype=np.int32
+    )
+    buffers = [None, pa.py_buffer(offsets), pa.py_buffer(different.data)]
+    names = pa.Array.from_buffers(pa.string(), len(newest), buffers)
+    in_order = pc.array_sort_indices(names)
+    # Numbers of two bytes are sorted in time O(n).
+    rank = np.zeros(len(newest), np.uint16 if len(newest) <= 2**16 else np.uint32)
+    rank[codes[some][in_order.to_numpy()]] = np.arange(len(newest))
+    return rank[codes], names.take(in_order)
 
 
 def _keys(column: pa.ChunkedArray, identity: Identity) -> tuple[npt.NDArray[np.bool_], Keys]:
