@@ -33,7 +33,8 @@ from dynhull_server.state.records import (
 from dynhull_server.storage.port import NEWEST, DamagedError
 from dynhull_server.storage.rows import filing, past_rows
 from dynhull_server.storage.rows.filed import Filed
-from dynhull_server.storage.segments.archive import BATCHES, Archive
+from dynhull_server.storage.segments import archive
+from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive
 from dynhull_server.storage.segments.columns import columns_of, records_of
 from dynhull_server.storage.segments.parquet import from_parquet, to_parquet
 from dynhull_server.storage.sqlite import copies
@@ -286,9 +287,56 @@ def test_no_flipped_bit_cut_or_exchange_of_a_file_goes_unnoticed(tmp_path):
         changed[place // 8] ^= 1 << place % 8
         paths[0].write_bytes(changed)
         with pytest.raises(DamagedError, match="is not as it was written"):
-            fleet.archive.read(segment.file + BATCHES, segment.facts.bytes, segment.facts.digest)
+            fleet.archive.read(segment.file + BATCHES, segment.facts.wrote)
     report = copies.check(fleet.folder / "data", no_progress, fleet.archive.path)
     assert ["revisions 1 to" in each and paths[0].name in each for each in report.notes] == [True]
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+def test_what_is_read_of_a_few_keys_is_as_it_was_written_or_refused(tmp_path, blocks, monkeypatch):
+    """Also of segments of earlier versions, whose blocks have no hashes."""
+    monkeypatch.setattr(archive, "BLOCK", 512)
+    fleet = Fleet(tmp_path).fill()
+    storage = fleet.storage
+    hull = storage._ledger.hulls[1]
+    if not blocks:
+        hull.segments[:] = [
+            replace(each, facts=replace(each.facts, blocks="", state_blocks="")) for each in hull.segments
+        ]
+    segment = hull.segments[1]
+    keys = PackedKeys.pack(KEYS[:1])
+
+    def read():
+        at, changes = storage.key_changes(1, keys, segment.first - 1, segment.last)
+        revision, _, contents = storage.key_state(1, keys, segment.first - 1)
+        columns = changes.rows, changes.revisions, changes.times, changes.points, contents.points
+        return at, revision, [each.tobytes() for each in columns]
+
+    if blocks:
+        monkeypatch.setattr(Archive, "content", None)  # no file is read as a whole
+    whole, rng = read(), np.random.default_rng(1)
+    for end in (BATCHES, STATE):
+        path = fleet.archive.path / (segment.file + end)
+        content = path.read_bytes()
+        for place in rng.integers(0, 8 * len(content), FLIPS).tolist():
+            changed = bytearray(content)
+            changed[place // 8] ^= 1 << place % 8
+            path.write_bytes(changed)
+            try:
+                found = read()
+            except DamagedError as error:
+                assert path.name in str(error)  # noqa: PT017
+                assert "is not as it was written" in str(error)  # noqa: PT017
+            else:
+                assert blocks  # what is not read does not matter
+                assert found == whole
+        for damaged in (content[:-1], content + b"0", b""):
+            path.write_bytes(damaged)
+            with pytest.raises(DamagedError, match="is not as it was written"):
+                read()
+        path.write_bytes(content)
+    assert read() == whole
+    fleet.storage.close()
 
 
 def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():

@@ -90,8 +90,8 @@ class Filed:
         """What the batches of one segment do to some keys, from a revision on."""
         segment = _segment(hull, after + 1)
         name, facts, last = segment.file + BATCHES, segment.facts, min(until, segment.last)
-        with self._noted(segment, BATCHES):
-            columns, _, _ = keys_from_parquet(self._archive.read(name, facts.bytes, facts.digest), name, keys)
+        with self._noted(segment, BATCHES), self._archive.parts(name, facts.wrote) as file:
+            columns, _, _ = keys_from_parquet(file, name, keys)
         return last, changes_of_keys(columns.between(after, last), keys)
 
     def forget(self, file: str) -> None:
@@ -137,7 +137,7 @@ class Filed:
 def read_batches(archive: Archive, segment: StoredSegment) -> Batches:
     """The batches of a segment. Raises DamagedError, which names the file, or StorageError."""
     name, facts = segment.file + BATCHES, segment.facts
-    columns, _, _ = from_parquet(archive.read(name, facts.bytes, facts.digest), name)
+    columns, _, _ = from_parquet(archive.read(name, facts.wrote), name)
     if not len(columns) or (columns.revision[0], columns.revision[-1]) != (segment.first, segment.last):
         raise DamagedError(f"{name} has other revisions than {segment.first} to {segment.last}: restore a backup")
     return Batches(columns)
@@ -149,8 +149,11 @@ def read_state(archive: Archive, segment: StoredSegment, keys: Keys | None = Non
     Raises DamagedError, which names the file, or StorageError.
     """
     name, facts = segment.file + STATE, segment.facts
-    content = archive.read(name, facts.state_bytes, facts.state_digest)
-    columns, about, told = from_parquet(content, name) if keys is None else keys_from_parquet(content, name, keys)
+    if keys is None:
+        columns, about, told = from_parquet(archive.read(name, facts.state_wrote), name)
+    else:
+        with archive.parts(name, facts.state_wrote) as file:
+            columns, about, told = keys_from_parquet(file, name, keys)
     kept, _ = state_from(told)
     contents = contents_of(columns, times=about["times"] == "True", deadlines=about["deadlines"] == "True")
     return replace(kept, revision=segment.first - 1, contents=contents)

@@ -30,9 +30,9 @@ def examine_segment(archive: Archive, segment: StoredSegment) -> None:
         if segment.facts.state_bytes:
             read_state(archive, segment)
         return
-    archive.read(segment.file + BATCHES, segment.facts.bytes, segment.facts.digest)
+    archive.read(segment.file + BATCHES, segment.facts.wrote)
     if segment.facts.state_bytes:
-        archive.read(segment.file + STATE, segment.facts.state_bytes, segment.facts.state_digest)
+        archive.read(segment.file + STATE, segment.facts.state_wrote)
 
 
 def hole(hull: HullRows, segment: StoredSegment, error: Exception) -> str:

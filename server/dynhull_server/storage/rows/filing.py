@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from ...state.records import FOREVER, NO_TIME, HullRow, Kept
-from ..segments.archive import BATCHES, STATE, Archive
+from ..segments.archive import BATCHES, STATE, Archive, Written
 from ..segments.columns import SegmentColumns, columns_of_state
 from ..segments.parquet import to_parquet
 from .chunks import state
@@ -49,13 +49,24 @@ class Due:
             OSError: the disk is full, or fails.
         """
         columns = self.columns
-        state, commit = (0, ""), None
+        state, commit = Written(0, "", ""), None
         if self.before is not None:
             state, commit = archive.write(file + STATE, state_file(self.row, self.before)), self.before.committed
         wrote = archive.write(file + BATCHES, to_parquet(columns, _about(self.row, columns)))
         ends = int(columns.committed[0]), int(columns.committed[-1])
         times = (0, 0) if NO_TIME in ends else ends
-        facts = SegmentFacts(*wrote, *state, commit, self.last - self.first + 1, columns.moves, *times)
+        facts = SegmentFacts(
+            wrote.bytes,
+            wrote.digest,
+            state.bytes,
+            state.digest,
+            commit,
+            self.last - self.first + 1,
+            columns.moves,
+            *times,
+            wrote.blocks,
+            state.blocks,
+        )
         return StoredSegment(place, self.first, self.last, file, facts)
 
 

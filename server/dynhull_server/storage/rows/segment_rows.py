@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ..past import Erasure
+from ..segments.archive import Written
 from .encoding import checksum, weight
 
 NO_HULL = 0
@@ -27,6 +28,7 @@ class SegmentFacts:
         batches: the number of batches.
         moves: the number of points and keys that they write.
         first_time, last_time: the times of their first and last commit, in microseconds since 1970; 0 if not known.
+        blocks, state_blocks: the hashes of the blocks of the files; empty where there are none.
     """
 
     bytes: int
@@ -38,6 +40,18 @@ class SegmentFacts:
     moves: int
     first_time: int
     last_time: int
+    blocks: str = ""
+    state_blocks: str = ""
+
+    @property
+    def wrote(self) -> Written:
+        """What the file with the batches was written with."""
+        return Written(self.bytes, self.digest, self.blocks)
+
+    @property
+    def state_wrote(self) -> Written:
+        """What the file with the state was written with."""
+        return Written(self.state_bytes, self.state_digest, self.state_blocks)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,28 +1,87 @@
 """The folder of the past: two files for each segment, written once, and read with the hash of all their bytes."""
 
+import io
 import os
+from base64 import b64decode, b64encode
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..durable import TEMPORARY, make_durable, write_durably
 from ..port import DamagedError, StorageError
 
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
 BATCHES, STATE = ".batches.parquet", ".state.parquet"
 HISTORY = "history"  # the folder within a data folder, unless another one is named
 DIGEST_BYTES = 16
+# Who needs a part of a file reads and checks whole blocks of it: a group of rows is in one or two.
+BLOCK, BLOCK_DIGEST_BYTES = 2**16, 8
 NEEDS = "needs pyarrow: pip install 'dynhull[history]'"
 
 
 class Written(NamedTuple):
-    """What a file was written with: its size, and the hash of its bytes."""
+    """What a file was written with: its size, the hash of its bytes, and those of its blocks, one after the other."""
 
     bytes: int
     digest: str
+    blocks: str
+
+
+class _Blocks(io.RawIOBase):
+    """A file whose bytes are checked, a block at a time, as they are read.
+
+    Args:
+        path: the file.
+        written: what it was written with.
+    """
+
+    def __init__(self, path: Path, written: Written) -> None:
+        self._path = path
+        self._digests = b64decode(written.blocks)
+        self._size = written.bytes
+        self._at = 0
+        self._file = path.open("rb", buffering=0)
+        if os.fstat(self._file.fileno()).st_size != self._size:
+            raise _changed(path)
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._at
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
+        return self._at
+
+    def readinto(self, buffer: "WriteableBuffer") -> int:
+        target = memoryview(buffer).cast("B")
+        start, end = self._at, min(self._at + len(target), self._size)
+        if start >= end:
+            return 0
+        first = start // BLOCK
+        content = os.pread(
+            self._file.fileno(), min(-(-end // BLOCK) * BLOCK, self._size) - first * BLOCK, first * BLOCK
+        )
+        expected = self._digests[first * BLOCK_DIGEST_BYTES : -(-end // BLOCK) * BLOCK_DIGEST_BYTES]
+        if _digests_of(content) != expected:
+            raise _changed(self._path)
+        target[: end - start] = content[start - first * BLOCK : end - first * BLOCK]
+        self._at = end
+        return end - start
 
 
 def is_installed() -> bool:
@@ -41,6 +100,8 @@ class Archive:
     Attributes:
         path, most_bytes, most_age: the same.
     """
+
+    has_parts = True  # whether to read a part of a file takes less than to read all of it
 
     def __init__(self, path: Path, most_bytes: int = 0, most_age: int = 0) -> None:
         self.path = path
@@ -63,25 +124,44 @@ class Archive:
                 folder.mkdir(parents=True, exist_ok=True)
                 make_durable(folder.parent)
         write_durably(path, content)
-        return Written(len(content), digest_of(content))
+        return written(content)
 
-    def read(self, file: str, size: int, digest: str) -> bytes:
+    def read(self, file: str, wrote: Written) -> bytes:
         """All bytes of a file.
 
         Raises:
             DamagedError: they are not those that were written.
             StorageError: the file cannot be read at present.
         """
+        with self._reading(file):
+            content = self.content(file, wrote.bytes)
+        if len(content) != wrote.bytes or digest_of(content) != wrote.digest:
+            raise _changed(self.path / file)
+        return content
+
+    @contextmanager
+    def parts(self, file: str, wrote: Written) -> Iterator[io.IOBase]:
+        """A file that is read in parts. What is read of it is checked; and all of it, where its blocks have no hashes.
+
+        Raises:
+            DamagedError: the bytes are not those that were written.
+            StorageError: the file cannot be read at present.
+        """
+        if not self.has_parts or not wrote.blocks:
+            yield io.BytesIO(self.read(file, wrote))
+            return
+        with self._reading(file), _Blocks(self.path / file, wrote) as parts:
+            yield parts
+
+    @contextmanager
+    def _reading(self, file: str) -> Iterator[None]:
         path = self.path / file
         try:
-            content = self.content(file, size)
+            yield
         except FileNotFoundError:
             raise DamagedError(f"{path} is missing: restore a backup") from None
         except OSError as error:
             raise StorageError(f"{path} cannot be read: {error}") from error
-        if len(content) != size or digest_of(content) != digest:
-            raise DamagedError(f"{path} is not as it was written: it was cut, changed or exchanged: restore a backup")
-        return content
 
     def content(self, file: str, size: int = 0) -> bytes:
         """All bytes of a file, which had a size, whatever they are.
@@ -147,6 +227,21 @@ class Archive:
             make_durable(folder)
 
 
+def written(content: bytes) -> Written:
+    """What to know of a file with this content."""
+    return Written(len(content), digest_of(content), b64encode(_digests_of(content)).decode())
+
+
 def digest_of(content: bytes) -> str:
     """The hash of the bytes of a file."""
     return blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
+
+
+def _digests_of(content: bytes) -> bytes:
+    """The hashes of the blocks of a file, or of some of them."""
+    blocks = (content[start : start + BLOCK] for start in range(0, len(content), BLOCK))
+    return b"".join(blake2b(block, digest_size=BLOCK_DIGEST_BYTES).digest() for block in blocks)
+
+
+def _changed(path: Path) -> DamagedError:
+    return DamagedError(f"{path} is not as it was written: it was cut, changed or exchanged: restore a backup")

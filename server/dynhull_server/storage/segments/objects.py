@@ -20,7 +20,7 @@ from time import time
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from .archive import BATCHES, STATE, Archive, Written, digest_of
+from .archive import BATCHES, STATE, Archive, Written, written
 from .place import is_store, require_store
 
 if TYPE_CHECKING:
@@ -54,6 +54,8 @@ class ObjectArchive(Archive):
         seconds: for a call.
     """
 
+    has_parts = False  # an object is asked for once
+
     def __init__(self, place: str, most_bytes: int = 0, most_age: int = 0, seconds: float = CALL_SECONDS) -> None:
         parts = urlsplit(place)
         root = f"{parts.netloc}{unquote(parts.path)}".rstrip("/")
@@ -79,7 +81,7 @@ class ObjectArchive(Archive):
         self._ask(file, put, len(content))
         if self.content(file, len(content)) != content:
             raise OSError(errno.EIO, "the object store does not keep what it is sent", file)
-        return Written(len(content), digest_of(content))
+        return written(content)
 
     def content(self, file: str, size: int = 0) -> bytes:
         """All bytes of an object, whatever they are.

@@ -8,7 +8,7 @@ way of one key is one read, and so that numbers differ little from those before 
 from __future__ import annotations
 
 from bisect import bisect_left
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -21,11 +21,17 @@ from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
 from .gathered import key_codes
 
 if TYPE_CHECKING:
+    from io import IOBase
+
     import numpy.typing as npt
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     from dynhull.keys import Keys
+
+    Rows = npt.NDArray[np.intp]
+
+Value = TypeVar("Value", bound=np.generic)
 
 VERSION = 1
 FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
@@ -138,48 +144,53 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
         DamagedError: it is no file of ours, or of a newer version.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(pa.BufferReader(data), memory_map=False, page_checksum_verification=True)
-        found = table.schema.metadata or {}
-        if FORMAT not in found:
-            raise DamagedError(f"{name} is a Parquet file of another program")
-        if int(found[FORMAT]) > VERSION:
-            raise DamagedError(f"{name} has format {int(found[FORMAT])}, this version reads {VERSION}")
-        return _columns(_in_order(table), found), _about(found), found.get(STATE, b"")
+        file = _opened(pa.BufferReader(data), name)
+        found = file.schema_arrow.metadata
+        table = file.read()
+        return _columns(table, found, _order(table)), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
 
 
-def keys_from_parquet(data: bytes, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
-    """The same with the rows of some keys, and of none, alone: no more is decompressed than the groups that have these.
+def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
+    """The same with the rows of some keys, and of none, alone: no more is read than the groups that have these.
 
     Raises:
         DamagedError: it is no file of ours, or of a newer version.
     """
     import pyarrow as pa
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
 
     try:
+        file = _opened(pa.PythonFile(source, mode="r"), name)
+        found = file.schema_arrow.metadata
         values = sorted(key_list(keys))
-        wanted = pa.array(values, pa.string() if isinstance(keys, PackedKeys) else pa.uint64())
-        file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True)
-        found = file.schema_arrow.metadata or {}
         column = file.schema_arrow.names.index("key")
         groups = [
             place
             for place in range(file.num_row_groups)
             if _may_have(file.metadata.row_group(place).column(column), values)
         ]
-        table = file.read_row_groups(groups)
-        key = table.column("key")
-        table = table.filter(pc.or_(pc.is_in(key, value_set=wanted), pc.is_null(key)))
-        table = table.sort_by([("revision", "ascending"), ("row", "ascending")]).combine_chunks()
-        return _columns(table, found), _about(found), found.get(STATE, b"")
+        table = file.read_row_groups(groups, use_threads=False)
+        return _columns(table, found, _of_keys(table, values)), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def _opened(source: pa.NativeFile, name: str) -> pq.ParquetFile:
+    """A file whose words are read as places in a list of them. DamagedError if it is none of ours, or too new."""
+    import pyarrow.parquet as pq
+
+    metadata = pq.read_metadata(source)
+    found = metadata.metadata or {}
+    if FORMAT not in found:
+        raise DamagedError(f"{name} is a Parquet file of another program")
+    if int(found[FORMAT]) > VERSION:
+        raise DamagedError(f"{name} has format {int(found[FORMAT])}, this version reads {VERSION}")
+    # Of a state every key is another one.
+    words = [each for each in (*WORDS, "detail") if each != "key" or STATE not in found]
+    return pq.ParquetFile(source, metadata=metadata, read_dictionary=words, page_checksum_verification=True)
 
 
 def _may_have(column: pq.ColumnChunkMetaData, values: list[Any]) -> bool:
@@ -199,55 +210,85 @@ def _about(found: dict[bytes, bytes]) -> dict[str, str]:
     }
 
 
-def _in_order(table: pa.Table) -> pa.Table:
-    """The rows by revision and place, without sorting: each says where it belongs. ValueError if one is missing."""
-    import pyarrow as pa
+def _order(table: pa.Table) -> Rows | None:
+    """The rows by revision and place, without sorting: each says where it belongs. ValueError if one is missing.
 
-    table = table.combine_chunks()
-    if not len(table):
-        return table
+    None if they are in this order.
+    """
+    count = len(table)
+    if not count:
+        return None
     revision, place = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
     first, last = int(revision.min()), int(revision.max())
-    if last - first >= len(table) or int(place.min()) < 0:
+    if last - first >= count or int(place.min()) < 0:
         raise ValueError("a row is missing")
     counts = np.bincount(revision - first)
     belongs = (np.cumsum(counts) - counts)[revision - first] + place
-    rows = np.arange(len(table))
+    rows = np.arange(count)
     if np.array_equal(belongs, rows):
-        return table
-    order = np.full(len(table), -1)
-    order[belongs[belongs < len(table)]] = rows[belongs < len(table)]
+        return None
+    order = np.full(count, -1)
+    order[belongs[belongs < count]] = rows[belongs < count]
     if int(order.min()) < 0:
         raise ValueError("a row is missing")
-    return table.take(pa.array(order))
+    return order
 
 
-def _columns(table: pa.Table, found: dict[bytes, bytes]) -> SegmentColumns:
+def _of_keys(table: pa.Table, values: list[Any]) -> Rows:
+    """The rows of some keys, and of none, by revision and place."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    key = table.column("key")
+    wanted = pa.array(values, pa.uint64() if pa.types.is_uint64(key.type) else pa.string())
+    if pa.types.is_dictionary(key.type):
+        codes, words = _coded(key)
+        among = pc.is_in(words, value_set=wanted).to_numpy(zero_copy_only=False)
+        chosen = np.append(among, True)[codes]  # without a key the code is the last place
+    else:
+        chosen = pc.or_(pc.is_in(key, value_set=wanted), pc.is_null(key)).to_numpy()
+    rows = np.flatnonzero(chosen)
+    revision, place = _integers(table, "revision", NO_TIME)[rows], _integers(table, "row", NO_TIME)[rows]
+    found: Rows = rows[np.lexsort((place, revision))]
+    return found
+
+
+def _columns(table: pa.Table, found: dict[bytes, bytes], order: Rows | None) -> SegmentColumns:
+    """Some rows in an order; None for all as they are."""
     identity: Any = found[b"dynhull.identity"].decode()
-    points = np.column_stack([_coordinates(table, name) for name in "xy"])
-    keyed, keys = _keys(table.column("key"), identity)
+    keyed, keys = _keys(table.column("key"), identity, order)
+
+    def integers(name: str, none: int = NO_TIME) -> Integers:
+        return _integers(table, name, none, order)
+
+    def codes(name: str, words: tuple[str, ...]) -> Codes:
+        return _codes(table, name, words, order)
+
     return SegmentColumns(
         identity,
-        _integers(table, "revision", NO_TIME),
-        _integers(table, "commit", NO_TIME),
-        _integers(table, "committed", NO_TIME),
-        _codes(table, "cause", CAUSES),
-        _integers(table, "clock", NO_TIME),
-        _integers(table, "row", NO_TIME),
-        _codes(table, "kind", KINDS),
-        _codes(table, "op", OPS),
+        integers("revision"),
+        integers("commit"),
+        integers("committed"),
+        codes("cause", CAUSES),
+        integers("clock"),
+        integers("row"),
+        codes("kind", KINDS),
+        codes("op", OPS),
         keyed,
         keys,
-        points,
-        _integers(table, "event_time", NO_TIME),
-        _integers(table, "expire_time", FOREVER),
-        _details(table.column("detail")),
+        np.column_stack([_coordinates(table, name, order) for name in "xy"]),
+        integers("event_time"),
+        integers("expire_time", FOREVER),
+        _details(table.column("detail"), order),
     )
 
 
-def _details(column: pa.ChunkedArray) -> list[str | None]:
-    """Most rows have none, and few a file of them."""
-    return [None] * len(column) if column.null_count == len(column) else column.to_pylist()
+def _details(column: pa.ChunkedArray, order: Rows | None) -> list[str | None]:
+    if column.null_count == len(column):
+        return [None] * (len(column) if order is None else len(order))
+    codes, words = _coded(column)
+    said: list[str | None] = np.array([*words.to_pylist(), None], object)[_chosen(codes, order)].tolist()
+    return said
 
 
 def _optional(values: Integers, none: int, kind: pa.DataType) -> pa.Array:
@@ -274,28 +315,41 @@ def _words(codes: Codes, words: tuple[str, ...]) -> pa.Array:
     return pa.DictionaryArray.from_arrays(pa.array(codes, mask=codes == NONE), pa.array(words)).cast(pa.string())
 
 
-def _codes(table: pa.Table, name: str, words: tuple[str, ...]) -> Codes:
+def _coded(column: pa.ChunkedArray) -> tuple[npt.NDArray[np.int32], pa.Array]:
+    """Words as places in an array of different ones, which is the second; NONE for no word."""
     import pyarrow as pa
-    import pyarrow.compute as pc
 
-    column = table.column(name)
-    if column.null_count == len(column):
-        return np.full(len(column), NONE, np.int8)
-    codes = pc.index_in(column, value_set=pa.array(words))
-    if codes.null_count != column.null_count:
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    together = column.unify_dictionaries().combine_chunks()
+    codes: npt.NDArray[np.int32] = together.indices.cast(pa.int32()).fill_null(NONE).to_numpy()
+    return codes, together.dictionary
+
+
+def _codes(table: pa.Table, name: str, words: tuple[str, ...], order: Rows | None) -> Codes:
+    count = len(table) if order is None else len(order)
+    codes, there = _coded(table.column(name))
+    listed = there.to_pylist()
+    if any(each not in words for each in listed):
         raise ValueError(f"column {name} has an unknown word")
-    found: Codes = codes.fill_null(NONE).to_numpy().astype(np.int8)
-    return found
+    places = np.array([*(words.index(each) for each in listed), NONE], np.int8)
+    if len(codes) and codes.min() == codes.max():
+        return np.full(count, places[codes[0]])
+    return places[_chosen(codes, order)]
 
 
-def _integers(table: pa.Table, name: str, none: int) -> Integers:
+def _integers(table: pa.Table, name: str, none: int, order: Rows | None = None) -> Integers:
     import pyarrow as pa
 
     column = table.column(name)
     if column.null_count == len(column):
-        return np.full(len(column), none)
+        return np.full(len(column) if order is None else len(order), none)
     found: Integers = column.cast(pa.int64()).fill_null(none).to_numpy().astype(np.int64, copy=False)
-    return found
+    return _chosen(found, order)
+
+
+def _chosen(values: npt.NDArray[Value], order: Rows | None) -> npt.NDArray[Value]:
+    return values if order is None else values[order]
 
 
 def _by_key(columns: SegmentColumns) -> tuple[npt.NDArray[np.intp], pa.Array]:
@@ -341,13 +395,20 @@ def _ranked(keys: PackedKeys) -> tuple[npt.NDArray[Any], pa.Array]:
     return rank[codes], names.take(in_order)
 
 
-def _keys(column: pa.ChunkedArray, identity: Identity) -> tuple[npt.NDArray[np.bool_], Keys]:
+def _keys(column: pa.ChunkedArray, identity: Identity, order: Rows | None) -> tuple[npt.NDArray[np.bool_], Keys]:
     import pyarrow as pa
 
-    keyed = column.is_valid().to_numpy().astype(np.bool_)
-    there = column.drop_null().combine_chunks()
-    if identity == "int":
-        return keyed, there.cast(pa.uint64()).to_numpy()
+    if identity == "int" or not pa.types.is_dictionary(column.type):
+        some = column.combine_chunks() if order is None else column.combine_chunks().take(pa.array(order))
+        keyed = some.is_valid().to_numpy(zero_copy_only=False).astype(np.bool_)
+        there = some.drop_null()
+        if identity == "int":
+            return keyed, there.cast(pa.uint64()).to_numpy()
+    else:
+        codes, words = _coded(column)
+        codes = _chosen(codes, order)
+        keyed = codes != NONE
+        there = words.take(pa.array(codes[keyed]))
     _, offsets, data = there.cast(pa.string()).buffers()
     ends = np.frombuffer(offsets, np.int32, len(there) + 1, 4 * there.offset) if offsets else np.zeros(1, np.int32)
     lengths = np.diff(ends).astype(np.uint8)
@@ -377,13 +438,14 @@ def _as_whole(values: npt.NDArray[np.float64], scale: int) -> Integers | None:
     return whole.astype(np.int64) if np.array_equal(back.view(np.int64), values.view(np.int64)) else None
 
 
-def _coordinates(table: pa.Table, name: str) -> npt.NDArray[np.float64]:
+def _coordinates(table: pa.Table, name: str, order: Rows | None) -> npt.NDArray[np.float64]:
     import pyarrow as pa
 
     column = table.column(name)
     scale = (table.schema.field(name).metadata or {}).get(SCALE)
     if scale is None:
         found: npt.NDArray[np.float64] = column.cast(pa.float64()).fill_null(np.nan).to_numpy().astype(np.float64)
-        return found
+        return _chosen(found, order)
     whole = column.cast(pa.int64()).fill_null(0).to_numpy() / int(scale)
-    return np.where(column.is_valid().to_numpy().astype(np.bool_), whole, np.nan)
+    whole[~column.is_valid().to_numpy().astype(np.bool_)] = np.nan
+    return _chosen(whole, order)
