@@ -11,6 +11,7 @@ from ..state.records import Contents, Keys, Times
 from ..state.tracks import EXPIRE, NO_KEY, PUT, REMOVE, KeyChanges
 from .segments import columns as segment
 from .segments.columns import SegmentColumns
+from .segments.gathered import key_codes
 
 
 def contents_of_keys(contents: Contents, keys: Keys) -> tuple[npt.NDArray[np.int32], Contents]:
@@ -49,36 +50,19 @@ def changes_of_keys(columns: SegmentColumns, keys: Keys) -> KeyChanges:
 
 def _places(keys: Keys, wanted: Keys) -> npt.NDArray[np.int32]:
     """The place of each key among those that are wanted; NO_KEY for others. O(size of the keys)."""
-    found = np.full(len(keys), NO_KEY, np.int32)
-    if not isinstance(keys, PackedKeys):
-        _find(found, np.arange(len(keys)), keys, np.asarray(wanted), np.arange(len(wanted)))
+    if isinstance(keys, PackedKeys):
+        packed = PackedKeys.pack(key_list(wanted))
+        codes = key_codes(PackedKeys(packed.lengths + keys.lengths, packed.data + keys.data))
+        of_codes = np.full(int(codes.max(initial=-1)) + 1, NO_KEY, np.int32)
+        of_codes[codes[: len(packed)]] = np.arange(len(packed))
+        found: npt.NDArray[np.int32] = of_codes[codes[len(packed) :]]
         return found
-    lengths = np.frombuffer(keys.lengths, np.uint8)
-    data, starts = np.frombuffer(keys.data, np.uint8), np.cumsum(lengths, dtype=np.int64) - lengths
-    texts = [str(key).encode() for key in key_list(wanted)]
-    for length in {len(text) for text in texts}:
-        rows = np.flatnonzero(lengths == length)
-        alike = [place for place, text in enumerate(texts) if len(text) == length]
-        # Bytes of numpy end before zeros; but of two texts of the same length these are not what differs.
-        these = data[starts[rows, np.newaxis] + np.arange(length)].view(f"S{length}").ravel()
-        _find(found, rows, these, np.array([texts[place] for place in alike], f"S{length}"), np.array(alike))
-    return found
-
-
-def _find(
-    found: npt.NDArray[np.int32],
-    rows: npt.NDArray[np.intp],
-    keys: npt.NDArray[np.generic],
-    wanted: npt.NDArray[np.generic],
-    places: npt.NDArray[np.intp],
-) -> None:
-    """Write the place of each key that is wanted, in some rows."""
-    if not len(wanted):
-        return
-    order = np.argsort(wanted)
-    at = np.minimum(np.searchsorted(wanted[order], keys), len(wanted) - 1)
-    there = wanted[order][at] == keys
-    found[rows[there]] = places[order[at[there]]]
+    order = np.argsort(wanted).astype(np.int32)
+    if not len(order):
+        return np.full(len(keys), NO_KEY, np.int32)
+    values = np.asarray(wanted)[order]
+    at = np.minimum(np.searchsorted(values, keys), len(order) - 1)
+    return np.where(values[at] == keys, order[at], np.int32(NO_KEY))
 
 
 def _rows(times: Times | None, which: npt.NDArray[np.bool_]) -> Times | None:

@@ -8,6 +8,7 @@ way of one key is one read, and so that numbers differ little from those before 
 from __future__ import annotations
 
 from bisect import bisect_left
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -62,6 +63,7 @@ ORDER = (
     "row",
 )
 WORDS: tuple[str, ...] = ("cause", "kind", "op", "key")
+CODED = ("key", "cause", "kind", "op", "detail")  # what is read as places in a list of words
 # Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
 SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
 SHARED = 4  # rows of a commit, on average, from which on its time is an index into those of all
@@ -144,10 +146,18 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
         DamagedError: it is no file of ours, or of a newer version.
     """
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
     try:
         file = _opened(pa.BufferReader(data), name)
         found = file.schema_arrow.metadata
+        if STATE in found:  # of a state every key is another one
+            file = pq.ParquetFile(
+                pa.BufferReader(data),
+                metadata=file.metadata,
+                read_dictionary=CODED[1:],
+                page_checksum_verification=True,
+            )
         table = file.read()
         return _columns(table, found, _order(table)), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
@@ -166,13 +176,7 @@ def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentCol
         file = _opened(pa.PythonFile(source, mode="r"), name)
         found = file.schema_arrow.metadata
         values = sorted(key_list(keys))
-        column = file.schema_arrow.names.index("key")
-        groups = [
-            place
-            for place in range(file.num_row_groups)
-            if _may_have(file.metadata.row_group(place).column(column), values)
-        ]
-        table = file.read_row_groups(groups, use_threads=False)
+        table = file.read_row_groups(_groups(file, values), use_threads=False)
         return _columns(table, found, _of_keys(table, values)), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
@@ -182,24 +186,34 @@ def _opened(source: pa.NativeFile, name: str) -> pq.ParquetFile:
     """A file whose words are read as places in a list of them. DamagedError if it is none of ours, or too new."""
     import pyarrow.parquet as pq
 
-    metadata = pq.read_metadata(source)
-    found = metadata.metadata or {}
+    file = pq.ParquetFile(source, read_dictionary=CODED, page_checksum_verification=True)
+    found = file.schema_arrow.metadata or {}
     if FORMAT not in found:
         raise DamagedError(f"{name} is a Parquet file of another program")
     if int(found[FORMAT]) > VERSION:
         raise DamagedError(f"{name} has format {int(found[FORMAT])}, this version reads {VERSION}")
-    # Of a state every key is another one.
-    words = [each for each in (*WORDS, "detail") if each != "key" or STATE not in found]
-    return pq.ParquetFile(source, metadata=metadata, read_dictionary=words, page_checksum_verification=True)
+    return file
 
 
-def _may_have(column: pq.ColumnChunkMetaData, values: list[Any]) -> bool:
-    """Whether a group of rows, which lie by key, may have one with these keys, which are in order, or with none."""
-    statistics = column.statistics
-    if statistics is None or not statistics.has_min_max or statistics.null_count:
-        return True
-    after = bisect_left(values, statistics.min)
-    return after < len(values) and values[after] <= statistics.max
+def _groups(file: pq.ParquetFile, values: list[Any]) -> list[int]:
+    """The groups of rows, which lie by key, that may have one with these keys, or with none: these are the last."""
+    column, places = file.schema_arrow.names.index("key"), range(file.num_row_groups)
+
+    @cache
+    def ends(place: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """The least key and the greatest: what is less than any, and more than any, where that is not known."""
+        statistics = file.metadata.row_group(place).column(column).statistics
+        if statistics is None or not statistics.has_min_max:
+            return (0,), (1,)
+        return (0, statistics.min), (1,) if statistics.null_count else (0, statistics.max)
+
+    found = set(places[bisect_left(places, (1,), key=lambda place: ends(place)[1]) :])
+    for value in values:
+        place = bisect_left(places, (0, value), key=lambda place: ends(place)[1])
+        while place < len(places) and ends(place)[0] <= (0, value):
+            found.add(place)
+            place += 1
+    return sorted(found)
 
 
 def _about(found: dict[bytes, bytes]) -> dict[str, str]:
