@@ -651,8 +651,7 @@ class Model:
             carried = truth.requests.get(revision)
             if revision != applied.revision or carried is None:
                 continue
-            too_old = carried.dropped & releases if applied.clamped else set()
-            expected = (carried.waited & releases) - too_old, carried.waited & drops | too_old
+            expected = carried.waited & releases, carried.waited & drops
             missing = len(releases | drops) - len(carried.released | carried.dropped)
             said = applied.released, applied.dropped, applied.missing
             if (carried.released, carried.dropped) == expected and said == (*map(len, expected), missing):

@@ -48,7 +48,14 @@ def too_old(settings: HullSettings, clock: int | None) -> int | None:
 
 
 def admit(
-    settings: HullSettings, times: Times | None, rows: int, field: str, arrived: int, clock: int | None
+    settings: HullSettings,
+    times: Times | None,
+    rows: int,
+    field: str,
+    arrived: int,
+    clock: int | None,
+    *,
+    held: bool = False,
 ) -> Admission:
     """Admit the rows of a batch.
 
@@ -59,6 +66,8 @@ def admit(
         field: the field of the batch that has the times.
         arrived: the time of their arrival.
         clock: the clock of the hull.
+        held: whether the rows are released from quarantine. How far their times were ahead was judged when they came,
+            by a clock that may have been set back since.
 
     Raises:
         InvalidBatchError: times are required, or a time is further ahead than the hull allows.
@@ -72,7 +81,7 @@ def admit(
     if window is None:
         return Admission(times, clock)
     admission = Admission(np.full(rows, arrived, np.int64) if times is None else times, clock)
-    if times is not None and window.max_skew is not None:
+    if times is not None and window.max_skew is not None and not held:
         _limit_skew(admission, arrived + window.max_skew, field, clamps=window.clamps)
     assert admission.times is not None  # a hull with a window has times
     if window.clock == "server":

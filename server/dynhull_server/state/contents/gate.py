@@ -143,9 +143,7 @@ class Gate:
         unwanted = [] if request.drops is None else key_list(request.drops)
         left = [key for key in (*wanted, *unwanted) if quarantine is not None and key in quarantine]
         rows.held = HeldChange(rows_of(no_keys(self._kind), []), of_kind(left, no_keys(self._kind)), request.rules)
-        # A position that is clamped after the clock of the machine was set back may be too old: it is dropped.
-        let_in = set(key_list(rows.keys))
-        released = sum(key in let_in for key in wanted)
+        released = sum(quarantine is not None and key in quarantine for key in wanted)
         return Verdict([], released, len(left) - released, 0, len(wanted) + len(unwanted) - len(left))
 
     def follow(self, change: HeldChange) -> None:

@@ -147,7 +147,8 @@ class Keyed:
             batch = self._gate.opened(batch, self.globe)
         quarantine = self.quarantine
         rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
-        admission = admit(self._settings, batch.times, len(batch.keys), "puts.times", arrived, self.clock)
+        held, puts = batch.of_quarantine, len(batch.keys)
+        admission = admit(self._settings, batch.times, puts, "puts.times", arrived, self.clock, held=held)
         rows.times = admission.times
         if rows.times is None and quarantine is not None and quarantine.rules.max_speed is not None:
             rows.times = np.full(len(rows.keys), arrived, np.int64)
@@ -158,14 +159,14 @@ class Keyed:
         late = 0
         if admission.young is not None:
             refuse_repeated(rows)
-            if not batch.of_quarantine:  # a released position that has just become too old is missing
+            if not held:  # a released position that has just become too old is missing
                 late = len(rows.keys) - int(np.count_nonzero(admission.young))
             rows = selected(rows, admission.young)
         admitted = AdmittedPuts(rows, admission.clock, late, admission.clamped, batch.refuse_missing, admission.young)
-        if batch.of_quarantine:
+        if held:
             admitted.request = batch
-        held = 0 if quarantine is None else len(quarantine)
-        if len(self.hull) + held + len(rows.keys) > self._most_points:
+        waiting = 0 if quarantine is None else len(quarantine)
+        if len(self.hull) + waiting + len(rows.keys) > self._most_points:
             self._refuse_growth(admitted)
         return admitted
 
