@@ -71,10 +71,11 @@ class Served:
 
 
 @contextmanager
-def serving(folder: Path, *options: str) -> Iterator[Served]:
-    with subprocess.Popen(
-        [sys.executable, *COMMAND, "--data", str(folder), *options], stdout=subprocess.PIPE, text=True
-    ) as process:
+def serving(folder: Path | None, *options: str) -> Iterator[Served]:
+    """A server of its own, in memory without a folder."""
+    place = ["--in-memory"] if folder is None else ["--data", str(folder)]
+    command = [sys.executable, *COMMAND, *place, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
             address = process.stdout.readline().split()[-1]
