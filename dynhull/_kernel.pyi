@@ -471,6 +471,11 @@ def turnings_if_valid(rings: list[dynhull.arrays.Points]) -> list[int]:
     Of each ring of a polygon, +1 if its inside is on the left, -1 if on the right. Empty if a ring is not simple, or is a hole that is not inside the first one or overlaps another.
     """
 
+def sign_of_measure(vertices: dynhull.arrays.Points, measure: str, bound: float) -> int | None:
+    """
+    The sign of the area, the diameter or the width of a hull less a bound that is not negative; None where rounding might decide, or of many vertices. O(h), or O(h²) of few.
+    """
+
 def plain_difference_of_products(a: float, b: float, c: float, d: float) -> float:
     """
     a * b - c * d with three roundings, as the predicates' filters compute it: tests the compiler's flags.

@@ -5,6 +5,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import Literal
 
+from .._implementation import kernel
 from ..arrays import Points
 from ._area import doubled_area
 from ._extent import squared_diameter, squared_width
@@ -18,6 +19,8 @@ Compared = Literal["area", "diameter", "width"]
 
 def compare(vertices: Points, measure: Compared, bound: float) -> int:
     """The sign of a measure less a bound that is not negative: -1, 0 or 1, exact. O(h log h), O(h) for the area."""
+    if kernel is not None and (sign := kernel.sign_of_measure(vertices, measure, bound)) is not None:
+        return sign
     if measure == "area":
         return _compare_area(vertices, bound)
     if 2 < len(vertices) <= FEW:

@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "../fence/valid_rings.hpp"
+#include "../query/certain_sign.hpp"
 #include "../static/chan.hpp"
 #include "../static/static_hull.hpp"
 #include "fences.hpp"
@@ -40,6 +41,10 @@ std::vector<int> turnings(const std::vector<Rows>& rings) {
   std::optional<nb::gil_scoped_release> release;
   if (corners.size() > FEW_ROWS) release.emplace();
   return RingSweep(corners, sizes).turnings();
+}
+
+std::optional<int> sign_of_measure(const Rows& vertices, std::string_view measure, double bound) {
+  return certain_sign({points_of(vertices), vertices.shape(0)}, measure.empty() ? ' ' : measure[0], bound);
 }
 
 std::optional<PointArray> convex_hull(const Rows& xy, std::optional<bool> discard, std::optional<bool> threads) {
@@ -313,6 +318,11 @@ void add_predicates(nb::module_& module) {
              nb::sig("def turnings_if_valid(rings: list[dynhull.arrays.Points]) -> list[int]"), "rings"_a,
              "Of each ring of a polygon, +1 if its inside is on the left, -1 if on the right. Empty if a ring is not "
              "simple, or is a hole that is not inside the first one or overlaps another.");
+  module.def("sign_of_measure", &sign_of_measure,
+             nb::sig("def sign_of_measure(vertices: dynhull.arrays.Points, measure: str, bound: float) -> int | None"),
+             "vertices"_a, "measure"_a, "bound"_a,
+             "The sign of the area, the diameter or the width of a hull less a bound that is not negative; None where "
+             "rounding might decide, or of many vertices. O(h), or O(h²) of few.");
   module.def("plain_difference_of_products", &difference_of_products, "a"_a, "b"_a, "c"_a, "d"_a,
              "a * b - c * d with three roundings, as the predicates' filters compute it: tests the compiler's flags.");
 }
