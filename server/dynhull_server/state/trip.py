@@ -210,11 +210,13 @@ class Trip:
         elif hull.divided:  # it is created by the same trip, so the batch came before the hull
             raise HullNotFoundError(leg.name)
         expired = None
-        if self.fences is not None or self.quiet is not None:
+        if (self.fences is not None or self.quiet is not None) and hull.state.contents.clock is not None:
             expired = partial(self._expired_before, hull, request.write.arrived)
         applied = write(request, hull, self._now, leg.records, expired)
         self.torn = hull.state.torn
-        fences = self._fences_at(hull, request.write.arrived)
+        fences = self.fences
+        if self.quiet is not None and (applied is None or applied.hull_changed or self.quiet.line.restless):
+            fences = self._fences_at(hull, request.write.arrived)
         if fences is not None:
             fences.wrote(leg, hull, applied, request.write.arrived)
         if applied is None:

@@ -5,6 +5,8 @@ from functools import cached_property
 
 from .conditions import SILENT, Condition, condition_of
 
+# What a batch that leaves the outline as it is cannot change.
+OF_OUTLINES = frozenset({"area", "perimeter", "diameter", "width", "vertices"})
 # Alarms and fences have names of their own: no name of a fence has a colon.
 MARK = "alarm:"
 MICROSECONDS = 10**6
@@ -43,6 +45,11 @@ class AlarmRule:
     def of_points(self) -> bool:
         """Whether it compares the number of points, which may change with the vertices as they are."""
         return self.raises.measure == "count"
+
+    @cached_property
+    def of_outline(self) -> bool:
+        """Whether nothing but a change of the outline means anything for it."""
+        return self.raises.measure in OF_OUTLINES
 
     def suits(self, *, geographic: bool) -> bool:
         """Whether hulls in the plane, or on the globe, have its measure."""

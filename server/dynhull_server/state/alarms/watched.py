@@ -68,7 +68,7 @@ class Watched:
         if self._rule.silence:
             self._points = state.counts.revision  # whatever it has changed
         elif not self._rule.of_points:
-            self._vertices = state.vertices()
+            self._vertices = state.hull.vertices()  # `state.vertices` keeps them for watches that resume, too
 
     @property
     def waits(self) -> bool:

@@ -11,6 +11,7 @@ from ..registry import Registry
 from ..requests import CreateHull, Request, WriteBatch
 from ..schedule import Schedule
 from ..trip import Quiet, Trip
+from .index.line import Line
 from .model.fence import Fence
 from .model.records import KeptFence
 from .model.requests import CreateFence, FenceRequest, PassTime
@@ -83,19 +84,30 @@ class FenceCore:
 
     def _quiet_trip(self, queues: Sequence[Queue], requests: list[Request], now: float, pause: float) -> Trip | None:
         """A trip of batches to hulls with alarms alone, which gets a part for these once one is touched; else None."""
-        line, hulls, registry = queues[0].line, self._registry.hulls, self._registry
+        line, hulls = queues[0].line, self._registry.hulls
         if line is None or len(queues) > 1 or not line.has_only_alarms:
             return None
-        names = {request.name: None for request in requests if type(request) is WriteBatch and request.name in hulls}
-        if any(type(request) is not WriteBatch or request.name not in names for request in requests):
+        legs: dict[str, Leg] = {}
+        weight = 0
+        for request in requests:
+            if type(request) is not WriteBatch:
+                return None
+            name = request.name
+            if name not in legs:
+                hull = hulls.get(name)
+                if hull is None:
+                    return None
+                weight += line.weight(name)
+                legs[name] = Leg(name, hull, keeps=self._keeps)
+        if weight > QUIET_WEIGHT:
             return None
-        if sum(map(line.weight, names)) > QUIET_WEIGHT:
-            return None
-        legs = {name: Leg(name, hulls[name], keeps=self._keeps) for name in names}
         trip = Trip(legs, requests, now, pause, {})
-        ground = partial(Ground, legs, [line], {}, {}, registry.tallies, registry.limits.fences)
-        trip.quiet = Quiet(line, lambda: FencePart(ground(), requests))
+        trip.quiet = Quiet(line, partial(self._quiet_part, line, legs, requests))
         return trip
+
+    def _quiet_part(self, line: Line, legs: dict[str, Leg], requests: list[Request]) -> FencePart:
+        registry = self._registry
+        return FencePart(Ground(legs, [line], {}, {}, registry.tallies, registry.limits.fences), requests)
 
     def _reserve(self, request: CreateFence, numbers: dict[str, int]) -> None:
         number = self._registry.reserve_fence(alarm=request.config.rule is not None)

@@ -70,6 +70,7 @@ class Line:
         areas: the hulls that are areas of keys, by name.
         pairs: the fences that compare a hull as a whole with another one, by the names of both.
         alarms: the alarms at a hull, by its name.
+        restless: the number of alarms to which a batch may mean something that leaves the outline as it is.
     """
 
     def __init__(self, fences: Iterable[Fence], names: Iterable[str]) -> None:
@@ -79,12 +80,14 @@ class Line:
         self.areas: dict[str, AreaHull] = {}
         self.pairs: dict[str, list[Fence]] = {}
         self.alarms: dict[str, list[Fence]] = {}
+        self.restless = 0
         for fence in fences:
             self.add(fence)
 
     def add(self, fence: Fence) -> None:
         """Add a fence that has compared the hulls as they are now."""
         self.fences[fence.name] = fence
+        self.restless += _is_restless(fence)
         self.subjects.update(fence.subjects)
         for name in () if fence.watched is None else fence.watched.of:
             self.alarms.setdefault(name, []).append(fence)
@@ -100,6 +103,7 @@ class Line:
     def remove(self, fence: Fence) -> None:
         """Remove a fence, after its subjects have dropped it."""
         del self.fences[fence.name]
+        self.restless -= _is_restless(fence)
         for name, subjects in fence.subjects.items():
             if not subjects.fences:
                 self.subjects.pop(name, None)  # or another of the fences that are removed has done it
@@ -135,8 +139,11 @@ class Line:
 
     def touched(self, hull: Hull, now: int) -> bool:
         """Whether a new revision of a hull may mean anything for one of the alarms at it: as a rule it does not."""
-        found = [watched.touched(now) for _, watched in self.watching([hull.name])]
-        return any(found)
+        name, found = hull.name, False
+        for fence in self.alarms.get(name, ()):
+            if fence.watched is not None and fence.watched.of[name].touched(now):
+                found = True  # the others take note of the revision, too
+        return found
 
     def watching(self, names: Iterable[str]) -> Iterator[tuple[Fence, Watched]]:
         """The alarms at the hulls with these names."""
@@ -216,3 +223,8 @@ class Line:
             crossings = subjects.take()
             if len(crossings):
                 yield subjects, crossings
+
+
+def _is_restless(fence: Fence) -> bool:
+    rule = fence.row.config.rule
+    return rule is not None and not rule.of_outline

@@ -1,0 +1,80 @@
+"""What alarms cost batches: counted, not timed."""
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from live_engine import LIMITS
+
+import dynhull
+from dynhull.keys import PackedKeys
+from dynhull.measure import _comparison
+from dynhull_server.state.alarms import watched
+from dynhull_server.state.alarms.rule import AlarmRule, marked
+from dynhull_server.state.batch import KeyedBatch, Write
+from dynhull_server.state.core import Core
+from dynhull_server.state.events import Arrived, Commit, Committed, Event
+from dynhull_server.state.fences.model.config import FenceConfig
+from dynhull_server.state.fences.model.requests import CreateFence
+from dynhull_server.state.records import HullSettings
+from dynhull_server.state.requests import Birth, CreateHull, WriteBatch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+HULLS = [f"fleet/{number}" for number in range(4)]
+BATCHES = 20
+CREATED = Birth("uid", 0.0)
+CORNERS = {"a": (0, 0), "b": (4, 0), "c": (4, 3), "d": (0, 3)}
+
+
+def moved(hull: str, places: dict[str, tuple[float, float]]) -> WriteBatch:
+    batch = KeyedBatch(
+        "str", PackedKeys.pack(list(places)), np.array(list(places.values()), float), PackedKeys.pack([])
+    )
+    return WriteBatch(None, Write(hull, batch, 1))
+
+
+def step(core: Core, event: Event) -> None:
+    for effect in core.step(event):
+        if isinstance(effect, Commit) and effect.ticket is not None:
+            step(core, Committed(effect.ticket))
+
+
+def counted(monkeypatch: pytest.MonkeyPatch, counts: "Counter[str]", where: Any, name: str) -> None:
+    function: Callable[..., Any] = getattr(where, name)
+
+    def count(*args: Any, **options: Any) -> Any:
+        counts[name] += 1
+        return function(*args, **options)
+
+    monkeypatch.setattr(where, name, count)
+
+
+@pytest.mark.parametrize("prefix", [False, True])
+@pytest.mark.parametrize("measure", ["area", "diameter", "width", "perimeter", "vertices"])
+def test_a_batch_that_leaves_the_outline_costs_nothing(
+    monkeypatch: pytest.MonkeyPatch, measure: str, *, prefix: bool
+) -> None:
+    core, counts = Core(LIMITS), Counter[str]()
+    for hull in HULLS:
+        step(core, CreateHull(None, hull, CREATED, HullSettings("str")))
+        step(core, moved(hull, CORNERS | {"inside": (1, 1)}))
+    rule = AlarmRule(f"{measure} > 1000", f"{measure} <= 1000")
+    for kind, subjects in [("prefix", "fleet/")] if prefix else [("other", hull) for hull in HULLS]:
+        step(core, CreateFence(None, marked(subjects), 1, FenceConfig(rule, kind, subjects), CREATED))
+    counted(monkeypatch, counts, watched, "sign_of")
+    counted(monkeypatch, counts, watched.Watched, "touched")
+    counted(monkeypatch, counts, _comparison, "_sign")
+    for number in range(BATCHES):
+        for hull in HULLS:
+            step(core, moved(hull, {"inside": (1 + number / BATCHES, 1)}))
+            step(core, Arrived([moved(hull, {"inside": (2, 1)}), moved(hull, {"inside": (1, 2)})]))
+    assert counts == {}
+    for number in range(BATCHES):
+        step(core, moved(HULLS[0], {"c": (4, 4 + number)}))
+    exactly = 0 if dynhull.KERNEL == "cpp" or measure not in ("diameter", "width") else BATCHES
+    assert counts == Counter(touched=BATCHES, sign_of=BATCHES) + Counter(_sign=exactly)
+    for hull in HULLS:
+        assert core.get(hull).counts.revision == 1 + 3 * BATCHES + (BATCHES if hull == HULLS[0] else 0)
