@@ -140,6 +140,10 @@ class Gnomonic:
         angles: Floats = np.degrees(np.arctan2(np.hypot(x, y), z))
         return angles
 
+    def vectors(self, lonlat: Points) -> npt.NDArray[np.float64]:
+        """(k, 3) unit vectors of (k, 2) places anywhere: east, north and up, as seen from the centre. O(k)."""
+        return np.column_stack(self._vectors(lonlat))
+
     def _vectors(self, lonlat: Points) -> tuple[Floats, Floats, Floats]:
         """East, north and up, as seen from the centre.
 

@@ -16,6 +16,7 @@ from ._ellipsoid import Boundary, area, diameter, distance, perimeter
 from ._flat_map import boundary, geojson
 from ._globe import REACH, Gnomonic, as_center, as_lonlat
 from ._globe_extent import bounds, label_point
+from ._globe_part import project_far, project_hull
 from ._globe_sketch import sketch
 
 __all__ = [
@@ -32,5 +33,7 @@ __all__ = [
     "geojson",
     "label_point",
     "perimeter",
+    "project_far",
+    "project_hull",
     "sketch",
 ]

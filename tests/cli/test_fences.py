@@ -123,6 +123,9 @@ def test_a_radius_on_the_globe_is_in_metres(name: str) -> None:
     assert dynhull("create", name, "--keyed", "str", "--geographic", "--center", "13,52").exit_code == 0
     ran("create", name, "--circle", 13.4, 52.5, 20000, "--subjects", name)
     assert ran("show", name)[0] == "area\tcircle around (13.4, 52.5), radius 20 km"
+    ran("create", f"{name}-all", "--circle", 13.4, 52.5, 20000, "--subject-prefix", name)
+    assert ran("show", f"{name}-all")[0].endswith("radius 20 km")
+    ran("delete", f"{name}-all", "--yes")
     assert dynhull("create", f"{name}-plane", "--keyed", "str").exit_code == 0
     ran("create", f"{name}-plane", "--circle", 13.4, 52.5, 0.2, "--subjects", f"{name}-plane")
     assert ran("show", f"{name}-plane")[0].endswith("radius 0.2")

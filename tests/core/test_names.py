@@ -24,6 +24,7 @@ PACKAGES = {
     "dynhull.globe": {
         *("REACH", "Boundary", "Gnomonic", "area", "as_center", "as_lonlat", "boundary", "bounds"),
         *("diameter", "distance", "geojson", "label_point", "perimeter", "sketch"),
+        *("project_far", "project_hull"),
     },
     "dynhull.gjk": {"Contact", "contact", "distance_many", "intersect", "intersect_many"},
     "dynhull.measure": {

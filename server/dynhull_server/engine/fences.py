@@ -26,6 +26,7 @@ from ..state.fences.model.requests import (
     TrimEvents,
 )
 from ..state.fences.trip.leg import members
+from ..state.frames import Globe
 from ..state.registry import page_of
 from ..storage.port import Storage, StorageError
 from .driver import Driver
@@ -224,17 +225,25 @@ class Fences:
         area = config.area
         if not isinstance(area, PolygonArea):
             return None
-        try:
-            subjects = None if config.kind == "prefix" else self._driver.core.get(config.subjects).state
-        except HullNotFoundError:
-            subjects = None
-        globe = None if subjects is None else subjects.contents.globe
+        frames = self._frames(config)
         await self._checks.acquire()
-        checking = asyncio.ensure_future(self._driver.aside(partial(check_polygons, area, globe)))
+        checking = asyncio.ensure_future(self._driver.aside(partial(check_polygons, area, frames)))
         checking.add_done_callback(lambda _: self._checks.release())
         # A caller who leaves does not end it, nor free its thread.
         checked: CheckedArea = await asyncio.shield(checking)
         return checked
+
+    def _frames(self, config: FenceConfig) -> list[Globe | None]:
+        """Those in which the area of a fence is checked, until it is valid in one."""
+        hulls = self._driver.core.hulls
+        if config.kind != "prefix":
+            hull = hulls.get(config.subjects)
+            return [None if hull is None else hull.state.contents.globe]
+        for name in hulls.irange(config.subjects, f"{config.subjects}\U0010ffff"):
+            settings = hulls[name].row.settings
+            if settings.identity != "multiset":
+                return [Globe(None) if settings.geographic else None]
+        return [None, Globe(None)]
 
     def _rows(self, config: FenceConfig) -> int:
         """The number of subjects, about; of an alarm, about as many rows of a batch as take as long as its hulls."""

@@ -319,6 +319,8 @@ class Trip:
             raise place.refusal
         assert birth is not None  # otherwise the request was refused
         settings = request.settings if isinstance(request, CreateHull) else settings_for(request.write.batch)
+        if self.fences is not None:
+            settings = self.fences.settled(leg.name, settings)
         row = HullRow(place.number, leg.name, birth.uid, birth.created, settings)
         hull = Hull(row, state_of(place.limits, settings, Kept(), self._now))
         if self.fences is not None:

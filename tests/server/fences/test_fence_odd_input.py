@@ -262,7 +262,8 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
         "1.0",
     ),
     "no centre": (create(subject_hull="odd/ships", hull_area={"name": "odd/nowhere"}), FAILED, "", "odd/nowhere"),
-    "a prefix of the globe": (create(subject_prefix="odd/ship"), FAILED, "", "odd/ships"),
+    "a prefix of both": (create(subject_prefix="odd/"), FAILED, "", "odd/fleet"),
+    "a margin over a prefix": (create(subject_prefix="odd/ship", margin=1), INVALID, "config.margin", "1.0"),
     "another centre": (create(subject_hull="odd/ships", hull_area={"name": "odd/atlantic"}), FAILED, "", "odd/ships"),
     "an area of the plane": (
         create(subject_hull="odd/ships", hull_area={"name": "odd/points"}),

@@ -117,9 +117,9 @@ def _remark_on_degrees(client: "HullClient", fence: "Fence") -> None:
     area = fence.area
     if not isinstance(area, Circle) or abs(area.x) > 180 or abs(area.y) > 90 or area.r <= 360:
         return
-    from .shown import unit_of
+    from .shown import is_geographic
 
-    if not unit_of(client, fence):
+    if is_geographic(client, fence) is False:
         typer.echo(
             f"{fence.name} is in the plane, where {area.r:g} is in the units of x and y: if these are degrees, "
             "`dynhull create NAME --geographic` makes a hull on the globe, where the radius is in metres",

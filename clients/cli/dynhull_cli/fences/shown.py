@@ -31,14 +31,18 @@ def event_members(event: FenceEvent) -> dict[str, Any]:
     return {name: value for name, value in found.items() if value or (value is not None and name in MAY_BE_EMPTY)}
 
 
+def is_geographic(client: HullClient, fence: Fence) -> bool | None:
+    """Whether a fence that compares keys is on the globe; None while its prefix has no hull with keys."""
+    if isinstance(fence.subjects, Prefix):
+        hull = next((each for each in client.list_hulls(fence.subjects.text) if each.keyed), None)
+    else:
+        hull = None if fence.subjects is None else known_hull(client, fence.subjects)
+    return None if hull is None else hull.geographic
+
+
 def unit_of(client: HullClient, fence: Fence) -> str:
-    """The unit of lengths of a fence on the globe; empty in the plane, whose unit nobody knows."""
-    if not isinstance(fence.area, Circle) or not isinstance(
-        fence.subjects, str
-    ):  # those with a prefix are in the plane
-        return ""
-    hull = known_hull(client, fence.subjects)
-    return " m" if hull is not None and hull.geographic else ""
+    """The unit of the lengths of a circle on the globe; empty in the plane, whose unit nobody knows."""
+    return " m" if isinstance(fence.area, Circle) and is_geographic(client, fence) else ""
 
 
 def area_text(fence: Fence, unit: str = "") -> str:

@@ -12,7 +12,7 @@ from dynhull.keys import Keys, key_list
 from .key_rows import update
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Container, Iterable, Sequence
 
     from ..records import KeyRows
 
@@ -39,6 +39,7 @@ class Mirror:
         places = self.project(points)
         self.plane = KeyedHull.from_entities(keys, places, times, hull.key_type, ordered=hull.ordered)
         self._previous: dict[Key, Position] = {}
+        self._strangers: set[Key] = set()
         self.inside: Callable[[], Iterable[Keys]] = tuple
 
     def project(self, points: Points) -> Points:
@@ -53,10 +54,21 @@ class Mirror:
             if held:
                 self._previous.setdefault(key, (lon, lat))
 
-    def take_previous(self) -> dict[Key, Position]:
-        """Where keys were, in degrees, that have changed since this was last called."""
-        previous, self._previous = self._previous, {}
-        return previous
+    def bring(self, source: "Mirror", keys: "Iterable[Key]") -> None:
+        """Take over where keys were that have come from another hull, as long as that has not been taken there."""
+        brought = {key: source._previous[key] for key in keys if key in source._previous}
+        self._previous |= brought
+        if source._frame.center != self._frame.center:
+            self._strangers |= brought.keys()
+
+    def take_previous(self) -> "tuple[dict[Key, Position], Container[Key]]":
+        """Where keys were, in degrees, that have changed since this was last called.
+
+        And those of them that were in another plane, so that nobody knows what is between.
+        """
+        previous, strangers = self._previous, self._strangers
+        self._previous, self._strangers = {}, set()
+        return previous, strangers
 
     def note_inside(self) -> None:
         """Take note of where those keys are that may leave."""

@@ -1,5 +1,6 @@
 """Polygons of areas that are checked before a fence is laid, so that other changes do not wait meanwhile."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dynhull.globe import Gnomonic
@@ -30,11 +31,22 @@ class CheckedArea:
         return self.found
 
 
-def check_polygons(area: PolygonArea, globe: Globe | None) -> CheckedArea:
-    """Check the polygons of an area, in the frame of a geographic hull or in the plane.
+def check_polygons(area: PolygonArea, frames: Sequence[Globe | None]) -> CheckedArea:
+    """Check the polygons of an area, in the first frame in which they are valid.
 
-    A hull without a centre gets the middle of the area.
+    Args:
+        area: the area.
+        frames: those of geographic hulls, and None for the plane. A hull without a centre gets the middle of the area.
     """
+    first, *others = frames
+    checked = _check(area, first)
+    if isinstance(checked.found, str):
+        again = (_check(area, globe) for globe in others)
+        return next((each for each in again if not isinstance(each.found, str)), checked)
+    return checked
+
+
+def _check(area: PolygonArea, globe: Globe | None) -> CheckedArea:
     frame: Gnomonic | None = None
     found: CheckedPolygons | str
     try:

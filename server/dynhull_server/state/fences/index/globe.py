@@ -8,7 +8,7 @@ import numpy as np
 from dynhull.arrays import Points
 from dynhull.convex import Cloud
 from dynhull.gjk import intersect
-from dynhull.globe import Gnomonic, distance
+from dynhull.globe import REACH, Gnomonic, distance, project_far
 
 from ...errors import HullUnsuitableError, InvalidFenceError
 from ...frames import off_globe, out_of_reach
@@ -22,38 +22,46 @@ CIRCLE_CORNERS = 720
 # Metres between places that are as far from each other as possible.
 HALF_ROUND = 20_003_931.5
 
+PAIR = 2
 POLE, ROUND = 90, 360  # degrees
+# Degrees by which an area is beyond reach, far more than the error of an angle.
+SURELY = 1e-6
 
 Rings = Sequence[Sequence[Points]]
 
 
-def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull | None) -> None:
+def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull) -> None:
     """Raise the error that refuses a fence because of the frames of its hulls.
 
     Args:
         config: its settings.
         area: the hull that is its area, None for other areas.
-        subjects: the hull that it compares; None for those with a prefix.
+        subjects: the hull that it compares.
     """
     hulls = [hull for hull in (area, subjects) if hull is not None]
-    geographic = [hull for hull in hulls if hull.row.settings.geographic]
-    if not geographic:
+    require_centers(hulls, "hulls of a fence on the globe have the same centre")
+    if not subjects.row.settings.geographic:
         return
-    if subjects is None:
-        raise HullUnsuitableError(geographic[0].name, "is geographic, and fences over a prefix are in the plane")
-    for hull in hulls:
-        if hull.state.center is None:
-            if hull in geographic:
-                reason = "has no centre so far: put its first points, or recenter it, before its fences are created"
-            else:
-                reason = "is a plane, and the other hull is geographic"
-            raise HullUnsuitableError(hull.name, f"{reason}; hulls of a fence on the globe have the same centre")
     centers = {hull.name: hull.state.center for hull in hulls}
     if len(set(centers.values())) > 1:
         raise HullUnsuitableError(
             subjects.name, f"has another centre: hulls of a fence on the globe have the same one, not {centers}"
         )
     require_margin(config)
+
+
+def require_centers(hulls: Sequence[Hull], rule: str) -> None:
+    """Raise HullUnsuitableError unless all of these hulls are planes, or all have centres."""
+    geographic = [hull for hull in hulls if hull.row.settings.geographic]
+    for hull in hulls if geographic else ():
+        if hull.state.center is None:
+            if hull in geographic:
+                reason = "has no centre so far: put its first points, or recenter it, before its fences are created"
+            elif len(hulls) == PAIR:
+                reason = "is a plane, and the other hull is geographic"
+            else:
+                reason = f"is a plane, and {geographic[0].name!r} is geographic"
+            raise HullUnsuitableError(hull.name, f"{reason}; {rule}")
 
 
 def require_margin(config: FenceConfig) -> None:
@@ -117,6 +125,37 @@ def projected(frame: Gnomonic, rings: Rings) -> list[list[Points]]:
         [_projected(frame, without_border(ring), f"polygon {i} ring {j}") for j, ring in enumerate(p)]
         for i, p in enumerate(rings)
     ]
+
+
+def laid_polygons(frame: Gnomonic, area: Area, *, anywhere: bool) -> Rings:
+    """The polygons of a circle or polygons in the plane of a hull; ValueError if they do not fit into it.
+
+    Args:
+        frame: the projection of the hull.
+        area: the area.
+        anywhere: whether the hull has to reach it. Otherwise an area that is surely beyond its reach has no polygons,
+            and another one has to end before the plane does.
+    """
+    rings = rings_of(area, None)
+    if not anywhere:
+        if isinstance(area, CircleArea):
+            require_circle(frame, area)
+        return projected(frame, rings)
+    polygons = [[without_border(ring) for ring in polygon] for polygon in rings]
+    corners = np.vstack([polygon[0] for polygon in polygons])
+    middle_of_all = Gnomonic.about(np.unique(corners, axis=0))
+    if frame.angle(middle_of_all.center) - middle_of_all.angles(corners).max() > REACH + SURELY:
+        return []
+    places = [[project_far(frame, ring) for ring in polygon] for polygon in polygons]
+    for number, (polygon, flat) in enumerate(zip(polygons, places, strict=True)):
+        for ring, xy in zip(polygon, flat, strict=True):
+            if np.isnan(xy).any():
+                lon, lat = ring[np.argmax(np.isnan(xy[:, 0]))].tolist()
+                words = f"degrees from the centre {frame.center}, which reaches other parts of the area"
+                raise ValueError(
+                    f"polygon {number} has the corner ({lon}, {lat}): {frame.angle((lon, lat)):.6f} {words}"
+                )
+    return places
 
 
 def without_border(ring: Points) -> Points:

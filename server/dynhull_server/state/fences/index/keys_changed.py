@@ -2,9 +2,10 @@
 
 from collections.abc import Collection, Container, Iterable, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull import Crossings
 from dynhull.keys import key_list, take_keys
@@ -86,6 +87,12 @@ def of_record(hull: Hull, record: Record, expired: AbstractSet[Key] = frozenset(
 def _limited(hull: Hull) -> bool:
     window = hull.row.settings.window
     return window is not None and window.limited
+
+
+def some(crossings: Crossings, rows: npt.NDArray[np.intp]) -> Crossings:
+    """Some rows of crossings."""
+    columns = {each.name: getattr(crossings, each.name)[rows] for each in fields(crossings) if each.name != "keys"}
+    return Crossings(**columns, keys=take_keys(crossings.keys, rows))
 
 
 def with_expiries(crossings: Crossings, expired: AbstractSet[Key]) -> Crossings:

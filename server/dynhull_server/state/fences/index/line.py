@@ -1,18 +1,19 @@
 """The fences of hulls that share a queue: what a change of one of these hulls means for them."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from dynhull import Crossings
 from dynhull.arrays import Points
 
 from ...alarms.watched import Watched
 from ...hull import Hull
+from ...records import HullSettings
 from ..model.fence import Fence
 from ..model.records import Cause
-from .globe import require_frames
 from .pair import Pair
-from .subjects import Subjects, area_vertices
+from .prefixes import admit, given_center, require_admissible
+from .subjects import Subjects
 
 # Finding an inner layer takes about as long as so many rows of a batch.
 PEELED = 2048
@@ -154,22 +155,40 @@ class Line:
 
     def admit(self, hull: Hull) -> None:
         """Compare the keys of a new hull with the areas of the fences whose prefix its name has, and watch it."""
-        prefixes = [fence for fence in self.fences.values() if fence.row.config.kind == "prefix"]
-        prefixes = [fence for fence in prefixes if fence.row.config.compares(hull.name)]
+        prefixes = self._prefixes(hull.name)
+        fences = [fence for fence in prefixes if fence.watched is None]
+        if fences and hull.row.settings.identity != "multiset":
+            subjects = Subjects(hull)
+            for fence in fences:
+                admit(fence, subjects)
+            self.subjects[hull.name] = subjects
+            for fence in fences:
+                subjects.fences[fence.number] = fence
+                fence.subjects = fence.subjects | {hull.name: subjects}
         for fence in prefixes:
             rule = fence.row.config.rule
             if fence.watched is not None and rule is not None and rule.suits(geographic=hull.row.settings.geographic):
                 fence.watched.add(hull)
                 self.alarms.setdefault(hull.name, []).append(fence)
-        fences = [fence for fence in prefixes if fence.watched is None]
-        if not fences or hull.row.settings.identity == "multiset":
-            return
-        require_frames(fences[0].row.config, hull, None)
-        subjects = self.subjects[hull.name] = Subjects(hull)
+
+    def settled(self, name: str, settings: HullSettings) -> HullSettings:
+        """The settings of a new hull: a geographic one without a centre gets the middle of the first fence that has it.
+
+        Raises HullUnsuitableError if fences over its prefix cannot compare it.
+        """
+        fences = [fence for fence in self._prefixes(name) if fence.watched is None]
+        if settings.identity == "multiset":
+            return settings
         for fence in fences:
-            subjects.lay(fence.number, fence.row.config, area_vertices(fence.row.config, fence.area))
-            subjects.fences[fence.number] = fence
-            fence.subjects = fence.subjects | {hull.name: subjects}
+            require_admissible(fence, name, settings)
+        if not fences or not settings.geographic or settings.center is not None:
+            return settings
+        return replace(settings, center=given_center(fences[0], name))
+
+    def _prefixes(self, name: str) -> list[Fence]:
+        """The fences and alarms whose prefix a name has, the oldest first."""
+        prefixes = [fence for fence in self.fences.values() if fence.row.config.kind == "prefix"]
+        return sorted((each for each in prefixes if each.row.config.compares(name)), key=lambda each: each.number)
 
     def dismiss(self, name: str) -> None:
         """Forget the keys of a hull that is deleted, or was not created after all."""

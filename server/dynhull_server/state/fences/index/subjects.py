@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynhull import Crossings, FenceIndex, KeyedHull
 from dynhull.arrays import Points
-from dynhull.globe import Boundary, Gnomonic
+from dynhull.globe import Boundary, Gnomonic, project_hull
 from dynhull.keys import PackedKeys, key_list
 
 from ...batch import NO_POINTS
@@ -23,7 +23,8 @@ from ...records import Keys, Times
 from ..model.config import Area, CircleArea, FenceConfig, HullArea
 from ..model.records import Key
 from .checked import CheckedArea
-from .globe import outline, projected, require_circle, rings_of
+from .globe import laid_polygons, rings_of
+from .keys_changed import some
 
 if TYPE_CHECKING:
     from ..model.fence import Fence
@@ -94,7 +95,10 @@ class Subjects:
         assert isinstance(contents, Keyed)
         if contents.mirror is None:
             return crossings
-        previous = contents.mirror.take_previous()
+        previous, strangers = contents.mirror.take_previous()
+        if strangers:
+            passed = np.array([key in strangers for key in key_list(crossings.keys)], np.bool_)
+            crossings = some(crossings, np.flatnonzero((crossings.changes != 0) | ~passed))
         if not len(crossings):
             return crossings
         points = contents.hull.positions(crossings.keys)
@@ -107,10 +111,18 @@ class Subjects:
             fence = self.fences[number]
             config = fence.row.config if replaced is None else replaced
             hull = fence.area if replaced is None else area
-            away = (crossings.fences == number) & (distances > 0) & (distances < np.inf)
+            away = (crossings.fences == number) & (distances > 0)
             if away.any():
                 distances[away] = self._metres(number, config, hull, points[away])
         return replace(crossings, points=points, previous=before, distances=distances)
+
+    def bring(self, source: "Subjects", keys: Collection[Key]) -> None:
+        """Take over where keys of another hull, which the index has carried, were on the globe."""
+        here, there = self.hull.state.contents, source.hull.state.contents
+        assert isinstance(here, Keyed)
+        assert isinstance(there, Keyed)
+        if here.mirror is not None and there.mirror is not None:
+            here.mirror.bring(there.mirror, keys)
 
     def note_delays(self, fence: "Fence") -> None:
         """Take note whether some of the keys have delays in a fence."""
@@ -207,7 +219,7 @@ def lay(
     if isinstance(area, HullArea):
         assert vertices is not None  # those of the area
         if frame is not None:
-            vertices = outline(frame, vertices)
+            vertices = project_hull(frame, vertices)
         index.set_hull(
             number,
             vertices,
@@ -221,10 +233,11 @@ def lay(
         polygons = checked.polygons()
         index.set_polygons(number, polygons, closed=closed, margin=margin, cross=cross, inside=inside)
     elif frame is not None:
-        if isinstance(area, CircleArea):
-            require_circle(frame, area)
-        rings = projected(frame, rings_of(area, None))
-        index.set_polygons(number, rings, closed=closed, margin=margin, cross=cross, inside=inside)
+        rings = laid_polygons(frame, area, anywhere=config.kind == "prefix")
+        if rings:
+            index.set_polygons(number, rings, closed=closed, margin=margin, cross=cross, inside=inside)
+        else:
+            index.set_hull(number, NO_POINTS, closed=closed, margin=margin, cross=cross, inside=inside)
     elif isinstance(area, CircleArea):
         index.set_circle(number, area.x, area.y, area.radius, closed=closed, margin=margin, cross=cross, inside=inside)
     else:

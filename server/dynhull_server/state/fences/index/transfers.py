@@ -35,6 +35,7 @@ def carry(subjects: Mapping[str, Subjects], changed: Mapping[str, KeysChanged]) 
             continue
         origin = Origin(source, before.hull.state.counts.revision)
         moved = [key for key, each in zip(key_list(after.keys(keys)), carried.tolist(), strict=True) if each]
+        after.bring(before, moved)
         found.setdefault(target, {}).update(dict.fromkeys(moved, origin))
     return found
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from dynhull import convex_hull, orient2d
 from dynhull.arrays import Points
-from dynhull.globe import Gnomonic
+from dynhull.globe import Gnomonic, project_hull
 from dynhull.keys import Keys, key_list
 from dynhull.range_search import RangeSearch
 
@@ -17,7 +17,7 @@ from ...alarms.rule import AlarmRule
 from ...alarms.values import sign_of
 from ...records import Center, Contents
 from ..events.order import one_by_one
-from ..index.globe import outline, projected, rings_of
+from ..index.globe import laid_polygons, rings_of
 from ..index.pair import nearness
 from ..index.subjects import area_vertices
 from ..model.config import CircleArea, FenceConfig, HullArea
@@ -197,12 +197,14 @@ def _allowed(search: RangeSearch, points: Points, side: Side, frame: Gnomonic | 
     def select(margin: float) -> Rows:
         if isinstance(area, HullArea):
             assert side.vertices is not None  # those of the area
-            vertices = side.vertices if frame is None else outline(frame, side.vertices)
+            vertices = side.vertices if frame is None else project_hull(frame, side.vertices)
             return search.hull(vertices, closed=config.closed, margin=margin)
         if isinstance(area, CircleArea) and frame is None:
             return search.disk(area.x, area.y, area.radius, closed=config.closed, margin=margin)
-        rings = rings_of(area, None)
-        polygons = rings if frame is None else projected(frame, rings)
+        anywhere = config.kind == "prefix"
+        polygons = rings_of(area, None) if frame is None else laid_polygons(frame, area, anywhere=anywhere)
+        if not polygons:
+            return np.empty(0, np.intp)
         return search.polygons(polygons, closed=config.closed, margin=margin)
 
     must = select(0.0)

@@ -1,21 +1,21 @@
 """What a change of hulls means for their fences: who has crossed, and the events of that."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from dynhull import Crossings
-from dynhull.keys import key_list, take_keys
+from dynhull.keys import key_list
 
 from ...hull import Hull
 from ...leg import Leg
 from ...limits import FenceLimits
 from ..events.log import EventLog
 from ..events.sequences import Swap, first_rows
-from ..index.keys_changed import KeysChanged, with_expiries
+from ..index.keys_changed import KeysChanged, some, with_expiries
 from ..index.line import Line
 from ..index.subjects import Subjects
 from ..index.transfers import carry, known_to
@@ -154,7 +154,7 @@ class Comparison:
                         leg.crossed(subjects, crossings, rows, swap, now, own)
                     else:
                         delay(leg, subjects, crossings, rows, swap, now, changed, own)
-                crossings = _some(crossings, np.flatnonzero(~apart))
+                crossings = some(crossings, np.flatnonzero(~apart))
             if len(crossings):
                 self.log.add(subjects, crossings, areas, swap, now)
         for fence in () if changed is None else list(subjects.delaying):
@@ -181,8 +181,3 @@ class Comparison:
                 own = known_to(fence, origins)
                 if own:
                     take_over(self.leg(fence), subjects, own)
-
-
-def _some(crossings: Crossings, rows: npt.NDArray[np.intp]) -> Crossings:
-    columns = {each.name: getattr(crossings, each.name)[rows] for each in fields(crossings) if each.name != "keys"}
-    return Crossings(**columns, keys=take_keys(crossings.keys, rows))

@@ -6,10 +6,11 @@ from ...alarms.rule import AlarmRule
 from ...errors import FenceExistsError, HullNotFoundError, HullUnsuitableError, InvalidFenceError, LimitExceededError
 from ...hull import Hull
 from ..events.sequences import Swap
-from ..index.areas import center_for, check, lay_area
+from ..index.areas import center_for, lay_area
 from ..index.checked import CheckedArea
 from ..index.globe import lacks_center, require_frames, require_margin
 from ..index.pair import Pair
+from ..index.prefixes import require_prefix
 from ..index.subjects import Subjects
 from ..model.config import FenceConfig
 from ..model.delays import Delays
@@ -65,15 +66,17 @@ class Definition:
         waits = _waits(config, 0, request.time)
         fence = Fence(FenceRow(number, request.name, request.birth.uid, request.birth.created, config, waits))
         fence.area = self._area(config)
-        if config.kind != "prefix" and request.gives_center:
-            self._give_center(request, fence.area)
-        require_frames(config, fence.area, None if config.kind == "prefix" else self._hull(config.subjects))
+        compared = self._compared(config)
+        if request.gives_center:
+            for hull in compared:
+                self._give_center(request, fence.area, hull)
+        self._require_frames(config, fence.area, compared, request.checked)
         if config.kind == "other":
             assert fence.area is not None  # checked by the caller
             fence.pair = Pair(fence.area, self._hull(config.subjects), config.near)
             fence.pair.look()
         leg = FenceLeg(fence, created=True)
-        fence.subjects = {each.hull.name: each for each in self._subjects(config, request.checked)}
+        fence.subjects = {each.hull.name: each for each in self._subjects(compared, config)}
         try:
             for subjects in fence.subjects.values():
                 lay_area(subjects, number, config, fence.area, request.checked)
@@ -130,9 +133,9 @@ class Definition:
             field = SUBJECT_FIELDS[config.kind]
             raise InvalidFenceError(field, config.subjects, "the subjects of a fence stay the same")
         area = self._area(config)
-        require_frames(config, area, None if config.kind == "prefix" else self._hull(config.subjects))
-        if not fence.subjects and config.kind == "prefix":  # nobody is there to refuse an invalid area
-            check(config, area, request.checked)
+        is_prefix = config.kind == "prefix"
+        compared = [each.hull for each in fence.subjects.values()] if is_prefix else [self._hull(config.subjects)]
+        self._require_frames(config, area, compared, request.checked)
         for subjects in fence.subjects.values():
             lay_area(subjects, fence.number, config, area, request.checked)
             comparison.applied = True
@@ -198,37 +201,45 @@ class Definition:
         _require_whole(hull)
         return hull
 
-    def _give_center(self, request: CreateFence, area: Hull | None) -> None:
+    def _give_center(self, request: CreateFence, area: Hull | None, subjects: Hull) -> None:
         """Give subjects that are geographic and have no centre the middle of the area, as a revision of their hull."""
         config = request.config
-        subjects = self._hull(config.subjects)
         if not lacks_center(area, subjects) or (config.kind == "hull" and subjects.row.settings.identity == "multiset"):
             return
         require_margin(config)
         center = center_for(config, area, request.checked)
         self._comparison.applied = True
-        subjects.state.recenter(center, self._ground.hulls[config.subjects].records)
+        subjects.state.recenter(center, self._ground.hulls[subjects.name].records)
 
-    def _subjects(self, config: FenceConfig, checked: CheckedArea | None) -> list[Subjects]:
-        """The hulls whose keys a new fence compares, by name."""
+    def _require_frames(
+        self, config: FenceConfig, area: Hull | None, compared: list[Hull], checked: CheckedArea | None
+    ) -> None:
+        if config.kind == "prefix":
+            require_prefix(config, area, compared, checked)
+        else:
+            require_frames(config, area, compared[0])
+
+    def _compared(self, config: FenceConfig) -> list[Hull]:
+        """The hulls that a fence compares, those with a prefix by name: the keyed ones."""
+        if config.kind != "prefix":
+            return [self._hull(config.subjects)]
+        found = [leg.after for _, leg in sorted(self._ground.hulls.items()) if config.compares(leg.name)]
+        hulls = [hull for hull in found if hull is not None]
+        for hull in hulls:
+            _require_whole(hull)
+        return [hull for hull in hulls if hull.row.settings.identity != "multiset"]
+
+    def _subjects(self, compared: list[Hull], config: FenceConfig) -> list[Subjects]:
+        """What a new fence compares with its area: the keys of hulls."""
+        if config.kind == "other":
+            return []
         known = {name: subjects for line in self._ground.lines for name, subjects in line.subjects.items()}
         for leg in self._comparison.legs.values():
             known |= leg.fence.subjects
-        if config.kind == "hull":
-            hull = self._hull(config.subjects)
+        for hull in compared:
             if hull.row.settings.identity == "multiset":
                 raise HullUnsuitableError(hull.name, "has points without keys", field="config.subject_hull")
-            return [known.get(hull.name) or Subjects(hull)]
-        hulls = [leg.after for _, leg in sorted(self._ground.hulls.items()) if config.compares(leg.name)]
-        keyed = [hull for hull in hulls if hull is not None and hull.row.settings.identity != "multiset"]
-        for each in hulls:
-            if each is not None:
-                _require_whole(each)
-        for hull in keyed:
-            require_frames(config, hull, None)
-        if not keyed and config.kind == "prefix":
-            check(config, self._area(config), checked)
-        return [known.get(hull.name) or Subjects(hull) for hull in keyed]
+        return [known.get(hull.name) or Subjects(hull) for hull in compared]
 
 
 def _waits(config: FenceConfig, sequence: int, time: int) -> Waits:

@@ -17,7 +17,7 @@ from ...errors import (
 )
 from ...hull import Hull
 from ...leg import Leg
-from ...records import NO_TIME
+from ...records import NO_TIME, HullSettings
 from ...requests import Request
 from ..events.block import AppendEvents, EventBlock, block_of, joined
 from ..events.sequences import Told
@@ -120,6 +120,12 @@ class FencePart:
         for line in self.lines:
             line.admit(hull)
 
+    def settled(self, name: str, settings: HullSettings) -> HullSettings:
+        """The settings of a new hull, with the centre that fences over its prefix give it."""
+        for line in self.lines:
+            settings = line.settled(name, settings)
+        return settings
+
     def created(self, hull: Hull, now: int) -> None:
         """Raise alarms for a new hull, which is empty."""
         for line in self.lines:
@@ -164,13 +170,13 @@ class FencePart:
         self._comparison.compare(list(changed), now, EXPIRY if expiry else None, found)
 
     def require_free(self, name: str, *, prefixes: bool = False) -> None:
-        """Raise HullFencedError if a fence or an alarm depends on the hull, an alarm by a prefix too if `prefixes`."""
+        """Raise HullFencedError if a fence or an alarm depends on the hull, if `prefixes` also by a prefix."""
         for line in self.lines:
             for fence in line.fences.values():
                 config = fence.row.config
                 if name == config.area_hull or (config.kind != "prefix" and name == config.subjects):
                     raise HullFencedError(name, unmarked(fence.name), "fence" if fence.watched is None else "alarm")
-                if prefixes and fence.watched is not None and name in fence.watched.of:
+                if prefixes and name in (fence.subjects if fence.watched is None else fence.watched.of):
                     raise HullFencedError(name, unmarked(fence.name), "fence" if fence.watched is None else "alarm")
 
     def hull_deleted(self, name: str, now: int) -> None:
