@@ -189,8 +189,8 @@ def contents_of(columns: SegmentColumns, *, times: bool, deadlines: bool) -> Con
     return Contents(
         columns.points[:rows],
         None if columns.identity == "multiset" else reader.keys(0, rows),
-        columns.event_time[:rows] if times else None,
-        columns.expire_time[:rows] if deadlines else None,
+        np.ascontiguousarray(columns.event_time[:rows]) if times else None,
+        np.ascontiguousarray(columns.expire_time[:rows]) if deadlines else None,
         reader.held(rows, len(columns)) if rows < len(columns) else None,
     )
 
@@ -435,4 +435,4 @@ class Batches:
         )
 
     def _times(self, times: Times, none: int, *, always: bool) -> Times | None:
-        return times if always or bool((times != none).any()) else None
+        return np.ascontiguousarray(times) if always or bool((times != none).any()) else None

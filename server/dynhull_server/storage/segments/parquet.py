@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from functools import cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
     Rows = npt.NDArray[np.intp]
 
-Value = TypeVar("Value", bound=np.generic)
+# The columns of numbers that may have none, and what stands for it.
+NOTHING = dict.fromkeys(("revision", "commit", "committed", "clock", "place", "event_time"), NO_TIME)
+NOTHING["expire_time"] = FOREVER
 
 VERSION = 1
 FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
@@ -158,8 +160,7 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
                 read_dictionary=CODED[1:],
                 page_checksum_verification=True,
             )
-        table = file.read()
-        return _columns(table, found, _order(table)), _about(found), found.get(STATE, b"")
+        return _all(file), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
 
@@ -224,28 +225,63 @@ def _about(found: dict[bytes, bytes]) -> dict[str, str]:
     }
 
 
-def _order(table: pa.Table) -> Rows | None:
-    """The rows by revision and place, without sorting: each says where it belongs. ValueError if one is missing.
+def _all(file: pq.ParquetFile) -> SegmentColumns:
+    """All rows by revision and place.
 
-    None if they are in this order.
+    A group at a time is put where it belongs: of all rows there are no arrays but those that are the result, since
+    memory that is new takes longer than what is done with it.
+    """
+    import pyarrow as pa
+
+    identity: Any = file.schema_arrow.metadata[b"dynhull.identity"].decode()
+    belongs = _belongs(file.read(columns=["revision", "row"]))
+    count, at = len(belongs), 0
+    arrays: dict[str, npt.NDArray[Any]] = {}
+    detail: list[str | None] = [None] * count
+    codes, words, number = np.full(count, NONE, np.int32), list[pa.Array](), 0
+    for group in range(file.num_row_groups):
+        table = file.read_row_group(group)
+        rows = belongs[at : at + len(table)]
+        at += len(table)
+        for name, values in _arrays(table).items():
+            if values.strides == (0,):  # there is none in this group
+                continue
+            if name not in arrays:
+                arrays[name] = np.full((count, *values.shape[1:]), NOTHING.get(name, NONE), values.dtype)
+            arrays[name][rows] = values
+        of_group, there = _coded(table.column("key"))
+        codes[rows] = np.where(of_group == NONE, NONE, of_group + number)
+        words.append(there)
+        number += len(there)
+        said = table.column("detail")
+        if said.null_count < len(said):
+            for row, text in zip(rows.tolist(), said.to_pylist(), strict=True):
+                detail[row] = text
+    empty = _arrays(file.schema_arrow.empty_table())
+    for name, values in empty.items():
+        arrays.setdefault(name, _constant(NOTHING[name], count) if name in NOTHING else values)
+    keyed = codes != NONE
+    keys = _packed(words, codes[keyed], identity)
+    return SegmentColumns(identity=identity, **arrays, keyed=keyed, keys=keys, detail=detail)
+
+
+def _belongs(table: pa.Table) -> Rows:
+    """The place of each row in the order of revisions, of which it says itself where it belongs.
+
+    ValueError if one is missing.
     """
     count = len(table)
+    revision, belongs = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
     if not count:
-        return None
-    revision, place = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
+        return belongs
     first, last = int(revision.min()), int(revision.max())
-    if last - first >= count or int(place.min()) < 0:
+    if last - first >= count or int(belongs.min()) < 0:
         raise ValueError("a row is missing")
     counts = np.bincount(revision - first)
-    belongs = (np.cumsum(counts) - counts)[revision - first] + place
-    rows = np.arange(count)
-    if np.array_equal(belongs, rows):
-        return None
-    order = np.full(count, -1)
-    order[belongs[belongs < count]] = rows[belongs < count]
-    if int(order.min()) < 0:
+    belongs = belongs + (np.cumsum(counts) - counts)[revision - first]
+    if int(belongs.max()) >= count or not np.bincount(belongs, minlength=count).all():
         raise ValueError("a row is missing")
-    return order
+    return belongs
 
 
 def _of_keys(table: pa.Table, values: list[Any]) -> Rows:
@@ -267,42 +303,35 @@ def _of_keys(table: pa.Table, values: list[Any]) -> Rows:
     return found
 
 
-def _columns(table: pa.Table, found: dict[bytes, bytes], order: Rows | None) -> SegmentColumns:
-    """Some rows in an order; None for all as they are."""
+def _columns(table: pa.Table, found: dict[bytes, bytes], order: Rows) -> SegmentColumns:
+    """Some rows in an order."""
     identity: Any = found[b"dynhull.identity"].decode()
-    keyed, keys = _keys(table.column("key"), identity, order)
-
-    def integers(name: str, none: int = NO_TIME) -> Integers:
-        return _integers(table, name, none, order)
-
-    def codes(name: str, words: tuple[str, ...]) -> Codes:
-        return _codes(table, name, words, order)
-
-    return SegmentColumns(
-        identity,
-        integers("revision"),
-        integers("commit"),
-        integers("committed"),
-        codes("cause", CAUSES),
-        integers("clock"),
-        integers("row"),
-        codes("kind", KINDS),
-        codes("op", OPS),
-        keyed,
-        keys,
-        np.column_stack([_coordinates(table, name, order) for name in "xy"]),
-        integers("event_time"),
-        integers("expire_time", FOREVER),
-        _details(table.column("detail"), order),
-    )
+    codes, words = _coded(table.column("key"))
+    codes = codes[order]
+    keyed = codes != NONE
+    keys = _packed([words], codes[keyed], identity)
+    arrays = {name: values[order] for name, values in _arrays(table).items()}
+    of_detail, said = _coded(table.column("detail"))
+    texts = [*said.to_pylist(), None]
+    detail = [texts[code] for code in of_detail[order].tolist()]
+    return SegmentColumns(identity=identity, **arrays, keyed=keyed, keys=keys, detail=detail)
 
 
-def _details(column: pa.ChunkedArray, order: Rows | None) -> list[str | None]:
-    if column.null_count == len(column):
-        return [None] * (len(column) if order is None else len(order))
-    codes, words = _coded(column)
-    said: list[str | None] = np.array([*words.to_pylist(), None], object)[_chosen(codes, order)].tolist()
-    return said
+def _arrays(table: pa.Table) -> dict[str, npt.NDArray[Any]]:
+    """The columns of numbers."""
+    return {
+        "revision": _integers(table, "revision", NO_TIME),
+        "commit": _integers(table, "commit", NO_TIME),
+        "committed": _integers(table, "committed", NO_TIME),
+        "cause": _codes(table, "cause", CAUSES),
+        "clock": _integers(table, "clock", NO_TIME),
+        "place": _integers(table, "row", NO_TIME),
+        "kind": _codes(table, "kind", KINDS),
+        "op": _codes(table, "op", OPS),
+        "points": np.column_stack([_coordinates(table, name) for name in "xy"]),
+        "event_time": _integers(table, "event_time", NO_TIME),
+        "expire_time": _integers(table, "expire_time", FOREVER),
+    }
 
 
 def _optional(values: Integers, none: int, kind: pa.DataType) -> pa.Array:
@@ -330,40 +359,45 @@ def _words(codes: Codes, words: tuple[str, ...]) -> pa.Array:
 
 
 def _coded(column: pa.ChunkedArray) -> tuple[npt.NDArray[np.int32], pa.Array]:
-    """Words as places in an array of different ones, which is the second; NONE for no word."""
+    """Words, or keys, as places in an array of them, which is the second; NONE for no word."""
     import pyarrow as pa
 
     if not pa.types.is_dictionary(column.type):
-        column = column.dictionary_encode()
+        codes = np.arange(len(column), dtype=np.int32)
+        if column.null_count:
+            codes[column.is_null().to_numpy()] = NONE
+        return codes, column.combine_chunks()
     together = column.unify_dictionaries().combine_chunks()
-    codes: npt.NDArray[np.int32] = together.indices.cast(pa.int32()).fill_null(NONE).to_numpy()
+    codes = _filled(together.indices.cast(pa.int32()), NONE).to_numpy()
     return codes, together.dictionary
 
 
-def _codes(table: pa.Table, name: str, words: tuple[str, ...], order: Rows | None) -> Codes:
-    count = len(table) if order is None else len(order)
+def _codes(table: pa.Table, name: str, words: tuple[str, ...]) -> Codes:
     codes, there = _coded(table.column(name))
     listed = there.to_pylist()
     if any(each not in words for each in listed):
         raise ValueError(f"column {name} has an unknown word")
-    places = np.array([*(words.index(each) for each in listed), NONE], np.int8)
-    if len(codes) and codes.min() == codes.max():
-        return np.full(count, places[codes[0]])
-    return places[_chosen(codes, order)]
+    found: Codes = np.array([*(words.index(each) for each in listed), NONE], np.int8)[codes]
+    return found
 
 
-def _integers(table: pa.Table, name: str, none: int, order: Rows | None = None) -> Integers:
+def _integers(table: pa.Table, name: str, none: int) -> Integers:
     import pyarrow as pa
 
     column = table.column(name)
     if column.null_count == len(column):
-        return np.full(len(column) if order is None else len(order), none)
-    found: Integers = column.cast(pa.int64()).fill_null(none).to_numpy().astype(np.int64, copy=False)
-    return _chosen(found, order)
+        return _constant(none, len(column))
+    found: Integers = _filled(column.cast(pa.int64()), none).to_numpy()
+    return found
 
 
-def _chosen(values: npt.NDArray[Value], order: Rows | None) -> npt.NDArray[Value]:
-    return values if order is None else values[order]
+def _constant(value: int, count: int) -> Integers:
+    """So many times the same number, without memory for each."""
+    return np.broadcast_to(np.int64(value), count)
+
+
+def _filled(values: Any, none: float) -> Any:
+    return values.fill_null(none) if values.null_count else values
 
 
 def _by_key(columns: SegmentColumns) -> tuple[npt.NDArray[np.intp], pa.Array]:
@@ -409,24 +443,19 @@ def _ranked(keys: PackedKeys) -> tuple[npt.NDArray[Any], pa.Array]:
     return rank[codes], names.take(in_order)
 
 
-def _keys(column: pa.ChunkedArray, identity: Identity, order: Rows | None) -> tuple[npt.NDArray[np.bool_], Keys]:
+def _packed(words: list[pa.Array], codes: npt.NDArray[np.int32], identity: Identity) -> Keys:
+    """The keys at some places of several arrays that lie one after the other."""
     import pyarrow as pa
 
-    if identity == "int" or not pa.types.is_dictionary(column.type):
-        some = column.combine_chunks() if order is None else column.combine_chunks().take(pa.array(order))
-        keyed = some.is_valid().to_numpy(zero_copy_only=False).astype(np.bool_)
-        there = some.drop_null()
-        if identity == "int":
-            return keyed, there.cast(pa.uint64()).to_numpy()
-    else:
-        codes, words = _coded(column)
-        codes = _chosen(codes, order)
-        keyed = codes != NONE
-        there = words.take(pa.array(codes[keyed]))
-    _, offsets, data = there.cast(pa.string()).buffers()
+    kind = pa.uint64() if identity == "int" else pa.string()
+    there = pa.concat_arrays([pa.array([], kind), *(each.cast(kind) for each in words)]).take(pa.array(codes))
+    if identity == "int":
+        integers: npt.NDArray[np.uint64] = there.to_numpy(zero_copy_only=False)
+        return integers
+    _, offsets, data = there.buffers()
     ends = np.frombuffer(offsets, np.int32, len(there) + 1, 4 * there.offset) if offsets else np.zeros(1, np.int32)
     lengths = np.diff(ends).astype(np.uint8)
-    return keyed, PackedKeys(lengths, b"" if data is None else data.to_pybytes()[ends[0] : ends[-1]])
+    return PackedKeys(lengths, b"" if data is None else data.to_pybytes()[ends[0] : ends[-1]])
 
 
 def _scaled(values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_]) -> tuple[pa.Array, int | None]:
@@ -452,14 +481,15 @@ def _as_whole(values: npt.NDArray[np.float64], scale: int) -> Integers | None:
     return whole.astype(np.int64) if np.array_equal(back.view(np.int64), values.view(np.int64)) else None
 
 
-def _coordinates(table: pa.Table, name: str, order: Rows | None) -> npt.NDArray[np.float64]:
+def _coordinates(table: pa.Table, name: str) -> npt.NDArray[np.float64]:
     import pyarrow as pa
 
     column = table.column(name)
     scale = (table.schema.field(name).metadata or {}).get(SCALE)
     if scale is None:
-        found: npt.NDArray[np.float64] = column.cast(pa.float64()).fill_null(np.nan).to_numpy().astype(np.float64)
-        return _chosen(found, order)
-    whole = column.cast(pa.int64()).fill_null(0).to_numpy() / int(scale)
-    whole[~column.is_valid().to_numpy().astype(np.bool_)] = np.nan
-    return _chosen(whole, order)
+        found: npt.NDArray[np.float64] = _filled(column.cast(pa.float64()), np.nan).to_numpy()
+        return found
+    whole: npt.NDArray[np.float64] = _filled(column.cast(pa.int64()), 0).to_numpy() / int(scale)
+    if column.null_count:
+        whole[column.is_null().to_numpy()] = np.nan
+    return whole
