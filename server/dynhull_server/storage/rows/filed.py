@@ -2,9 +2,10 @@
 
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Set
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
-from threading import Lock
+from threading import Lock, Thread
 
 from ...state.records import CommitStamp, Kept, Keys, Record
 from ...state.tracks import KeyChanges
@@ -20,7 +21,8 @@ from .ledger import HullRows
 from .past_rows import STEP_POINTS
 from .segment_rows import StoredSegment
 
-KEPT_OPEN = 2  # segments whose columns stay in memory, since what is read next is mostly in the same
+# Segments whose columns stay in memory: what is read next is mostly in the same, or in the one after it.
+KEPT_OPEN = 3
 
 
 class Filed:
@@ -37,7 +39,8 @@ class Filed:
         self._archive = archive
         self.unreadable: set[str] = set()
         self._turn = Lock()
-        self._open: OrderedDict[str, Batches] = OrderedDict()
+        self._open: OrderedDict[str, Future[Batches]] = OrderedDict()
+        self._ahead: Thread | None = None  # reads what is needed next
 
     def oldest_moment(self, hull: HullRows, *, timed: bool) -> Moment | None:
         """The oldest revision that segments lead to; or, `timed`, the oldest whose commit is known. None for none."""
@@ -71,15 +74,18 @@ class Filed:
 
     def state(self, hull: HullRows, until: int) -> Kept:
         """The newest state that lies beside a segment and is not after a revision."""
-        return self._read_state(_begins(hull, until), None)
+        segment = _begins(hull, until)
+        if until >= segment.first:
+            self._read_ahead(segment)
+        return self._read_state(segment, None)
 
     def batches(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """Some batches after a revision: no more than one segment has."""
-        return _some(self._batches(_segment(hull, after + 1)).between(after, until))
+        return _some(self._batches_after(hull, after, until).between(after, until))
 
     def gathered(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """What some batches after a revision come to: no more than one segment has."""
-        batches = self._batches(_segment(hull, after + 1))
+        batches = self._batches_after(hull, after, until)
         return _some(gathered(batches, hull.row.settings, after, until))
 
     def key_state(self, hull: HullRows, keys: Keys, until: int) -> Kept:
@@ -99,19 +105,49 @@ class Filed:
         with self._turn:
             self._open.pop(file, None)
 
+    def _batches_after(self, hull: HullRows, after: int, until: int) -> Batches:
+        """The segment with the batches that follow a revision. The next one is read meanwhile if it is needed, too."""
+        segment = _segment(hull, after + 1)
+        batches = self._batches(segment)
+        if segment.last < min(until, hull.oldest):
+            self._read_ahead(_segment(hull, segment.last + 1))
+        return batches
+
     def _batches(self, segment: StoredSegment) -> Batches:
-        with self._turn:
-            batches = self._open.get(segment.file)
-            if batches is not None:
-                self._open.move_to_end(segment.file)
-                return batches
+        reading, begins = self._reading(segment)
+        if begins:
+            self._read(segment, reading)
         with self._noted(segment, BATCHES):
-            batches = read_batches(self._archive, segment)
+            return reading.result()
+
+    def _reading(self, segment: StoredSegment) -> "tuple[Future[Batches], bool]":
+        """What has been read of a segment, or is being read; and whether the caller is to read it."""
         with self._turn:
-            self._open[segment.file] = batches
+            reading = self._open.get(segment.file)
+            if reading is not None:
+                self._open.move_to_end(segment.file)
+                return reading, False
+            reading = self._open[segment.file] = Future()
             while len(self._open) > KEPT_OPEN:
                 self._open.popitem(last=False)
-        return batches
+            return reading, True
+
+    def _read(self, segment: StoredSegment, reading: "Future[Batches]") -> None:
+        """Read a segment. Others wait for it; if it cannot be read, who needs it next tries again."""
+        try:
+            reading.set_result(read_batches(self._archive, segment))
+        except Exception as error:
+            self.forget(segment.file)
+            reading.set_exception(error)
+
+    def _read_ahead(self, segment: StoredSegment) -> None:
+        """Read a segment beside the caller, unless another one is being read so."""
+        if self._ahead is not None and self._ahead.is_alive():
+            return
+        reading, begins = self._reading(segment)
+        if begins:
+            self._ahead = Thread(target=self._read, args=(segment, reading), name="read ahead")
+            self._ahead.start()
 
     def _read_state(self, segment: StoredSegment, keys: Keys | None) -> Kept:
         if segment.first == 1:
