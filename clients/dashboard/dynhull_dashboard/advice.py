@@ -14,6 +14,7 @@ from dynhull_client import (
 from .feed import HullFeed
 from .fence_feed import FenceFeed
 from .many_feed import ManyFeed
+from .past_play import PastHull
 from .server_lists import FenceList, HullList
 from .server_metrics import ServerMetrics
 
@@ -62,6 +63,22 @@ def about_hull(feed: HullFeed) -> str | None:
             return "No such hull. Check the name, or create the hull: it appears here by itself"
         case PermissionDeniedError() as error:
             return f"{error}. Start the dashboard with a --token that may read this hull"
+        case error:
+            return str(error)
+
+
+def about_past(hull: PastHull) -> str | None:
+    """For the table: why a hull cannot be shown as it was, or not all of it; None where all can be."""
+    if hull.waits_for is not None:
+        return "Its past begins later"
+    match hull.trouble:
+        case PermissionDeniedError() as error:
+            return f"{error}. Start the dashboard with a --token that may read its past"
+        case None if not hull.followed:
+            return "Reading the past"
+        case None:
+            erasure = hull.kept.erased(hull.revision)
+            return None if erasure is None else f"Keys were erased from this past on {erasure.time:%Y-%m-%d} (UTC)"
         case error:
             return str(error)
 

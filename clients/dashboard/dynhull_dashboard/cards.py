@@ -2,14 +2,17 @@
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from html import escape
+from typing import TypeVar
 
 from dynhull_client import Verification
 
-from .advice import about_hull
+from .advice import about_hull, about_past
 from .feed import HullFeed, Verified
+from .hull_state import HullState
 from .looks import Look
+from .past_play import PastHull
 
 MARKERS = {
     "circle": '<circle cx="20" cy="8" r="5"/>',
@@ -22,9 +25,13 @@ MARKERS = {
 }
 HEADINGS = ("Revision", "Points", "Vertices", "Area{area}", "Batches/s")
 LAST_HEADING = "Live hull against Chan's algorithm"
+PAST_HEADING, AS_IT_WAS = "The past", "As it was"
 UNKNOWN = "-"
 DIGITS, RATE_DIGITS = 6, 3
 NOW_SECONDS, SECONDS_UP_TO = 2.0, 120.0
+
+
+State = TypeVar("State", HullFeed, PastHull)
 
 
 def table(shown: Iterable[tuple[HullFeed, Look]], connected: bool, area_unit: str) -> str:
@@ -32,24 +39,45 @@ def table(shown: Iterable[tuple[HullFeed, Look]], connected: bool, area_unit: st
 
     `area_unit`: of hulls in a plane; areas on the globe have their own.
     """
+
+    def live(feed: HullFeed) -> str:
+        problem = about_hull(feed) if connected else "Connection lost"
+        return _verified(feed.verified) if problem is None else _bad(problem)
+
+    return _table(shown, area_unit, LAST_HEADING, live)
+
+
+def past_table(shown: Iterable[tuple[PastHull, Look]], area_unit: str) -> str:
+    """The same table of hulls as they were."""
+
+    def past(hull: PastHull) -> str:
+        problem = about_past(hull)
+        return AS_IT_WAS if problem is None else _bad(problem)
+
+    return _table(shown, area_unit, PAST_HEADING, past)
+
+
+def _table(shown: Iterable[tuple[State, Look]], area_unit: str, last: str, state: Callable[[State], str]) -> str:
     shown = list(shown)
     area = f" ({escape(area_unit)})" if any(feed.center is None for feed, _ in shown) else ""
-    figures = [heading.format(area=area) for heading in HEADINGS]
-    headings = "".join(f'<th scope="col">{heading}</th>' for heading in ("Hull", *figures, LAST_HEADING))
-    rows = "".join(_row(feed, look, connected, figures) for feed, look in shown)
+    names: list[str] = [heading.format(area=area) for heading in HEADINGS]
+    headings = "".join(f'<th scope="col">{heading}</th>' for heading in ("Hull", *names, last))
+    rows = "".join(_row(feed, look, names, state(feed)) for feed, look in shown)
     return f"<table><thead><tr>{headings}</tr></thead>{rows}</table>" if rows else ""
 
 
-def _row(feed: HullFeed, look: Look, connected: bool, headings: Iterable[str]) -> str:
+def _row(feed: HullState, look: Look, headings: Iterable[str], state: str) -> str:
     cells = "".join(
         f'<td data-heading="{heading}">{figure}</td>' for heading, figure in zip(headings, _figures(feed), strict=True)
     )
-    problem = about_hull(feed) if connected else "Connection lost"
-    state = f'<span class="bad">✗ {escape(problem)}</span>' if problem else _verified(feed.verified)
     return f'<tr><th scope="row">{key(look)}{escape(feed.name)}</th>{cells}<td class="state">{state}</td></tr>'
 
 
-def _figures(feed: HullFeed) -> tuple[str, ...]:
+def _bad(problem: str) -> str:
+    return f'<span class="bad">✗ {escape(problem)}</span>'
+
+
+def _figures(feed: HullState) -> tuple[str, ...]:
     if not feed.followed:
         return (UNKNOWN,) * len(HEADINGS)
     outline, _ = feed.drawings()
@@ -58,7 +86,7 @@ def _figures(feed: HullFeed) -> tuple[str, ...]:
     return f"{feed.revision:,}", f"{feed.points:,}", vertices, _area(feed), number(feed.rate, RATE_DIGITS)
 
 
-def _area(feed: HullFeed) -> str:
+def _area(feed: HullState) -> str:
     """The area; of a geographic hull with its own unit, whatever that of the others."""
     return number(feed.shown_area) + ("" if feed.center is None else " km²")
 

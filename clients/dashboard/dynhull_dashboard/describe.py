@@ -9,6 +9,7 @@ from .degrees import axes, position_text
 from .event_rows import shortened
 from .feed import HullFeed
 from .fence_feed import FenceFeed
+from .hull_state import HullState
 from .many_feed import ManyFeed
 from .search import Sighting, State
 
@@ -33,12 +34,12 @@ EVENTS = {
 }
 
 
-def describe(hulls: Iterable[HullFeed], fences: Iterable[FenceFeed] = (), many: Iterable[ManyFeed] = ()) -> str:
+def describe(hulls: Iterable[HullState], fences: Iterable[FenceFeed] = (), many: Iterable[ManyFeed] = ()) -> str:
     """One sentence for each hull and each prefix, up to three for each fence."""
     return " ".join([*map(_sentence, hulls), *map(_many, many), *map(_fence, fences)])
 
 
-def _sentence(feed: HullFeed) -> str:
+def _sentence(feed: HullState) -> str:
     if feed.bounds is None:
         return f"{feed.name}: nothing drawn."
     left, bottom, right, top = feed.bounds

@@ -25,6 +25,7 @@ class Hub:
         units: the units of the coordinates.
 
     Attributes:
+        client: the connection.
         hull_list: the server's hulls.
         fence_list: the server's fences.
         hulls: the feeds of the hulls on view.
@@ -36,6 +37,7 @@ class Hub:
     def __init__(
         self, client: AsyncHullClient, prefix: str = "", metrics_url: str | None = None, units: Units = NO_UNITS
     ) -> None:
+        self.client = client
         self.address = client.address
         self.units = units
         self.hull_list = HullList(client, prefix)

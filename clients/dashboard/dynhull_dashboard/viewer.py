@@ -1,12 +1,13 @@
 """The page of one viewer: what is on it, and what it has not been sent yet."""
 
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .advice import about_fences, about_metrics, about_picture, about_server
-from .cards import key, table
+from .cards import key, past_table, table
 from .describe import describe, describe_key
 from .feed import HullFeed
 from .fence_picks import FencePicks
@@ -14,12 +15,14 @@ from .hub import Hub
 from .looks import LOOKS, Look
 from .many_cards import many_table
 from .many_picks import ManyPicks
+from .past_play import PastClock, PastPlay
 
 if TYPE_CHECKING:
     from .outliers import OutlierFeed
 
 # Text changes slower than the picture: nobody reads ten times a second.
 TICKS_OF_TEXT = 5
+LATEST, FASTEST = 2.0**52, 1_000.0  # milliseconds since 1970; seconds in one
 WHOLE_SERVER = ""  # instead of the name of a hull
 
 
@@ -61,6 +64,7 @@ class Viewer:
         self._sought = sought
         self._with_outliers = outliers
         self._outliers: dict[str, OutlierFeed] = {}
+        self._past: PastPlay | None = None
         self._ticks = 0
         self._properties: dict[str, Any] = {}
         self._drawn: dict[tuple[str, str], str] = {}
@@ -77,10 +81,12 @@ class Viewer:
             "sought": (_is_text, self._seek),
             "outliers": (_is_choice, self._choose_outliers),
             "verify": (_is_text, self._verify),
+            "past": (_is_past, self._go_back),
         }
 
     def close(self) -> None:
         """Let go of all feeds."""
+        self._go_back(None)
         self._show(())
         self._many.show((), ())
         self._fences.close()
@@ -97,7 +103,9 @@ class Viewer:
         for name, value in asked.items():
             is_valid, _ = self._takes[name]
             if not is_valid(value):
-                raise ValueError(f"the page sent {name} {str(value)[:100]!r}: expected text, names, or true or false")
+                raise ValueError(
+                    f"the page sent {name} {str(value)[:100]!r}: expected text, names, true or false, or a moment"
+                )
         for name, value in asked.items():
             _, take = self._takes[name]
             take(value)
@@ -110,6 +118,7 @@ class Viewer:
             self._choose()
             found += self._page({"version": self._version, **self._looks(), **self._text()})
             found += self._lines()
+            found += self._said_of_past()
         self._ticks += 1
         found += self._page(self._found())
         for name, message in self._drawings():
@@ -118,6 +127,8 @@ class Viewer:
                 self._drawn[name] = message
                 found.append(message)
         found += self._many.messages()
+        if self._past is not None:
+            found += self._past.messages()
         return found
 
     def _page(self, properties: Mapping[str, Any]) -> Iterator[str]:
@@ -184,6 +195,24 @@ class Viewer:
         for shown in self._shown.values():
             shown.feed.verify_now()
 
+    def _go_back(self, asked: Mapping[str, float] | None) -> None:
+        """Show the past from a moment on, or not any more."""
+        if self._past is not None:
+            self._past.close()
+        self._past = None
+        if asked is not None:
+            clock = PastClock(asked["moment"] / 1000, asked["speed"])
+            self._past = PastPlay(self._hub.client, int(asked["number"]), clock)
+            self._past.show(shown.feed for shown in self._shown.values())
+
+    def _said_of_past(self) -> Iterator[str]:
+        """The words and the figures of the moment that is shown, if that is past."""
+        if self._past is not None:
+            hulls = self._past.hulls
+            rows = [(hulls[name], shown.look) for name, shown in self._shown.items() if name in hulls]
+            figures = past_table(rows, area_unit=self._hub.units.area)
+            yield self._past.said({"description": describe(hulls.values()), "table": figures})
+
     def _show(self, picked: Iterable[str]) -> None:
         names = list(dict.fromkeys(picked))[: len(LOOKS) - len(self._many.looks)]
         for name in self._shown.keys() - set(names):
@@ -195,6 +224,8 @@ class Viewer:
                 look = next(look for look in LOOKS if look not in taken)
                 self._shown[name] = Shown(self._hub.hulls.open(name), look)
         self._show_outliers()
+        if self._past is not None:
+            self._past.show(shown.feed for shown in self._shown.values())
         self._forget(set(names) | set(self._fences.names))
 
     def _forget(self, names: set[str]) -> None:
@@ -242,6 +273,7 @@ class Viewer:
             "banner": about_server(self._hub.address, hull_list.error)
             if hull_list.error
             else about_metrics(self._hub.metrics),
+            "kept": [feed.kept.message(self._hub.address) for feed in feeds],
             "note": about_picture(self._hub.address, hull_list, feeds, self._fences.feeds, many),
             "outliers": [self._outliers[name].words for name in self._shown if name in self._outliers],
             "fence_hint": about_fences(self._hub.address, fences, shown=bool(self._fences.names)),
@@ -267,3 +299,17 @@ def _is_choice(value: object) -> bool:
 def _is_text(value: object) -> bool:
     """Whether it is text without halves of surrogate pairs, which JavaScript's text may hold."""
     return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
+
+
+def _is_past(value: object) -> bool:
+    """Whether it is a moment to go back to, or None for now."""
+    if value is None:
+        return True
+    names = {"number", "moment", "speed"}
+    if not isinstance(value, dict) or value.keys() != names or not all(map(_is_number, value.values())):
+        return False
+    return bool(0 <= value["moment"] <= LATEST and 0 <= value["speed"] <= FASTEST)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

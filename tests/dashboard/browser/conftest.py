@@ -2,7 +2,12 @@ from collections.abc import Iterator
 
 import pytest
 from chromium import chromium
+from dashboard_process import dashboard_process
+from metrics import measured
 from playwright.sync_api import Browser
+from server_process import Server
+
+from dynhull_client import HullClient
 
 
 @pytest.fixture(scope="package")
@@ -10,3 +15,22 @@ def browser() -> Iterator[Browser]:
     """A real Chromium, whose first page takes several times as long as the next ones."""
     with chromium() as browser:
         yield browser
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[tuple[Server, str]]:
+    """A server, and the address of its metrics."""
+    with measured() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def url(server: tuple[Server, str]) -> Iterator[str]:
+    with dashboard_process(server[0].address, "--metrics", f"http://{server[1]}/metrics") as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def client(server: tuple[Server, str]) -> Iterator[HullClient]:
+    with HullClient(server[0].address) as client:
+        yield client

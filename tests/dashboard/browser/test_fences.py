@@ -1,14 +1,13 @@
 """Fences on the dashboard, in a real browser, on a real server."""
 
 import asyncio
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
 from pathlib import Path
 
 import pytest
 from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
-from metrics import measured, scrape
+from metrics import scrape
 from patience import PATIENCE, until, wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
 from ports import free_port
@@ -23,25 +22,6 @@ SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 YARD = Polygon([[0, 0], [10, 0], [10, 10], [0, 10]], ([[4, 4], [6, 4], [6, 6], [4, 6]],))
 NUMBERS = count(1)
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[tuple[Server, str]]:
-    """A server, and the address of its metrics."""
-    with measured() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def url(server: tuple[Server, str]) -> Iterator[str]:
-    with dashboard_process(server[0].address) as url:
-        yield url
-
-
-@pytest.fixture(scope="module")
-def client(server: tuple[Server, str]) -> Iterator[HullClient]:
-    with HullClient(server[0].address) as client:
-        yield client
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -52,25 +51,6 @@ INSIDE = """([name, columns, rows]) => {
         }
     return found
 }"""
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[tuple[Server, str]]:
-    """A server, and the address of its metrics."""
-    with measured() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def url(server: tuple[Server, str]) -> Iterator[str]:
-    with dashboard_process(server[0].address, "--metrics", f"http://{server[1]}/metrics") as url:
-        yield url
-
-
-@pytest.fixture(scope="module")
-def client(server: tuple[Server, str]) -> Iterator[HullClient]:
-    with HullClient(server[0].address) as client:
-        yield client
 
 
 @pytest.fixture

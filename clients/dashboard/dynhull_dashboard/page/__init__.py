@@ -32,6 +32,7 @@ SCRIPTS = (
     "picture.js",
     "hands.js",
     "recorder.js",
+    "time_bar.js",
     "time_lines.js",
     "events.js",
     "saving.js",

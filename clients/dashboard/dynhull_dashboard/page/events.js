@@ -7,6 +7,7 @@ class Events {
     this.look_for = look_for
     this.rows = new Map()
     this.shown = new Map()
+    this.until = Infinity  // the moment shown
     const zone = new Intl.DateTimeFormat("en", {timeZoneName: "short"}).formatToParts().find(({type}) => type == "timeZoneName")
     find(".events .zone").textContent = zone.value
     find(".events .scroll").addEventListener("keydown", event => this.choose(event))
@@ -28,6 +29,11 @@ class Events {
     for (const name of this.rows.keys()) if (!names.includes(name)) this.rows.delete(name)
     this.show_soon()
   }
+  end_at(until) {
+    if (until == this.until) return
+    this.until = until
+    this.show_soon()
+  }
   show_soon() {
     this.awaited ??= requestAnimationFrame(() => {
       this.awaited = undefined
@@ -46,7 +52,7 @@ class Events {
       return rows.map(row => ({row, fence, at: at = Math.min(at, row[1] ?? at)}))
     })
     // Of one fence they are in order already, and stay so: sorting is stable.
-    const newest = rows.sort((one, two) => two.at - one.at).slice(0, find(".page").dataset.mostEvents)
+    const newest = rows.filter(({at}) => at <= this.until).sort((one, two) => two.at - one.at).slice(0, find(".page").dataset.mostEvents)
     const items = newest.map(({row, fence}) => [`${fence} ${row[0]}`, row, fence])
     const wanted = new Set(items.map(([id]) => id))
     for (const [id, element] of this.shown) {

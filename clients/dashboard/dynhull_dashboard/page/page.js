@@ -6,7 +6,7 @@ const SILENCE = "The dashboard does not answer. Check that dynhull dashboard sti
   + "received, and reconnects by itself."
 const SAID = ["description", "table", "many_table", "fence_table", "outliers"], PAGE = "", ALL_OF = "*"
 const settings = find(".page").dataset
-const state = {hulls: [], prefixes: [], fences: [], offered: [], offered_fences: [], banner: "", sought: "", found: [], outliers: [],
+const state = {hulls: [], prefixes: [], fences: [], offered: [], offered_fences: [], kept: [], banner: "", sought: "", found: [], outliers: [],
   places: []}
 const is_dark = matchMedia("(prefers-color-scheme: dark)"), on_dark = JSON.parse(settings.onDark)
 const lit = colour => is_dark.matches ? on_dark[colour] ?? colour : colour
@@ -17,11 +17,12 @@ const events = new Events(key => seek(key))
 const recorder = new Recorder(show_drawing, () => {
   picture.live = recorder.live
   time_lines.mark(recorder.live ? undefined : recorder.moment)
+  events.end_at(recorder.past ? recorder.moment : Infinity)
   time_bar?.update()
   show_found()
   picture.draw_soon()
-})
-let time_bar = null, socket
+}, ask_past)
+let time_bar = null, socket, asking
 time_bar = new TimeBar(recorder, find(".time"))
 const time_lines = new TimeLines([...document.querySelectorAll("canvas.line")], lit(settings.neutral),
   settings.percentileDash.split(" ").map(Number))
@@ -31,7 +32,10 @@ function connect() {
   const address = new URL(`live${location.search}`, location.href)
   address.protocol = address.protocol.replace("http", "ws")
   socket = new WebSocket(address)
-  socket.onopen = () => time_lines.clear()
+  socket.onopen = () => {
+    time_lines.clear()
+    recorder.ask_again()
+  }
   socket.onmessage = ({data}) => take(JSON.parse(data), data)
   socket.onclose = () => {
     write(".banner", SILENCE)
@@ -40,6 +44,12 @@ function connect() {
 }
 function ask(change) {
   if (socket.readyState == WebSocket.OPEN) socket.send(JSON.stringify(change))
+}
+// While the slider is dragged, now and then.
+function ask_past(past) {
+  clearTimeout(asking)
+  if (past) asking = setTimeout(() => ask({past}), ASK_MILLISECONDS)
+  else ask({past})
 }
 // The address follows, so that the page shows the same when it is loaded or connects again.
 function keep_in_address(noun, values) {
@@ -54,6 +64,7 @@ function take(message, text) {
       if (message[name] != undefined) record({kind: `said ${name}`, hull: PAGE, name, said: message[name]})
     return update(message)
   }
+  if (message.kind == "past") return recorder.take_past(message)
   if (message.kind == "lines") return time_lines.take(message)
   if (message.kind == "vertices" || message.kind == "points") picture.trails.take(message, Date.now())
   if (message.kind == "many") {
@@ -85,6 +96,8 @@ function show_drawing(message) {
 function update({kind: _, ...changes}) {
   if (changes.version && changes.version != settings.version) return location.reload()
   Object.assign(state, changes)
+  if (changes.kept || changes.hulls)
+    time_bar.keep(state.kept.map(each => ({...each, colour: lit(state.hulls.find(({name}) => name == each.hull)?.colour)})))
   if (changes.hulls || changes.fences || changes.prefixes) {
     const hulls = state.hulls.map(({name}) => name), fences = state.fences.map(({name}) => name)
     show_looks()

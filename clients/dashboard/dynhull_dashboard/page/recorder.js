@@ -1,27 +1,41 @@
-// The last minutes of the picture, to go back to. It keeps what the server sent, as text: of what is old and much, every
-// other drawing.
+// The moments of the picture to go back to. Of the last minutes it keeps what the server sent, as text: of what is old and
+// much, every other drawing. What is older the server plays, as far as it has kept it.
 const RECORDED_MILLISECONDS = 5 * 60_000, MOST_TEXT = 60_000_000, TICK = 100
 class Recorder {
-  // `show` is given messages, whether they come now or are shown again.
-  constructor(show, changed) {
+  // `show` is given messages, whether they come now or are shown again; `ask` what is to be played, or null.
+  constructor(show, changed, ask) {
     this.show = show
     this.changed = changed
+    this.ask = ask
+    this.kept = undefined  // the oldest moment that the server has kept
+    this.past = undefined  // what it plays: the number of the request, the moment, and whether that is there
+    this.number = 0
     this.tracks = new Map()  // by what is drawn: moments and texts, in order
     this.length = 0
     this.lag = 0  // milliseconds between the moment shown and now, while it is moving
     this.paused_at = undefined
-    this.speed = 1
+    this.pace = 1
     this.began = Date.now()
     setInterval(() => this.tick(), TICK)
   }
   get live() {
-    return this.paused_at == undefined && this.lag == 0
+    return this.paused_at == undefined && this.lag == 0 && !this.past
   }
   get moment() {
-    return this.paused_at ?? Date.now() - this.lag
+    return this.past?.moment ?? this.paused_at ?? Date.now() - this.lag
+  }
+  get recorded() {
+    return Math.max(this.began, Date.now() - RECORDED_MILLISECONDS)
   }
   get earliest() {
-    return Math.max(this.began, Date.now() - RECORDED_MILLISECONDS)
+    return Math.min(this.recorded, this.kept ?? Infinity)
+  }
+  get speed() {
+    return this.pace
+  }
+  set speed(pace) {
+    this.pace = pace
+    if (this.past && this.paused_at == undefined) this.go_back(this.moment, pace)
   }
   take(message, text) {
     const subject = message.within ?? message.fence ?? message.hull, now = Date.now()
@@ -54,7 +68,42 @@ class Recorder {
   // Shows the picture as it was at a moment.
   go(moment) {
     this.paused_at = Math.max(this.earliest, Math.min(Date.now(), moment))
+    if (this.paused_at < this.recorded) return this.go_back(this.paused_at, 0)
+    this.leave_past()
     this.show_from(-Infinity, this.paused_at)
+    this.changed()
+  }
+  // Has the server play from a moment on. What it does not play disappears, but for the areas of fences.
+  go_back(moment, speed) {
+    if (!this.past)
+      for (const [{texts}, message] of [...this.tracks.values()].map(track => [track, JSON.parse(track.texts.at(-1))]))
+        if (message.kind != "area") this.show(message.kind == "events" ? message : emptied(JSON.parse(texts[0])))
+    this.past = {number: ++this.number, moment, speed, ready: false, holes: []}
+    this.ask({number: this.number, moment, speed})
+    this.changed()
+  }
+  // The dashboard has begun anew, or this page has.
+  ask_again() {
+    if (this.past) this.go_back(this.moment, this.past.speed)
+  }
+  leave_past() {
+    if (!this.past) return
+    this.past = undefined
+    this.ask(null)
+  }
+  // A part of the past that the server plays.
+  take_past({number, drawn, said, ...what}) {
+    if (number != this.past?.number) return
+    if (drawn) this.show(drawn)
+    for (const [name, text] of Object.entries(said ?? {})) this.show({kind: `said ${name}`, name, said: text})
+    if (what.moment == undefined) return
+    Object.assign(this.past, what)
+    if (this.paused_at == undefined && this.past.moment >= this.recorded) {
+      this.paused_at = this.past.moment
+      this.leave_past()
+      this.show_from(-Infinity, this.paused_at)
+      this.play()
+    }
     this.changed()
   }
   pause() {
@@ -62,8 +111,10 @@ class Recorder {
   }
   play() {
     if (this.paused_at == undefined) return
-    this.lag = Math.max(0, Date.now() - this.paused_at)
+    const moment = this.paused_at
     this.paused_at = undefined
+    if (this.past) return this.go_back(moment, this.speed)
+    this.lag = Math.max(0, Date.now() - moment)
     this.shown = this.moment
     this.changed()
   }
@@ -74,12 +125,14 @@ class Recorder {
   go_live() {
     this.paused_at = undefined
     this.lag = 0
+    this.leave_past()
     this.show_from(-Infinity, Infinity)
     this.changed()
   }
   tick() {
+    if (this.past) return
     if (this.paused_at == undefined && this.lag > 0) {
-      this.lag = Math.min(this.lag - TICK * (this.speed - 1), Date.now() - this.earliest)
+      this.lag = Math.min(this.lag - TICK * (this.speed - 1), Date.now() - this.recorded)
       if (this.lag <= TICK) return this.go_live()
       const until = this.moment
       this.show_from(this.shown, until)
@@ -98,32 +151,6 @@ class Recorder {
 }
 // What was to be seen before the first message.
 function emptied(message) {
-  return {...message, ...NOTHING, ...NO_OUTLIERS, ...NO_AREA, ...NOBODY, rows: [], hull: message.fence ? [] : message.hull}
-}
-class TimeBar {
-  constructor(recorder, form) {
-    this.recorder = recorder
-    const at = name => form.querySelector(name)
-    this.button = at(".pause")
-    this.slider = at("input")
-    this.output = at("[role=timer]")
-    this.back = at(".live")
-    this.button.onclick = () => recorder.toggle()
-    this.back.onclick = () => recorder.go_live()
-    at("select").onchange = ({target}) => recorder.speed = +target.value
-    this.slider.oninput = () => recorder.go(Date.now() + 1000 * this.slider.value)
-    this.update()
-    setInterval(() => this.update(), 1000)
-  }
-  update() {
-    const {live, moment, earliest, paused_at} = this.recorder
-    this.slider.min = -Math.max(1, Math.ceil((Date.now() - earliest) / 1000))
-    if (document.activeElement != this.slider || !this.slider.matches(":active")) this.slider.value = live ? 0 : (moment - Date.now()) / 1000
-    this.button.textContent = paused_at == undefined ? "Pause" : "Play"
-    this.back.disabled = live
-    const time = new Date(moment).toLocaleTimeString("en", {timeStyle: "medium", hourCycle: "h23"})
-    const text = live ? "Live" : `${time}, ${Math.round((Date.now() - moment) / 1000)} s ago`
-    if (this.output.textContent != text) this.output.textContent = text
-    this.slider.setAttribute("aria-valuetext", text)
-  }
+  const said = Array.isArray(message.said) ? [] : message.said && ""
+  return {...message, ...NOTHING, ...NO_OUTLIERS, ...NO_AREA, ...NOBODY, rows: [], said, hull: message.fence ? [] : message.hull}
 }
