@@ -117,7 +117,7 @@ class PastHulls:
             return found
         oldest = await self.oldest(live)
         if not oldest.revision <= revision <= newest:
-            raise _forgotten(live, revision, oldest, f"{field}revision")
+            raise _forgotten(newest, revision, oldest, f"{field}revision")
         return Moment(revision, None)
 
     async def oldest(self, live: LiveHull) -> Moment:
@@ -217,7 +217,7 @@ class PastHulls:
         except NotStoredError:
             oldest = await self.oldest(live)
             if oldest.revision > after:
-                raise _forgotten(live, after + 1, oldest, "start_revision") from None
+                raise _forgotten(live.counts.revision, after + 1, oldest, "start_revision") from None
             raise
 
     async def follow(self, state: HullState, records: Sequence[Record]) -> None:
@@ -242,6 +242,13 @@ class PastHulls:
                     await self.ask(hull.name, partial(self._step, rebuilt, revision))
             except _ErasedMeanwhileError:
                 rebuilt = None
+            except NotStoredError:
+                oldest: Moment = await self.ask(hull.name, partial(self._past.oldest_moment, hull.row.number))
+                if oldest.revision > revision:
+                    raise _forgotten(hull.counts.revision, revision, oldest, "at_revision") from None
+                if rebuilt is None or rebuilt.state.counts.revision >= oldest.revision:
+                    raise
+                rebuilt = None  # what followed it has been dropped meanwhile: a newer state leads there
         return rebuilt
 
     async def _begin(self, hull: Hull, revision: int) -> _Rebuilt:
@@ -334,9 +341,9 @@ class PastHulls:
         return found
 
 
-def _forgotten(live: LiveHull, revision: int, oldest: Moment, field: str) -> RevisionForgottenError:
+def _forgotten(newest: int, revision: int, oldest: Moment, field: str) -> RevisionForgottenError:
     at = None if oldest.committed is None else oldest.committed.time
-    return RevisionForgottenError(revision, oldest.revision, live.counts.revision, at, field)
+    return RevisionForgottenError(revision, oldest.revision, newest, at, field)
 
 
 class PastHull(LiveHull):
