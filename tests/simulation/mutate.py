@@ -75,7 +75,9 @@ def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
         return Hunt(patch.stem, None, seconds, "")
     found = re.search(r"(\d+) lives.*, 1 finding\nseed \d+ of the \w+: (.*)", run.stdout)
     if found is None or found[2].startswith(("NameError", "AttributeError", "ImportError")):
-        raise RuntimeError(f"{patch.name}: the simulation itself fails, or the patch names what is no more\n{run.stdout}\n{run.stderr}")
+        raise RuntimeError(
+            f"{patch.name}: the simulation itself fails, or the patch names what is no more\n{run.stdout}\n{run.stderr}"
+        )
     return Hunt(patch.stem, int(found[1]), seconds, found[2])
 
 
