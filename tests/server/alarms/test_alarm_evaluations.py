@@ -15,6 +15,7 @@ from dynhull_server.state.alarms.rule import AlarmRule, marked
 from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.core import Core
 from dynhull_server.state.events import Arrived, Commit, Committed, Event
+from dynhull_server.state.fences.index.line import MEASURED
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.requests import CreateFence
 from dynhull_server.state.records import HullSettings
@@ -76,5 +77,10 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
         step(core, moved(HULLS[0], {"c": (4, 4 + number)}))
     exactly = 0 if dynhull.KERNEL == "cpp" or measure not in ("diameter", "width") else BATCHES
     assert counts == Counter(touched=BATCHES, sign_of=BATCHES) + Counter(_sign=exactly)
+    step(core, moved(HULLS[0], {"e": (2, -1)}))
+    line = core.line(HULLS[0])
+    assert line is not None
+    assert line.weight(HULLS[0]) == MEASURED * 5  # of the vertices as they are now
+    step(core, moved(HULLS[0], {"e": (2, 1)}))
     for hull in HULLS:
-        assert core.get(hull).counts.revision == 1 + 3 * BATCHES + (BATCHES if hull == HULLS[0] else 0)
+        assert core.get(hull).counts.revision == 1 + 3 * BATCHES + (BATCHES + 2 if hull == HULLS[0] else 0)

@@ -71,6 +71,11 @@ class Watched:
             self._vertices = state.hull.vertices()  # `state.vertices` keeps them for watches that resume, too
 
     @property
+    def vertex_count(self) -> int:
+        """The number of vertices when it was last looked at; 0 for a rule that needs none."""
+        return len(self._vertices)
+
+    @property
     def waits(self) -> bool:
         """Whether the condition holds, but not yet for long enough."""
         return self.standing is not None and self.standing.enters

@@ -202,10 +202,11 @@ class Line:
 
     def weight(self, name: str) -> int:
         """The number of subjects that a change of a hull may concern beside its own rows."""
-        area, alarms = self.areas.get(name), self.alarms.get(name)
         measured = 0
-        if alarms and alarms[0].watched is not None:
-            measured = MEASURED * len(alarms) * alarms[0].watched.of[name].hull.vertex_count
+        for fence in self.alarms.get(name, ()):
+            if fence.watched is not None:
+                measured += MEASURED * fence.watched.of[name].vertex_count
+        area = self.areas.get(name)
         if area is None:
             return measured
         return sum(fence.subject_count for fence in area.fences.values()) + (PEELED if area.layered else 0) + measured
