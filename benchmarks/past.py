@@ -10,7 +10,8 @@ A fleet of keyed vehicles makes small steps. Parts, all of them unless `--parts`
   later from segments, each time the first read of this hull since the start; and again 200 batches later, five times.
 * memory: the resident memory of a server while 100 million moves become the past, no faster than segments are written:
   the most in the second half, beside the most in the first quarter.
-* replay: a day of 5,000 vehicles that report every ten seconds, as fast as it is read.
+* day: a day of 5,000 vehicles that report every ten seconds: a replay of it as fast as it is read, the way of one
+  vehicle, and the events of a fence after the fact; beside what pyarrow takes to read the same files, unchecked.
 
 Client and server share the machine. `--scale 0.01` is over in a minute. The folder should lie on the disk that counts.
 """
@@ -23,7 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,22 +32,25 @@ from statistics import median
 
 import grpc
 import numpy as np
+import pyarrow.parquet as pq
 from scipy.stats import t as student
 
 import server
 from dynhull.keys import PackedKeys
-from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
+from dynhull_proto.v1 import batch_pb2, fence_pb2, fence_service_pb2, hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_proto.v1.fence_service_pb2_grpc import FenceServiceStub
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 COMMAND = ["-m", "dynhull_server", "--port", "0", "--scrub-cpu", "0", "--log-level", "warning"]
 MANY, DAY, VEHICLES, REPORTED = 10**6, 8640, 5000, 10**8
 LOADED = 8192
 NEAR = 1000
+SEGMENT_SECONDS = 20  # after which another segment would have come
 MOVES = 2**18  # of a run of writers, and of what is weighed
 PACE = 250_000  # moves a second
 BEHIND = 5 * 10**6  # moves that segments may lack: those after the last snapshot but one are not due
-PARTS = ("writers", "bytes", "as-of", "memory", "replay")
+PARTS = ("writers", "bytes", "as-of", "memory", "day")
 
 
 @dataclass
@@ -56,6 +60,7 @@ class Served:
     process: subprocess.Popen[str]
     address: str
     stub: HullServiceStub
+    channel: grpc.Channel
 
     @property
     def processor(self) -> float:
@@ -80,7 +85,7 @@ def serving(folder: Path | None, *options: str) -> Iterator[Served]:
         try:
             address = process.stdout.readline().split()[-1]
             with grpc.insecure_channel(address, options=server.OPTIONS) as channel:
-                yield Served(process, address, HullServiceStub(channel))
+                yield Served(process, address, HullServiceStub(channel), channel)
         finally:
             process.terminate()
 
@@ -255,21 +260,62 @@ def memory(folder: Path, scale: float, _: int) -> Iterator[str]:
     yield f"memory after {moves:,} moves, of {early:.0f} MB after a quarter, MB | +- 50 | {late - early:+.0f}"
 
 
-def replay(folder: Path, scale: float, _: int) -> Iterator[str]:
-    """Seconds until every revision of a day has been read."""
+def day(folder: Path, scale: float, repeat: int) -> Iterator[str]:
+    """Seconds to read a day in three ways; most of it is in segments, and the rest in the journal."""
     reports = max(int(DAY * scale), 10)
     fleet = Fleet(VEHICLES)
-    with serving(folder / "replay") as served:
+    with serving(folder / "day") as served:
         create(served, "fleet")
         for first in range(0, reports, 100):
             write(served, "fleet", [each for _ in range(min(100, reports - first)) for each in fleet.all(VEHICLES)])
-            told(f"replay: {min(first + 100, reports):,} of {reports:,} reports are written")
-        begun = time.perf_counter()
-        request = pb.ReplayRequest(name="fleet", start_revision=0)
-        seen = sum(1 for _ in served.stub.Replay(request))
-        took = time.perf_counter() - begun
-    assert seen >= reports
-    yield f"replay of {reports:,} reports of {VEHICLES:,} vehicles, s | <= {15 * scale:g} | {took:.1f}"
+            told(f"day: {min(first + 100, reports):,} of {reports:,} reports are written")
+        wait_until_filed(served, "fleet")
+        filed = served.stub.GetHistory(pb.GetHistoryRequest(name="fleet")).moves / (reports * VEHICLES)
+    files = sorted(map(str, (folder / "day").rglob("*.batches.parquet")))
+    replayed = pb.ReplayRequest(name="fleet", start_revision=0)
+    keys = PackedKeys.pack([fleet.names[VEHICLES // 2]])
+    tracked = pb.TrackRequest(
+        name="fleet", start_revision=0, keys=points_pb2.Keys(lengths=keys.lengths, text=keys.data)
+    )
+    first = pb.TrackRequest(name="fleet", start_revision=0, end_revision=1, keys=tracked.keys)
+    disk = fence_pb2.CircleArea(center_x=15.0, center_y=35.0, radius=10.0)
+    fenced = fence_service_pb2.FenceEventsBetweenRequest(
+        config=fence_pb2.FenceConfig(circle_area=disk, subject_hull="fleet"), start_revision=1
+    )
+    took: dict[str, list[float]] = {"replay": [], "track": [], "fence": []}
+    for _ in range(repeat):
+        with serving(folder / "day") as served:
+            fences = FenceServiceStub(served.channel)
+            list(served.stub.Track(first))  # what reads is loaded
+            calls = (served.stub.Track, tracked), (served.stub.Replay, replayed), (fences.FenceEventsBetween, fenced)
+            for name, (call, request) in zip(("track", "replay", "fence"), calls, strict=True):
+                begun = time.perf_counter()
+                seen = sum(1 for _ in call(request))
+                took[name].append(time.perf_counter() - begun)
+                told(f"day: {name} {took[name][-1]:.2f} s, {seen:,} messages")
+    of_pyarrow = median(timed(lambda: [pq.read_table(file) for file in files]) for _ in range(repeat))
+    chosen = [("key", "==", fleet.names[VEHICLES // 2])]
+    of_key = median(timed(lambda: pq.read_table(files, filters=chosen)) for _ in range(repeat))
+    replay, track, fence = (median(each) for each in took.values())
+    what = f"{reports:,} reports of {VEHICLES:,} vehicles, {filed:.0%} in segments"
+    yield f"replay of {what}; pyarrow reads the rows in {of_pyarrow:.2f}, s | <= {15 * scale:g} | {replay:.2f}"
+    yield f"way of one vehicle; pyarrow finds it in segments in {of_key:.2f}, s | <= 0.2 | {track:.2f}"
+    yield f"fence after the fact, a disk, s | <= {5 * scale:g} | {fence:.2f}"
+
+
+def wait_until_filed(served: Served, name: str) -> None:
+    """Wait until no more segments come."""
+    before = -1
+    while (found := served.stub.GetHistory(pb.GetHistoryRequest(name=name)).moves) != before:
+        told(f"{found:,} moves are in segments")
+        before = found
+        time.sleep(SEGMENT_SECONDS)
+
+
+def timed(function: Callable[[], object]) -> float:
+    begun = time.perf_counter()
+    function()
+    return time.perf_counter() - begun
 
 
 def main() -> None:
@@ -280,7 +326,7 @@ def main() -> None:
     parser.add_argument("--parts", nargs="*", default=PARTS, choices=PARTS, help="which parts (default: all)")
     options = parser.parse_args()
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    works = dict(zip(PARTS, (writers, weighed, as_of, memory, replay), strict=True))
+    works = dict(zip(PARTS, (writers, weighed, as_of, memory, day), strict=True))
     print(f"| at scale {options.scale:g}, load {os.getloadavg()[0]:.1f} | aim | found |")
     print("| --- | --- | ---: |", flush=True)
     for part in options.parts:
