@@ -140,6 +140,23 @@ def test_hulls_without_a_centre_get_the_middle_of_the_area(client, name):
     assert client.recenter(f"{name}/new", (179, -17)).center == (179, -17)
 
 
+def test_a_fence_that_is_refused_by_one_hull_gives_no_other_one_a_centre(client, name):
+    client.create_hull(f"{name}/a", keyed="str", geographic=True)
+    client.create_hull(f"{name}/b", keyed="str")
+    client.create_hull(f"{name}-far/a", keyed="str", geographic=True)
+    client.create_hull(f"{name}-far/b", keyed="str", geographic=True, center=(100, 0))
+    vast = [(-60, -30), (60, -30), (60, 30), (-60, 30)]
+    for area, prefix, options, error in (
+        (ZONE, f"{name}/", {}, HullUnsuitableError),
+        (vast, f"{name}-far/", {}, InvalidRequestError),
+        (ZONE, f"{name}-far/", {"margin": 1}, InvalidRequestError),
+    ):
+        with pytest.raises(error):
+            client.create_fence(f"{name}/fence", area=area, subjects=Prefix(prefix), **options)
+        hull = client.get_hull(f"{prefix}a").info
+        assert (hull.center, hull.revision) == (None, 0)
+
+
 def test_hulls_of_one_prefix_have_frames_of_one_kind(client, name):
     fence = f"{name}/fence"
     client.create_fence(fence, area=ZONE, subjects=Prefix(f"{name}/"))

@@ -1,6 +1,6 @@
 """Fences about geographic hulls: their areas in the plane of the projection, in which great circles are straight."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -50,11 +50,11 @@ def require_frames(config: FenceConfig, area: Hull | None, subjects: Hull) -> No
     require_margin(config)
 
 
-def require_centers(hulls: Sequence[Hull], rule: str) -> None:
-    """Raise HullUnsuitableError unless all of these hulls are planes, or all have centres."""
+def require_centers(hulls: Sequence[Hull], rule: str, lacking: Collection[Hull] = ()) -> None:
+    """Raise HullUnsuitableError unless all of these hulls are planes, or all have centres: `lacking` ones will."""
     geographic = [hull for hull in hulls if hull.row.settings.geographic]
     for hull in hulls if geographic else ():
-        if hull.state.center is None:
+        if hull.state.center is None and hull not in lacking:
             if hull in geographic:
                 reason = "has no centre so far: put its first points, or recenter it, before its fences are created"
             elif len(hulls) == PAIR:
@@ -70,9 +70,12 @@ def require_margin(config: FenceConfig) -> None:
         raise InvalidFenceError("margin", config.margin, "a fence on the globe has no margin")  # nor without_self
 
 
-def lacks_center(area: Hull | None, subjects: Hull | None) -> bool:
+def lacks_center(config: FenceConfig, area: Hull | None, subjects: Hull) -> bool:
     """Whether the subjects of a fence are geographic and without a centre, which its area can give them."""
-    if subjects is None or not subjects.row.settings.geographic or subjects.state.center is not None:
+    settings = subjects.row.settings
+    if not settings.geographic or subjects.state.center is not None:
+        return False
+    if config.kind == "hull" and settings.identity == "multiset":
         return False
     return area is None or area.state.center is not None
 

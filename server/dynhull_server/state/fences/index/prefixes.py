@@ -1,6 +1,6 @@
 """Fences over a prefix: on the globe each hull has a centre of its own, and the area is laid in the plane of each."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ...errors import HullUnsuitableError, InvalidFenceError
 from ...hull import Hull
@@ -15,7 +15,13 @@ from .subjects import Subjects, area_vertices
 WORDS = {False: "is a plane", True: "is geographic"}
 
 
-def require_prefix(config: FenceConfig, area: Hull | None, hulls: Sequence[Hull], checked: CheckedArea | None) -> None:
+def require_prefix(
+    config: FenceConfig,
+    area: Hull | None,
+    hulls: Sequence[Hull],
+    checked: CheckedArea | None,
+    lacking: Collection[Hull] = (),
+) -> None:
     """Raise the error that refuses a fence over a prefix, because of its area or of the frames of its hulls.
 
     Args:
@@ -23,9 +29,10 @@ def require_prefix(config: FenceConfig, area: Hull | None, hulls: Sequence[Hull]
         area: the hull that is its area, None for other areas.
         hulls: the keyed hulls with the prefix.
         checked: the polygons of the area, if they have been checked.
+        lacking: those of the hulls that will have a centre, which they lack.
     """
     known = [*([] if area is None else [area]), *hulls]
-    require_centers(known, "all hulls of a fence are geographic and have a centre, or none is")
+    require_centers(known, "all hulls of a fence are geographic and have a centre, or none is", lacking)
     if any(hull.row.settings.geographic for hull in known):
         require_margin(config)
         center_for(config, area, checked)

@@ -67,20 +67,20 @@ class Definition:
         fence = Fence(FenceRow(number, request.name, request.birth.uid, request.birth.created, config, waits))
         fence.area = self._area(config)
         compared = self._compared(config)
-        if request.gives_center:
-            for hull in compared:
-                self._give_center(request, fence.area, hull)
-        self._require_frames(config, fence.area, compared, request.checked)
+        lacking = [hull for hull in compared if request.gives_center and lacks_center(config, fence.area, hull)]
+        center = center_for(config, fence.area, request.checked) if lacking else None
+        self._require_frames(config, fence.area, compared, request.checked, lacking)
         if config.kind == "other":
             assert fence.area is not None  # checked by the caller
             fence.pair = Pair(fence.area, self._hull(config.subjects), config.near)
             fence.pair.look()
         leg = FenceLeg(fence, created=True)
-        fence.subjects = {each.hull.name: each for each in self._subjects(compared, config)}
         try:
-            for subjects in fence.subjects.values():
-                lay_area(subjects, number, config, fence.area, request.checked)
-                self._inside += subjects.index.count(number)
+            self._lay(fence, [hull for hull in compared if hull not in lacking], request.checked)
+            for hull in lacking:  # nothing refuses the fence any more
+                self._comparison.applied = True
+                hull.state.recenter(center, ground.hulls[hull.name].records)
+            self._lay(fence, lacking, request.checked)
         except BaseException:
             self._drop(fence)
             raise
@@ -201,21 +201,27 @@ class Definition:
         _require_whole(hull)
         return hull
 
-    def _give_center(self, request: CreateFence, area: Hull | None, subjects: Hull) -> None:
-        """Give subjects that are geographic and have no centre the middle of the area, as a revision of their hull."""
-        config = request.config
-        if not lacks_center(area, subjects) or (config.kind == "hull" and subjects.row.settings.identity == "multiset"):
-            return
-        require_margin(config)
-        center = center_for(config, area, request.checked)
-        self._comparison.applied = True
-        subjects.state.recenter(center, self._ground.hulls[subjects.name].records)
+    def _lay(self, fence: Fence, compared: list[Hull], checked: CheckedArea | None) -> None:
+        """Compare the keys of some hulls with the area of a new fence."""
+        config = fence.row.config
+        for subjects in self._subjects(compared, config):
+            fence.subjects[subjects.hull.name] = subjects
+            lay_area(subjects, fence.number, config, fence.area, checked)
+            self._inside += subjects.index.count(fence.number)
 
     def _require_frames(
-        self, config: FenceConfig, area: Hull | None, compared: list[Hull], checked: CheckedArea | None
+        self,
+        config: FenceConfig,
+        area: Hull | None,
+        compared: list[Hull],
+        checked: CheckedArea | None,
+        lacking: list[Hull] | None = None,
     ) -> None:
+        """Refuse a fence because of the frames of its hulls; those that are `lacking` a centre will have one."""
         if config.kind == "prefix":
-            require_prefix(config, area, compared, checked)
+            require_prefix(config, area, compared, checked, lacking or ())
+        elif lacking:
+            require_margin(config)
         else:
             require_frames(config, area, compared[0])
 
