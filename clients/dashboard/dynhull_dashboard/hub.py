@@ -5,6 +5,7 @@ from functools import partial
 
 from dynhull_client import AsyncHullClient
 
+from .alarm_list import AlarmList
 from .feed import HullFeed
 from .feeds import Feeds
 from .fence_feed import FenceFeed
@@ -28,6 +29,7 @@ class Hub:
         client: the connection.
         hull_list: the server's hulls.
         fence_list: the server's fences.
+        alarms: the server's alarms.
         hulls: the feeds of the hulls on view.
         fences: the feeds of the fences on view.
         many: the feeds of all hulls of a prefix.
@@ -42,6 +44,7 @@ class Hub:
         self.units = units
         self.hull_list = HullList(client, prefix)
         self.fence_list = FenceList(client, prefix)
+        self.alarms = AlarmList(client, prefix)
         self.metrics = None if metrics_url is None else ServerMetrics(metrics_url)
         self.hulls = Feeds(partial(HullFeed, client))
         self.fences = Feeds(partial(FenceFeed, client))
@@ -52,6 +55,7 @@ class Hub:
         """Stop all background tasks."""
         await self.outliers.close()  # they use hulls
         feeds = self.hulls, self.fences, self.many
-        await asyncio.gather(self.hull_list.close(), self.fence_list.close(), *(each.close() for each in feeds))
+        lists = self.hull_list, self.fence_list, self.alarms
+        await asyncio.gather(*(each.close() for each in (*lists, *feeds)))
         if self.metrics is not None:
             await self.metrics.close()

@@ -1,12 +1,14 @@
 """The page of one viewer: what is on it, and what it has not been sent yet."""
 
+import asyncio
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .advice import about_fences, about_metrics, about_picture, about_server
+from .alarm_rows import alarm_rows, raised_count
 from .cards import key, past_table, table
 from .describe import describe, describe_key
 from .feed import HullFeed
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
 # Text changes slower than the picture: nobody reads ten times a second.
 TICKS_OF_TEXT = 5
+LONGEST_MUTE = 30 * 86_400.0  # seconds
 LATEST, FASTEST = 2.0**52, 1_000.0  # milliseconds since 1970; seconds in one
 WHOLE_SERVER = ""  # instead of the name of a hull
 
@@ -65,6 +68,8 @@ class Viewer:
         self._with_outliers = outliers
         self._outliers: dict[str, OutlierFeed] = {}
         self._past: PastPlay | None = None
+        self._alarm_trouble = ""
+        self._doing: set[asyncio.Task[None]] = set()
         self._ticks = 0
         self._properties: dict[str, Any] = {}
         self._drawn: dict[tuple[str, str], str] = {}
@@ -82,6 +87,8 @@ class Viewer:
             "outliers": (_is_choice, self._choose_outliers),
             "verify": (_is_text, self._verify),
             "past": (_is_past, self._go_back),
+            "acknowledge": (_is_alarm_at, self._acknowledge),
+            "mute": (_is_mute, self._mute),
         }
 
     def close(self) -> None:
@@ -195,6 +202,23 @@ class Viewer:
         for shown in self._shown.values():
             shown.feed.verify_now()
 
+    def _acknowledge(self, alarm_at: list[str]) -> None:
+        name, hull = alarm_at
+        self._begin(self._hub.alarms.acknowledge(name, hull))
+
+    def _mute(self, muted: tuple[str, str, float]) -> None:
+        self._begin(self._hub.alarms.mute(*muted))
+
+    def _begin(self, act: Coroutine[Any, Any, str]) -> None:
+        """Do something about an alarm; the page says why it could not be done."""
+
+        async def do() -> None:
+            self._alarm_trouble = await act
+
+        task = asyncio.create_task(do())
+        self._doing.add(task)
+        task.add_done_callback(self._doing.discard)
+
     def _go_back(self, asked: Mapping[str, float] | None) -> None:
         """Show the past from a moment on, or not any more."""
         if self._past is not None:
@@ -273,6 +297,9 @@ class Viewer:
             "banner": about_server(self._hub.address, hull_list.error)
             if hull_list.error
             else about_metrics(self._hub.metrics),
+            "alarms": alarm_rows(self._hub.alarms),
+            "raised": raised_count(self._hub.alarms),
+            "alarm_trouble": self._alarm_trouble,
             "kept": [feed.kept.message(self._hub.address) for feed in feeds],
             "note": about_picture(self._hub.address, hull_list, feeds, self._fences.feeds, many),
             "outliers": [self._outliers[name].words for name in self._shown if name in self._outliers],
@@ -313,3 +340,15 @@ def _is_past(value: object) -> bool:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_alarm_at(value: object) -> bool:
+    """Whether it is the name of an alarm and that of a hull."""
+    return isinstance(value, list) and len(value) == 2 and all(map(_is_text, value))
+
+
+def _is_mute(value: object) -> bool:
+    """Whether it is the same, and seconds."""
+    if not isinstance(value, list) or len(value) != 3 or not _is_number(value[2]):
+        return False
+    return _is_alarm_at(value[:2]) and bool(0 <= value[2] <= LONGEST_MUTE)

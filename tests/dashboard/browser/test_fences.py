@@ -6,6 +6,7 @@ from itertools import count
 from pathlib import Path
 
 import pytest
+from contrast import CONTRAST
 from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
 from metrics import scrape
 from patience import PATIENCE, until, wait_until
@@ -310,17 +311,6 @@ def test_on_a_phone_nothing_is_cut_off(browser: Browser, url: str, client: HullC
             fit = parts.evaluate_all("all => all.map(each => each.scrollWidth <= each.clientWidth)")
             assert fit == [True] * len(fit)
         assert events(page).first.bounding_box()["height"] < 150
-
-
-CONTRAST = """([over, under]) => {
-    const rgb = colour => colour.startsWith("#") ? colour.match(/[0-9a-f]{2}/gi).map(each => parseInt(each, 16))
-        : colour.match(/[0-9.]+/g).slice(0, 3)
-    const light = colour => rgb(colour).map(each => each / 255)
-        .map(each => each <= 0.04045 ? each / 12.92 : ((each + 0.055) / 1.055) ** 2.4)
-        .reduce((sum, each, i) => sum + each * [0.2126, 0.7152, 0.0722][i], 0)
-    const [low, high] = [light(over), light(under)].sort((one, two) => one - two)
-    return (high + 0.05) / (low + 0.05)
-}"""
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -35,6 +35,7 @@ SCRIPTS = (
     "time_bar.js",
     "time_lines.js",
     "events.js",
+    "alarms.js",
     "saving.js",
     "page.js",
 )

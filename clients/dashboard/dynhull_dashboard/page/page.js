@@ -6,7 +6,7 @@ const SILENCE = "The dashboard does not answer. Check that dynhull dashboard sti
   + "received, and reconnects by itself."
 const SAID = ["description", "table", "many_table", "fence_table", "outliers"], PAGE = "", ALL_OF = "*"
 const settings = find(".page").dataset
-const state = {hulls: [], prefixes: [], fences: [], offered: [], offered_fences: [], kept: [], banner: "", sought: "", found: [], outliers: [],
+const state = {hulls: [], prefixes: [], fences: [], offered: [], offered_fences: [], kept: [], alarms: [], raised: 0, alarm_trouble: "", banner: "", sought: "", found: [], outliers: [],
   places: []}
 const is_dark = matchMedia("(prefers-color-scheme: dark)"), on_dark = JSON.parse(settings.onDark)
 const lit = colour => is_dark.matches ? on_dark[colour] ?? colour : colour
@@ -14,6 +14,7 @@ const picture = new Picture(find(".map"), {
   x_unit: settings.xUnit, y_unit: settings.yUnit, tiles: {url: settings.tiles, largest_zoom: +settings.largestZoom, attribution: settings.attribution},
 })
 const events = new Events(key => seek(key))
+const alarms = new Alarms(find(".alarms"), ask)
 const recorder = new Recorder(show_drawing, () => {
   picture.live = recorder.live
   time_lines.mark(recorder.live ? undefined : recorder.moment)
@@ -96,6 +97,8 @@ function show_drawing(message) {
 function update({kind: _, ...changes}) {
   if (changes.version && changes.version != settings.version) return location.reload()
   Object.assign(state, changes)
+  if (changes.alarms || changes.raised != undefined || changes.alarm_trouble != undefined)
+    alarms.show(state.alarms, state.raised, state.alarm_trouble)
   if (changes.kept || changes.hulls)
     time_bar.keep(state.kept.map(each => ({...each, colour: lit(state.hulls.find(({name}) => name == each.hull)?.colour)})))
   if (changes.hulls || changes.fences || changes.prefixes) {
