@@ -31,7 +31,7 @@ from dynhull_server.state.records import (
     Record,
 )
 from dynhull_server.storage.port import NEWEST, DamagedError
-from dynhull_server.storage.rows import filing, past_rows
+from dynhull_server.storage.rows import filed, filing, past_rows
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments import archive
 from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive
@@ -127,6 +127,24 @@ def test_a_segment_has_no_more_than_its_rows_and_those_read_together(tmp_path, m
     assert max(rows) < 20 + 8
     require_all(fleet.storage, fleet.records)
     fleet.storage.close()
+
+
+@pytest.mark.parametrize(("rows", "again"), [(filed.KEPT_ROWS, 0), (0, 1)])
+def test_segments_that_are_read_in_turn_are_decoded_once_if_they_are_small(tmp_path, monkeypatch, rows, again):
+    fleet = Fleet(tmp_path).fill()
+    names = []
+    monkeypatch.setattr(filed, "KEPT_ROWS", rows)
+    monkeypatch.setattr(
+        fleet.archive, "read", lambda name, *file: names.append(name) or Archive.read(fleet.archive, name, *file)
+    )
+    storage = fleet.make_reader()
+    firsts = sorted({int(name.split("/")[1].split("-")[0]) for name in fleet.files if name.endswith(BATCHES)})
+    assert len(firsts) > filed.KEPT_OPEN
+    for _ in range(3):
+        for first in firsts:
+            assert storage.batches(1, first - 1, first)[0].revision == first
+    storage.close()
+    assert len(names) == len(firsts) * (1 + 2 * again)
 
 
 def test_a_deleted_hull_has_no_past_and_a_new_one_of_its_name_none_of_it(fleet):

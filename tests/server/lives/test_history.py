@@ -59,8 +59,10 @@ def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_pa
         first, last, *_ = newest.name.split("-")
         content = newest.read_bytes()
         newest.unlink()
-        with pytest.raises(DynhullError, match=f"revisions {int(first)} to {int(last)} cannot be read"):
+        with pytest.raises(DynhullError, match=f"revisions {int(first)} to {int(last)} cannot be read") as refused:
             client.at("fleet", int(first))
+        assert newest.name.removesuffix(".batches.parquet") in str(refused.value)
+        assert str(tmp_path) not in str(refused.value)  # where the server's files are is the operator's
         found = scrape(metrics)
         assert found[f'dynhull_past_holes{{first="{int(first)}",hull="fleet",last="{int(last)}"}}'] == 1
         assert found['dynhull_past_reads_total{outcome="unreadable"}'] >= 1

@@ -21,8 +21,9 @@ from .ledger import HullRows
 from .past_rows import STEP_POINTS
 from .segment_rows import StoredSegment
 
-# Segments whose columns stay in memory: what is read next is mostly in the same, or in the one after it.
-KEPT_OPEN = 3
+# Segments whose columns stay in memory, since what is read next is mostly in the same: these, and more of few rows, as
+# those of many hulls that are read in the order of their commits.
+KEPT_OPEN, KEPT_ROWS = 3, 2**20
 
 
 class Filed:
@@ -128,8 +129,9 @@ class Filed:
                 self._open.move_to_end(segment.file)
                 return reading, False
             reading = self._open[segment.file] = Future()
-            while len(self._open) > KEPT_OPEN:
-                self._open.popitem(last=False)
+            rows = sum(map(_rows, self._open.values()))
+            while len(self._open) > KEPT_OPEN and rows > KEPT_ROWS:
+                rows -= _rows(self._open.popitem(last=False)[1])
             return reading, True
 
     def _read(self, segment: StoredSegment, reading: "Future[Batches]") -> None:
@@ -165,7 +167,9 @@ class Filed:
         except StorageError as error:
             with self._turn:
                 self.unreadable.add(file)
-            raise type(error)(f"{what} cannot be read: {error}") from error
+            why = "is missing or damaged" if isinstance(error, DamagedError) else "cannot be read at present"
+            plainly = f"{what} cannot be read: segment {segment.file} {why}"
+            raise type(error)(f"{what} cannot be read: {error}", for_callers=plainly) from error
         with self._turn:
             self.unreadable.discard(file)
 
@@ -249,3 +253,8 @@ def _some(records: Iterator[Record]) -> list[Record]:
 
 def _not_kept(hull: HullRows, revision: int) -> DamagedError:
     return DamagedError(f"revision {revision} of hull {hull.row.name!r} is no longer kept")
+
+
+def _rows(reading: "Future[Batches]") -> int:
+    """The rows of a segment that has been read; 0 of one that is being read."""
+    return len(reading.result().columns) if reading.done() and reading.exception() is None else 0
