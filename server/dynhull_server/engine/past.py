@@ -279,6 +279,13 @@ class PastHulls:
         self._require_room(rebuilt.rows)
         state.catch_up(records, self._driver.machine.clock.monotonic())
 
+    def require_room(self, hulls: Sequence[Hull]) -> None:
+        """Raise LimitExceededError, which says why, if hulls that one reader has have too many points together."""
+        points = sum(hull.state.counts.points for hull in hulls)
+        if points > self._max_rows:
+            which = " and ".join(f"{hull.name!r} at revision {hull.state.counts.revision}" for hull in hulls)
+            raise LimitExceededError("max_past_rows", self._max_rows, f"{points} points of {which}")
+
     def _require_room(self, rows: int) -> None:
         if rows > self._max_rows:
             raise LimitExceededError("max_past_rows", self._max_rows)

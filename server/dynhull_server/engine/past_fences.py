@@ -16,6 +16,7 @@ from ..storage.port import DamagedError
 from .driver import Driver
 from .fences import Fences
 from .hulls import Hulls
+from .past import PastHulls
 from .watch_fence import EVENTS_TOGETHER
 
 # Rows of batches that one step applies, about: some milliseconds.
@@ -90,13 +91,17 @@ class _Run:
     """A fence, and the batches that it has still to compare.
 
     Args:
+        pasts: bounds the points of its hulls.
         fence: the fence.
         batches: those of its hulls; of that of the subjects first.
         until: the time up to which time passes after the last batch; None for none.
         leads: whether the last batch of the subjects is the end.
     """
 
-    def __init__(self, fence: PastFence, batches: list[_Batches], until: int | None, *, leads: bool) -> None:
+    def __init__(
+        self, pasts: PastHulls, fence: PastFence, batches: list[_Batches], until: int | None, *, leads: bool
+    ) -> None:
+        self._pasts = pasts
         self._fence = fence
         self._batches = batches
         self._until = until
@@ -106,7 +111,9 @@ class _Run:
     def step(self) -> list[FenceEvent]:
         """The next events, if some come soon."""
         fence, rows, made = self._fence, 0, self._fence.take()
+        hulls = [each.hull for each in self._batches]
         while rows < STEP_ROWS and len(made) < EVENTS_TOGETHER:
+            self._pasts.require_room(hulls)
             coming = [(first.number, each) for each in self._batches if (first := each.commit()) is not None]
             if not coming or (self._leads and self._batches[0].commit() is None):
                 if self._until is not None:
@@ -195,7 +202,7 @@ class PastFences:
                 for each in batches[1:]:
                     each.catch_up(commit.number)
             fence = PastFence(config, own, commit.time if began is None else began, checked)
-            return _Run(fence, batches, until, leads=leads)
+            return _Run(self._pasts, fence, batches, until, leads=leads)
 
         return await self._pasts.ask(config.subjects, begin), hulls
 

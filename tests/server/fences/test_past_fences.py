@@ -229,6 +229,21 @@ def test_a_hull_that_is_deleted_meanwhile_ends_it(client):
                 pass
 
 
+def test_its_hulls_have_no_more_points_together_than_a_reader_may_have(tmp_path):
+    options = "--data", str(tmp_path), "--max-past-rows", "30"
+    with server_process(*options, complaints=None) as server, HullClient(server.address) as client:
+        for name, points in (("yard", 10), ("fleet", 10)):
+            client.create_hull(name, keyed="str")
+            client.put(name, [f"k{i}" for i in range(points)], [(i, i * i) for i in range(points)])
+        client.put("fleet", [f"more {i}" for i in range(12)], [(i, -i * i) for i in range(12)])
+        assert list(client.fence_events_between("yard", "fleet", start=1, end=1))
+        assert list(client.fence_events_between(TRIANGLE, "fleet", start=1))
+        with pytest.raises(
+            LimitExceededError, match="max_past_rows is 30: 32 points of 'fleet' at revision 2 and 'yard'"
+        ):
+            list(client.fence_events_between("yard", "fleet", start=1))
+
+
 def test_the_asyncio_client_and_the_command_line(served, client, monkeypatch):
     expected = [plain(event) for event in client.fence_events_between(TRIANGLE, "all/a", start=3, end=30)]
 
