@@ -234,12 +234,14 @@ def _hulls_of(request: Any, config: FenceConfig) -> Iterable[tuple[str, str]]:
 
 
 def _names_of_alarm(request: alarm_service_pb2.CreateAlarmRequest) -> Iterable[tuple[str, str]]:
-    """The names of an alarm and of its hull, or of the prefix of its hulls, which has to have a whole first part."""
+    """The names of an alarm, of its hull, or the prefix of these, with a whole first part, and of the other hull."""
     config = decode_alarm(request)
     yield "name", decode_alarm_name(request.name)
     if config.kind == "prefix" and "/" not in config.subjects:
         raise decode.InvalidFieldError("rule.prefix", config.subjects, PREFIX_PROBLEM)
     yield f"rule.{request.rule.WhichOneof('hulls')}", config.subjects
+    if config.area_hull is not None:
+        yield "rule.when", config.area_hull
 
 
 def _counts(hull: hull_pb2.Hull) -> Counts:

@@ -4,13 +4,15 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import Literal
 
+from dynhull.keys import key_list
 from dynhull_proto.v1 import alarm_pb2, alarm_service_pb2
 
 from ._fence_messages import FenceConsumer, decode_consumer, words_of
+from ._keys import decode_keys
 from ._times import decode_time
 
 AlarmEventType = Literal["raised", "cleared", "snapshot", "closed", "lost", "progress", "unknown"]
-AlarmCause = Literal["batch", "expired", "hull_deleted", "alarm_created", "time_passed"]
+AlarmCause = Literal["batch", "expired", "hull_deleted", "alarm_created", "time_passed", "other_hull"]
 
 TYPES: dict[int, AlarmEventType] = words_of(alarm_pb2.AlarmEventType.items(), "ALARM_EVENT_TYPE_")
 CAUSES: dict[int, AlarmCause] = words_of(alarm_pb2.AlarmCause.items(), "ALARM_CAUSE_")
@@ -24,7 +26,8 @@ class AlarmStatus:
         hull: the name of the hull.
         raised: whether the alarm is raised for it.
         revision: the revision of the hull.
-        value: its measure there; of "silent", the seconds since its last change.
+        value: its measure there; of "silent", the seconds since its last change; of "near", the distance, infinite if
+            one of the hulls is empty; of "vertex in", the number of vertices in the area; of "vertex", 1 or 0.
         since: since when the condition holds, while the alarm is raised or waits for its time to hold; otherwise None.
         acknowledged: when somebody has acknowledged the alarm that is raised; None if nobody has.
         muted_until: until when the alarm is muted for this hull; None if it is not.
@@ -94,13 +97,17 @@ class AlarmEvent:
         uid: the uid of the alarm; with `sequence` it identifies the event.
         hull: the name of the hull; empty if there is no single one.
         revision: the revision of the hull at which the event was made.
-        value: the measure there, rounded; of "silent", the seconds since the last change; None if the hull is deleted.
+        value: the measure there, rounded; of "silent", the seconds since the last change; of "near", the distance; of
+            "vertex in", the number of vertices in the area; of "vertex", 1 or 0. None if the hull is deleted, or the
+            distance is that from an empty hull.
         bound: what it was compared with, on the globe in metres or square metres.
         cause: why it happened.
         cause_revision: the revision with which the condition began to hold, which with `for_` is before `revision`.
+        cause_hull: the hull whose revision that is: the other one that the condition names if that alone had changed.
         cause_time: the time of that revision; of "silent", that of the last change.
         previous: the measure at the revision before that one; None where there was none.
         time: when the server made the event; None for "lost" and "progress".
+        keys: of "raised" and "vertex in", the keys of the vertices in the area, at most 100; of "vertex", that key.
         raised: of "snapshot" and "closed", the names of the hulls for which the alarm was raised.
         first: of "lost", the first sequence that was dropped; 0 otherwise.
         last: of "lost", the last sequence that was dropped; 0 otherwise.
@@ -116,9 +123,11 @@ class AlarmEvent:
     bound: float | None = None
     cause: frozenset[AlarmCause] = frozenset()
     cause_revision: int = 0
+    cause_hull: str = ""
     cause_time: datetime | None = None
     previous: float | None = None
     time: datetime | None = None
+    keys: tuple[str | int, ...] = ()
     raised: tuple[str, ...] = ()
     first: int = 0
     last: int = 0
@@ -178,8 +187,10 @@ def decode_alarm_event(message: alarm_pb2.AlarmEvent, alarm: str, uid: str) -> A
         bound=message.bound if of_hull else None,
         cause=frozenset(CAUSES[each] for each in message.causes if each in CAUSES),
         cause_revision=message.cause_revision,
+        cause_hull=message.cause_hull,
         cause_time=decode_time(message.cause_time) if message.HasField("cause_time") else None,
         previous=message.previous_value if message.HasField("previous_value") else None,
         time=decode_time(message.time),
+        keys=tuple(key_list(decode_keys(message.keys))) if message.HasField("keys") else (),
         raised=tuple(message.raised),
     )

@@ -45,9 +45,11 @@ def create_alarm(
             of its own.
         when: the condition: a measure (area, perimeter, diameter, width, count or vertices), >, >=, < or <=, a number
             and, of geographic hulls, m, km, m2 or km2: "area > 500 km2". Or "silent 5m": the hull has not changed for
-            so long.
-        clear: the condition that clears the alarm, weaker than the opposite of `when`: "area < 450 km2". Default: the
-            opposite.
+            so long. Or "near fleet/south 3 km", "vertex in yard" and "vertex truck-7", each also after "not": two hulls
+            are at most so far apart, without a distance they meet; a vertex is in an area: another hull, "circle(x, y,
+            radius)" or "polygon(x y, x y, x y)"; a key is at a vertex.
+        clear: the condition that clears the alarm, weaker than the opposite of `when`: "area < 450 km2", "not near
+            fleet/south 4 km". Default: the opposite.
         for_: how long the condition must hold before the alarm is raised: seconds, a timedelta, or text such as "30s".
         max_events: the number of events to keep; 0 for the limit of the server.
         max_event_age: seconds or a timedelta for which events are kept; None for no limit.

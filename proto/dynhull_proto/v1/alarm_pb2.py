@@ -23,11 +23,12 @@ _sym_db = _symbol_database.Default()
 
 
 from dynhull_proto.v1 import fence_pb2 as dynhull__proto_dot_v1_dot_fence__pb2
+from dynhull_proto.v1 import points_pb2 as dynhull__proto_dot_v1_dot_points__pb2
 from google.protobuf import duration_pb2 as google_dot_protobuf_dot_duration__pb2
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x64ynhull_proto/v1/alarm.proto\x12\ndynhull.v1\x1a\x1c\x64ynhull_proto/v1/fence.proto\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\xff\x01\n\x05\x41larm\x12\x0c\n\x04name\x18\x01 \x01(\t\x12#\n\x04rule\x18\x02 \x01(\x0b\x32\x15.dynhull.v1.AlarmRule\x12/\n\x0b\x63reate_time\x18\x03 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0b\n\x03uid\x18\x04 \x01(\t\x12\x15\n\rlast_sequence\x18\x05 \x01(\x04\x12\x16\n\x0e\x66irst_sequence\x18\x06 \x01(\x04\x12\x12\n\nhull_count\x18\x07 \x01(\x04\x12\x14\n\x0craised_count\x18\x08 \x01(\x04\x12,\n\tconsumers\x18\t \x03(\x0b\x32\x19.dynhull.v1.FenceConsumer\"\xc2\x01\n\tAlarmRule\x12\x0e\n\x04hull\x18\x01 \x01(\tH\x00\x12\x10\n\x06prefix\x18\x02 \x01(\tH\x00\x12\x0c\n\x04when\x18\x03 \x01(\t\x12\r\n\x05\x63lear\x18\x04 \x01(\t\x12\'\n\x04hold\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x12\n\nmax_events\x18\x06 \x01(\x04\x12\x30\n\rmax_event_age\x18\x07 \x01(\x0b\x32\x19.google.protobuf.DurationB\x07\n\x05hulls\"\xef\x02\n\nAlarmEvent\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12(\n\x04type\x18\x02 \x01(\x0e\x32\x1a.dynhull.v1.AlarmEventType\x12\x0c\n\x04hull\x18\x03 \x01(\t\x12\x10\n\x08revision\x18\x04 \x01(\x04\x12\x12\n\x05value\x18\x05 \x01(\x01H\x00\x88\x01\x01\x12\r\n\x05\x62ound\x18\x06 \x01(\x01\x12&\n\x06\x63\x61uses\x18\x07 \x03(\x0e\x32\x16.dynhull.v1.AlarmCause\x12\x16\n\x0e\x63\x61use_revision\x18\x08 \x01(\x04\x12.\n\ncause_time\x18\t \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x1b\n\x0eprevious_value\x18\n \x01(\x01H\x01\x88\x01\x01\x12(\n\x04time\x18\x0b \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06raised\x18\x0c \x03(\tB\x08\n\x06_valueB\x11\n\x0f_previous_value\"\xdc\x01\n\x0b\x41larmStatus\x12\x0c\n\x04hull\x18\x01 \x01(\t\x12\x0e\n\x06raised\x18\x02 \x01(\x08\x12\x10\n\x08revision\x18\x03 \x01(\x04\x12\r\n\x05value\x18\x04 \x01(\x01\x12)\n\x05since\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x34\n\x10\x61\x63knowledge_time\x18\x06 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12-\n\tmute_time\x18\x07 \x01(\x0b\x32\x1a.google.protobuf.Timestamp*\xa9\x01\n\x0e\x41larmEventType\x12 \n\x1c\x41LARM_EVENT_TYPE_UNSPECIFIED\x10\x00\x12\x1b\n\x17\x41LARM_EVENT_TYPE_RAISED\x10\x01\x12\x1c\n\x18\x41LARM_EVENT_TYPE_CLEARED\x10\x02\x12\x1d\n\x19\x41LARM_EVENT_TYPE_SNAPSHOT\x10\x03\x12\x1b\n\x17\x41LARM_EVENT_TYPE_CLOSED\x10\x04*\xb3\x01\n\nAlarmCause\x12\x1b\n\x17\x41LARM_CAUSE_UNSPECIFIED\x10\x00\x12\x15\n\x11\x41LARM_CAUSE_BATCH\x10\x01\x12\x17\n\x13\x41LARM_CAUSE_EXPIRED\x10\x02\x12\x1c\n\x18\x41LARM_CAUSE_HULL_DELETED\x10\x03\x12\x1d\n\x19\x41LARM_CAUSE_ALARM_CREATED\x10\x04\x12\x1b\n\x17\x41LARM_CAUSE_TIME_PASSED\x10\x05\x42\x16Z\x14\x64ynhull/v1;dynhullv1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x64ynhull_proto/v1/alarm.proto\x12\ndynhull.v1\x1a\x1c\x64ynhull_proto/v1/fence.proto\x1a\x1d\x64ynhull_proto/v1/points.proto\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\xff\x01\n\x05\x41larm\x12\x0c\n\x04name\x18\x01 \x01(\t\x12#\n\x04rule\x18\x02 \x01(\x0b\x32\x15.dynhull.v1.AlarmRule\x12/\n\x0b\x63reate_time\x18\x03 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0b\n\x03uid\x18\x04 \x01(\t\x12\x15\n\rlast_sequence\x18\x05 \x01(\x04\x12\x16\n\x0e\x66irst_sequence\x18\x06 \x01(\x04\x12\x12\n\nhull_count\x18\x07 \x01(\x04\x12\x14\n\x0craised_count\x18\x08 \x01(\x04\x12,\n\tconsumers\x18\t \x03(\x0b\x32\x19.dynhull.v1.FenceConsumer\"\xc2\x01\n\tAlarmRule\x12\x0e\n\x04hull\x18\x01 \x01(\tH\x00\x12\x10\n\x06prefix\x18\x02 \x01(\tH\x00\x12\x0c\n\x04when\x18\x03 \x01(\t\x12\r\n\x05\x63lear\x18\x04 \x01(\t\x12\'\n\x04hold\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\x12\n\nmax_events\x18\x06 \x01(\x04\x12\x30\n\rmax_event_age\x18\x07 \x01(\x0b\x32\x19.google.protobuf.DurationB\x07\n\x05hulls\"\xa3\x03\n\nAlarmEvent\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12(\n\x04type\x18\x02 \x01(\x0e\x32\x1a.dynhull.v1.AlarmEventType\x12\x0c\n\x04hull\x18\x03 \x01(\t\x12\x10\n\x08revision\x18\x04 \x01(\x04\x12\x12\n\x05value\x18\x05 \x01(\x01H\x00\x88\x01\x01\x12\r\n\x05\x62ound\x18\x06 \x01(\x01\x12&\n\x06\x63\x61uses\x18\x07 \x03(\x0e\x32\x16.dynhull.v1.AlarmCause\x12\x16\n\x0e\x63\x61use_revision\x18\x08 \x01(\x04\x12.\n\ncause_time\x18\t \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x1b\n\x0eprevious_value\x18\n \x01(\x01H\x01\x88\x01\x01\x12(\n\x04time\x18\x0b \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06raised\x18\x0c \x03(\t\x12\x12\n\ncause_hull\x18\r \x01(\t\x12\x1e\n\x04keys\x18\x0e \x01(\x0b\x32\x10.dynhull.v1.KeysB\x08\n\x06_valueB\x11\n\x0f_previous_value\"\xdc\x01\n\x0b\x41larmStatus\x12\x0c\n\x04hull\x18\x01 \x01(\t\x12\x0e\n\x06raised\x18\x02 \x01(\x08\x12\x10\n\x08revision\x18\x03 \x01(\x04\x12\r\n\x05value\x18\x04 \x01(\x01\x12)\n\x05since\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x34\n\x10\x61\x63knowledge_time\x18\x06 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12-\n\tmute_time\x18\x07 \x01(\x0b\x32\x1a.google.protobuf.Timestamp*\xa9\x01\n\x0e\x41larmEventType\x12 \n\x1c\x41LARM_EVENT_TYPE_UNSPECIFIED\x10\x00\x12\x1b\n\x17\x41LARM_EVENT_TYPE_RAISED\x10\x01\x12\x1c\n\x18\x41LARM_EVENT_TYPE_CLEARED\x10\x02\x12\x1d\n\x19\x41LARM_EVENT_TYPE_SNAPSHOT\x10\x03\x12\x1b\n\x17\x41LARM_EVENT_TYPE_CLOSED\x10\x04*\xcf\x01\n\nAlarmCause\x12\x1b\n\x17\x41LARM_CAUSE_UNSPECIFIED\x10\x00\x12\x15\n\x11\x41LARM_CAUSE_BATCH\x10\x01\x12\x17\n\x13\x41LARM_CAUSE_EXPIRED\x10\x02\x12\x1c\n\x18\x41LARM_CAUSE_HULL_DELETED\x10\x03\x12\x1d\n\x19\x41LARM_CAUSE_ALARM_CREATED\x10\x04\x12\x1b\n\x17\x41LARM_CAUSE_TIME_PASSED\x10\x05\x12\x1a\n\x16\x41LARM_CAUSE_OTHER_HULL\x10\x06\x42\x16Z\x14\x64ynhull/v1;dynhullv1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,16 +36,16 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'dynhull_proto.v1.alarm_pb2'
 if not _descriptor._USE_C_DESCRIPTORS:
   _globals['DESCRIPTOR']._loaded_options = None
   _globals['DESCRIPTOR']._serialized_options = b'Z\024dynhull/v1;dynhullv1'
-  _globals['_ALARMEVENTTYPE']._serialized_start=1188
-  _globals['_ALARMEVENTTYPE']._serialized_end=1357
-  _globals['_ALARMCAUSE']._serialized_start=1360
-  _globals['_ALARMCAUSE']._serialized_end=1539
-  _globals['_ALARM']._serialized_start=140
-  _globals['_ALARM']._serialized_end=395
-  _globals['_ALARMRULE']._serialized_start=398
-  _globals['_ALARMRULE']._serialized_end=592
-  _globals['_ALARMEVENT']._serialized_start=595
-  _globals['_ALARMEVENT']._serialized_end=962
-  _globals['_ALARMSTATUS']._serialized_start=965
-  _globals['_ALARMSTATUS']._serialized_end=1185
+  _globals['_ALARMEVENTTYPE']._serialized_start=1271
+  _globals['_ALARMEVENTTYPE']._serialized_end=1440
+  _globals['_ALARMCAUSE']._serialized_start=1443
+  _globals['_ALARMCAUSE']._serialized_end=1650
+  _globals['_ALARM']._serialized_start=171
+  _globals['_ALARM']._serialized_end=426
+  _globals['_ALARMRULE']._serialized_start=429
+  _globals['_ALARMRULE']._serialized_end=623
+  _globals['_ALARMEVENT']._serialized_start=626
+  _globals['_ALARMEVENT']._serialized_end=1045
+  _globals['_ALARMSTATUS']._serialized_start=1048
+  _globals['_ALARMSTATUS']._serialized_end=1268
 # @@protoc_insertion_point(module_scope)

@@ -1,6 +1,7 @@
 import datetime
 
 from dynhull_proto.v1 import fence_pb2 as _fence_pb2
+from dynhull_proto.v1 import points_pb2 as _points_pb2
 from google.protobuf import duration_pb2 as _duration_pb2
 from google.protobuf import timestamp_pb2 as _timestamp_pb2
 from google.protobuf.internal import containers as _containers
@@ -28,6 +29,7 @@ class AlarmCause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     ALARM_CAUSE_HULL_DELETED: _ClassVar[AlarmCause]
     ALARM_CAUSE_ALARM_CREATED: _ClassVar[AlarmCause]
     ALARM_CAUSE_TIME_PASSED: _ClassVar[AlarmCause]
+    ALARM_CAUSE_OTHER_HULL: _ClassVar[AlarmCause]
 ALARM_EVENT_TYPE_UNSPECIFIED: AlarmEventType
 ALARM_EVENT_TYPE_RAISED: AlarmEventType
 ALARM_EVENT_TYPE_CLEARED: AlarmEventType
@@ -39,6 +41,7 @@ ALARM_CAUSE_EXPIRED: AlarmCause
 ALARM_CAUSE_HULL_DELETED: AlarmCause
 ALARM_CAUSE_ALARM_CREATED: AlarmCause
 ALARM_CAUSE_TIME_PASSED: AlarmCause
+ALARM_CAUSE_OTHER_HULL: AlarmCause
 
 class Alarm(_message.Message):
     __slots__ = ("name", "rule", "create_time", "uid", "last_sequence", "first_sequence", "hull_count", "raised_count", "consumers")
@@ -81,7 +84,7 @@ class AlarmRule(_message.Message):
     def __init__(self, hull: _Optional[str] = ..., prefix: _Optional[str] = ..., when: _Optional[str] = ..., clear: _Optional[str] = ..., hold: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_events: _Optional[int] = ..., max_event_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ...) -> None: ...
 
 class AlarmEvent(_message.Message):
-    __slots__ = ("sequence", "type", "hull", "revision", "value", "bound", "causes", "cause_revision", "cause_time", "previous_value", "time", "raised")
+    __slots__ = ("sequence", "type", "hull", "revision", "value", "bound", "causes", "cause_revision", "cause_time", "previous_value", "time", "raised", "cause_hull", "keys")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     TYPE_FIELD_NUMBER: _ClassVar[int]
     HULL_FIELD_NUMBER: _ClassVar[int]
@@ -94,6 +97,8 @@ class AlarmEvent(_message.Message):
     PREVIOUS_VALUE_FIELD_NUMBER: _ClassVar[int]
     TIME_FIELD_NUMBER: _ClassVar[int]
     RAISED_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_HULL_FIELD_NUMBER: _ClassVar[int]
+    KEYS_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     type: AlarmEventType
     hull: str
@@ -106,7 +111,9 @@ class AlarmEvent(_message.Message):
     previous_value: float
     time: _timestamp_pb2.Timestamp
     raised: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, sequence: _Optional[int] = ..., type: _Optional[_Union[AlarmEventType, str]] = ..., hull: _Optional[str] = ..., revision: _Optional[int] = ..., value: _Optional[float] = ..., bound: _Optional[float] = ..., causes: _Optional[_Iterable[_Union[AlarmCause, str]]] = ..., cause_revision: _Optional[int] = ..., cause_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., previous_value: _Optional[float] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., raised: _Optional[_Iterable[str]] = ...) -> None: ...
+    cause_hull: str
+    keys: _points_pb2.Keys
+    def __init__(self, sequence: _Optional[int] = ..., type: _Optional[_Union[AlarmEventType, str]] = ..., hull: _Optional[str] = ..., revision: _Optional[int] = ..., value: _Optional[float] = ..., bound: _Optional[float] = ..., causes: _Optional[_Iterable[_Union[AlarmCause, str]]] = ..., cause_revision: _Optional[int] = ..., cause_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., previous_value: _Optional[float] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., raised: _Optional[_Iterable[str]] = ..., cause_hull: _Optional[str] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class AlarmStatus(_message.Message):
     __slots__ = ("hull", "raised", "revision", "value", "since", "acknowledge_time", "mute_time")

@@ -27,8 +27,8 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class AlarmServiceStub:
-    """Alarms: exact events when a measure of an outline passes a bound, or a hull falls silent. Errors are as in HullService; a
-    resource is an alarm, a consumer or a hull.
+    """Alarms: exact events when a measure of an outline passes a bound, a hull falls silent, two hulls meet, or a vertex reaches
+    an area. Errors are as in HullService; a resource is an alarm, a consumer or a hull.
 
     The events of an alarm equal the changes of its condition between consecutive revisions of each hull, and are committed
     together with the batch that caused them. Between two raises for one hull there is exactly one clear.
@@ -37,7 +37,7 @@ class AlarmServiceStub:
     an alarm only knows by its prefix can: if the alarm is raised for it, that is cleared.
 
     A caller with a token needs the right to write for the name of the alarm, and the right to read for the hull or the prefix,
-    to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
+    and for the other hull that its condition names, to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
     name for all else.
     """
 
@@ -70,8 +70,8 @@ class AlarmServiceStub:
 
 @_typing.type_check_only
 class AlarmServiceAsyncStub(AlarmServiceStub):
-    """Alarms: exact events when a measure of an outline passes a bound, or a hull falls silent. Errors are as in HullService; a
-    resource is an alarm, a consumer or a hull.
+    """Alarms: exact events when a measure of an outline passes a bound, a hull falls silent, two hulls meet, or a vertex reaches
+    an area. Errors are as in HullService; a resource is an alarm, a consumer or a hull.
 
     The events of an alarm equal the changes of its condition between consecutive revisions of each hull, and are committed
     together with the batch that caused them. Between two raises for one hull there is exactly one clear.
@@ -80,7 +80,7 @@ class AlarmServiceAsyncStub(AlarmServiceStub):
     an alarm only knows by its prefix can: if the alarm is raised for it, that is cleared.
 
     A caller with a token needs the right to write for the name of the alarm, and the right to read for the hull or the prefix,
-    to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
+    and for the other hull that its condition names, to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
     name for all else.
     """
 
@@ -109,8 +109,8 @@ class AlarmServiceAsyncStub(AlarmServiceStub):
     """Mutes an alarm for a hull until a time, for who shows alarms: its events are made and sent as before."""
 
 class AlarmServiceServicer(metaclass=_abc_1.ABCMeta):
-    """Alarms: exact events when a measure of an outline passes a bound, or a hull falls silent. Errors are as in HullService; a
-    resource is an alarm, a consumer or a hull.
+    """Alarms: exact events when a measure of an outline passes a bound, a hull falls silent, two hulls meet, or a vertex reaches
+    an area. Errors are as in HullService; a resource is an alarm, a consumer or a hull.
 
     The events of an alarm equal the changes of its condition between consecutive revisions of each hull, and are committed
     together with the batch that caused them. Between two raises for one hull there is exactly one clear.
@@ -119,7 +119,7 @@ class AlarmServiceServicer(metaclass=_abc_1.ABCMeta):
     an alarm only knows by its prefix can: if the alarm is raised for it, that is cleared.
 
     A caller with a token needs the right to write for the name of the alarm, and the right to read for the hull or the prefix,
-    to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
+    and for the other hull that its condition names, to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
     name for all else.
     """
 

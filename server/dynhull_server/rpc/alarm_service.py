@@ -37,13 +37,18 @@ class AlarmService:
         call.access.require_write(name)
         config = decode_alarm(request)
         call.access.require_read(config.subjects)
+        if config.area_hull is not None:
+            call.access.require_read(config.area_hull)
         alarm = await self._alarms.create(name, config)
         return pb.CreateAlarmResponse(alarm=encode_alarm(alarm, {}))
 
     async def DeleteAlarm(self, request: pb.DeleteAlarmRequest, call: Call) -> pb.DeleteAlarmResponse:
         name = decode_alarm_name(request.name)
         call.access.require_write(name)
-        call.access.require_read(self._alarms.get(name).fence.row.config.subjects)
+        config = self._alarms.get(name).fence.row.config
+        call.access.require_read(config.subjects)
+        if config.area_hull is not None:
+            call.access.require_read(config.area_hull)
         await self._alarms.delete(name)
         return pb.DeleteAlarmResponse()
 

@@ -10,7 +10,8 @@ from ..state.alarms.rule import AlarmRule, unmarked
 from ..state.alarms.status import AlarmStatus
 from ..state.fences.model.records import Cause, EventType, FenceEvent
 from ..state.records import NO_TIME
-from .encode_fence import encode_consumer
+from .encode import encode_keys
+from .encode_fence import PACKED, encode_consumer
 
 # An alarm that is raised for a hull is kept as a hull that begins to be near.
 TYPES = {
@@ -26,7 +27,9 @@ CAUSES = {
     Cause.REMOVED: alarm_pb2.ALARM_CAUSE_HULL_DELETED,
     Cause.CREATED: alarm_pb2.ALARM_CAUSE_ALARM_CREATED,
     Cause.TIME: alarm_pb2.ALARM_CAUSE_TIME_PASSED,
+    Cause.AREA: alarm_pb2.ALARM_CAUSE_OTHER_HULL,
 }
+OF_OTHER = Cause.AREA, Cause.AREA | Cause.TIME  # the other hull alone has changed
 
 
 def encode_alarm(alarm: LiveFence, oldest: Mapping[str, int]) -> alarm_pb2.Alarm:
@@ -105,12 +108,17 @@ def encode_alarm_event(event: FenceEvent, rule: AlarmRule) -> alarm_pb2.AlarmEve
         revision=event.subject_revision,
         causes=sorted({CAUSES[each] for each in Cause if each & event.causes and each in CAUSES}),
         cause_revision=event.area_revision,
-        raised=[each.hull for each in event.inside],
     )
     if event.type in (EventType.BEGIN, EventType.CEASE):
+        other = rule.other if event.causes in OF_OTHER else None
+        message.cause_hull = event.hull if other is None else other
+        for members in event.inside:
+            message.keys.CopyFrom(encode_keys(members.keys, PACKED))
         message.bound = (rule.raises if event.type is EventType.BEGIN else rule.clears).limit
         if not event.causes & Cause.REMOVED and event.distance is not None:
             message.value = event.distance
+    else:
+        message.raised.extend(each.hull for each in event.inside)
     if event.previous is not None:
         message.previous_value = event.previous[0]
     if event.event_time != NO_TIME:

@@ -88,7 +88,9 @@ class Registry:
             return [config.subjects] if config.kind == "hull" or config.rule is not None else []
         names = [name for name in self.hulls.irange(config.subjects) if name.startswith(config.subjects)]
         if config.rule is not None:
-            return [name for name in names if config.rule.suits(geographic=self.hulls[name].row.settings.geographic)]
+            other = None if config.rule.other is None else self.hulls[config.rule.other].row.settings
+            suits = config.rule.suits
+            return [each for each in names if config.compares(each) and suits(self.hulls[each].row.settings, other)]
         return [name for name in names if self.hulls[name].row.settings.identity != "multiset"]
 
     def reserve_hull(self) -> Reservation:

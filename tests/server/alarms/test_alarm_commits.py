@@ -94,3 +94,28 @@ def test_a_batch_that_was_not_committed_is_not_what_was_before(tmp_path: Path, f
             assert (event.distance, event.subject_revision) == (4.0, 3 if fault == "after" else 2)
 
     asyncio.run(life())
+
+
+@pytest.mark.parametrize("fault", ["refused", "before", "after"])
+def test_a_batch_to_the_other_hull_raises_an_alarm_if_it_is_there(tmp_path: Path, fault: str) -> None:
+    async def life() -> None:
+        async with engine_on(tmp_path) as (engine, storage):
+            for hull in ("fleet/a", "fleet/b"):
+                await engine.hulls.create(hull, HullSettings("str"))
+            await engine.alarms.create(
+                "near", FenceConfig(AlarmRule("near fleet/b", "not near fleet/b"), "prefix", "f")
+            )
+            await square(engine, "fleet/a", 2)
+            alarm = engine.alarms.get("near")
+            storage.fault = fault
+            if fault == "after":
+                await square(engine, "fleet/b", 1)
+            else:
+                with pytest.raises(NotStoredError):
+                    await square(engine, "fleet/b", 1)
+            assert alarm.fence.inside == int(fault == "after")
+            await square(engine, "fleet/b", 1)
+            assert (alarm.fence.inside, alarm.fence.last) == (1, 1)
+            engine.driver.core.check()
+
+    asyncio.run(life())

@@ -111,3 +111,54 @@ def test_events_are_those_of_exact_rationals(measure: str, op: str, scale: float
     assert life.made == expected
     assert len(expected) > 3
     assert attained > 0
+
+
+def apart(one: list[Corner], other: list[Corner]) -> Fraction:
+    """The square of the distance of two convex polygons, points or segments, which do not intersect."""
+    return min(square_to(p, a, b) for p, ring in pairs(one, other) for a, b in pairwise([*ring, ring[0]]))
+
+
+def pairs(one: list[Corner], other: list[Corner]) -> list[tuple[Corner, list[Corner]]]:
+    return [(p, other) for p in one] + [(p, one) for p in other]
+
+
+def square_to(p: Corner, a: Corner, b: Corner) -> Fraction:
+    (dx, dy), (px, py) = (b[0] - a[0], b[1] - a[1]), (p[0] - a[0], p[1] - a[1])
+    length = dx * dx + dy * dy
+    share = min(max((px * dx + py * dy) / length, Fraction(0)), Fraction(1)) if length else Fraction(0)
+    return (px - share * dx) ** 2 + (py - share * dy) ** 2
+
+
+@pytest.mark.parametrize("scale", [1.0, 3.0, 2.0**-400, 2.0**400])
+def test_distances_are_those_of_exact_rationals(scale: float) -> None:
+    """Two hulls on either side of an axis, one of which moves at a time."""
+    dice = random.Random(f"near {scale}")
+    bound = 2 * scale
+    rule = AlarmRule(f"near b {bound!r}", f"not near b {bound!r}")
+    life, positions, expected, attained, raised = Life(), {"a": {}, "b": {}}, [], 0, False
+    for hull in positions:
+        life.step(CreateHull(Everyone(), hull, CREATED, HullSettings("int")))
+    life.step(CreateFence(Everyone(), marked("size"), 0, FenceConfig(rule, "other", "a"), CREATED))
+    revisions = {"a": 0, "b": 0}
+    for keys, points in batches(dice, scale):
+        hull = dice.choice("ab")
+        points[:, 0] = np.abs(points[:, 0]) * (1 if hull == "a" else -1) + (0 if hull == "a" else -scale)
+        keys, points = keys[:1] % 2, points[:1]
+        revisions[hull] += 1
+        write = Write(hull, KeyedBatch("int", keys, points, keys[:0]), revisions[hull], len(keys))
+        life.step(WriteBatch(Everyone(), write))
+        positions[hull].update(zip(keys.tolist(), points.tolist(), strict=True))
+        if not (positions["a"] and positions["b"]):
+            continue
+        one, other = (
+            [(Fraction(x), Fraction(y)) for x, y in convex_hull(np.array(list(each.values()))).tolist()]
+            for each in positions.values()
+        )
+        square = apart(one, other)
+        attained += square == Fraction(bound) ** 2
+        if (square <= Fraction(bound) ** 2) != raised:
+            raised = not raised
+            expected.append((raised, revisions["a"]))
+    assert life.made == expected
+    assert len(expected) > 3
+    assert attained > 0

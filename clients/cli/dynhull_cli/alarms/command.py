@@ -10,6 +10,6 @@ from .settings import ack, create, mute
 def alarms() -> None:
     """Create alarms on the outline of hulls, and follow when they are raised and cleared.
 
-    An alarm compares a measure of a hull with a bound, or says that a hull has fallen silent: one hull, or all with a
-    prefix. Its events are numbered, and kept for durable consumers.
+    An alarm compares a measure of a hull with a bound, or says that a hull has fallen silent, comes near another one,
+    or has a vertex in an area: one hull, or all with a prefix. Its events are numbered, and kept for durable consumers.
     """

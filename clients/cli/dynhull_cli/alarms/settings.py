@@ -24,8 +24,10 @@ def create(
     when: Annotated[
         str,
         typer.Option(
-            help="Condition that raises it: MEASURE OP NUMBER [UNIT], or silent SPAN. MEASURE is area, perimeter, "
-            "diameter, width, count or vertices; OP is >, >=, < or <=; UNIT is m, km, m2 or km2, for geographic hulls."
+            help="Condition that raises it: MEASURE OP NUMBER [UNIT], silent SPAN, near HULL [DISTANCE], "
+            "vertex in AREA, or vertex KEY. MEASURE is area, perimeter, diameter, width, count or vertices; OP is >, "
+            ">=, < or <=; UNIT is m, km, m2 or km2, for geographic hulls; AREA is a hull, circle(X, Y, RADIUS) or "
+            "polygon(X Y, X Y, X Y)."
         ),
     ],
     hull: Annotated[str | None, typer.Option(metavar="HULL", help="The hull that is watched.")] = None,
@@ -51,6 +53,7 @@ def create(
 
         dynhull alarms create spread --hull fleet/north --when 'area > 500 km2' --clear 'area < 450 km2' --for 30s
         dynhull alarms create quiet --prefix fleet/ --when 'silent 5m'
+        dynhull alarms create close --hull fleet/north --when 'near fleet/south 2' --clear 'not near fleet/south 3'
 
     In the plane area, diameter and width are compared exactly. Hulls for which the condition holds already raise it.
     """

@@ -3,13 +3,16 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+from ..records import HullSettings
 from .conditions import SILENT, Condition, condition_of
 
 # What a batch that leaves the outline as it is cannot change.
-OF_OUTLINES = frozenset({"area", "perimeter", "diameter", "width", "vertices"})
+OF_OUTLINES = frozenset({"area", "perimeter", "diameter", "width", "vertices", "near", "vertex in"})
 # Alarms and fences have names of their own: no name of a fence has a colon.
 MARK = "alarm:"
 MICROSECONDS = 10**6
+# Keys that are integers are below it.
+KEYS = 2**64
 
 
 @dataclass(frozen=True)
@@ -42,18 +45,35 @@ class AlarmRule:
         return round(self.raises.bound * MICROSECONDS) if self.raises.measure == SILENT else 0
 
     @cached_property
-    def of_points(self) -> bool:
-        """Whether it compares the number of points, which may change with the vertices as they are."""
-        return self.raises.measure == "count"
+    def counts(self) -> bool:
+        """Whether what it compares is a number that is looked up: of points, or of vertices in an area."""
+        return self.raises.measure == "count" or self.raises.of_vertices
 
     @cached_property
     def of_outline(self) -> bool:
         """Whether nothing but a change of the outline means anything for it."""
         return self.raises.measure in OF_OUTLINES
 
-    def suits(self, *, geographic: bool) -> bool:
-        """Whether hulls in the plane, or on the globe, have its measure."""
-        return self.raises.measure != "width" if geographic else not (self.raises.unit or self.clears.unit)
+    @property
+    def other(self) -> str | None:
+        """The name of the other hull that it compares hulls with, None for none."""
+        return self.raises.other
+
+    def suits(self, settings: HullSettings, other: HullSettings | None = None) -> bool:
+        """Whether hulls with these settings have its measure; `other` are those of the other hull that it names."""
+        raises, geographic = self.raises, settings.geographic
+        if other is not None and other.geographic != geographic:
+            return False
+        if raises.measure == "vertex" and not is_key(str(raises.subject), settings.identity):
+            return False
+        return raises.measure != "width" if geographic else not (raises.unit or self.clears.unit)
+
+
+def is_key(text: str, identity: str) -> bool:
+    """Whether a text is a key of hulls whose points are identified so."""
+    if identity == "int":
+        return text.isascii() and text.isdecimal() and str(int(text)) == text and int(text) < KEYS
+    return identity == "str"
 
 
 def marked(name: str) -> str:

@@ -4,20 +4,24 @@ from collections.abc import Collection, Iterator, Mapping
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING
 
-from ..batch import NO_POINTS
+import numpy as np
+
+from dynhull.keys import PackedKeys
+
 from ..records import NO_TIME
 from .conditions import Condition
 from .rule import MICROSECONDS, AlarmRule
-from .values import sign_of, value_of
+from .values import NOTHING, Seen, holds, rows_in, seen, value_of
 
 if TYPE_CHECKING:
-    from dynhull.arrays import Points
-
     from ..fences.model.records import Delay, Subject
     from ..hull import Hull
+    from ..records import Keys
 
+# An event has at most so many keys.
+MOST_KEYS = 100
 # No hull has so many changes.
-NEVER = -1
+NEVER = -1, -1
 
 
 class Watched:
@@ -27,9 +31,11 @@ class Watched:
         rule: the rule of the alarm.
         hull: the hull.
         moved: the time of its last change, in microseconds since 1970.
+        other: the other hull that the rule names, None if it names none.
 
     Attributes:
         hull: the hull.
+        other: the other hull.
         raised: whether the alarm is raised for it.
         standing: since when and why the condition holds, who has acknowledged it, and until when it is muted; None for
             nothing of that.
@@ -39,36 +45,46 @@ class Watched:
     """
 
     __slots__ = (
-        "_changes",
-        "_points",
+        "_as_of",
         "_rule",
-        "_vertices",
+        "_seen",
         "fresh",
         "hull",
         "moved",
+        "other",
         "planned",
         "raised",
         "standing",
     )
 
-    def __init__(self, rule: AlarmRule, hull: "Hull", moved: int) -> None:
+    def __init__(self, rule: AlarmRule, hull: "Hull", moved: int, other: "Hull | None") -> None:
         self.hull = hull
+        self.other = other
         self.raised = False
         self.standing: Delay | None = None
         self.moved = moved
         self.planned: int | None = None
         self.fresh = True
         self._rule = rule
-        self._vertices = NO_POINTS
         self._look()
 
     def _look(self) -> None:
+        self._as_of = self._changes()
+        self._seen = NOTHING if self._rule.silence else self._now()
+
+    def _now(self) -> Seen:
+        other = None if self.other is None else self.other.state
+        return seen(self._rule, self.hull.state, other, geographic=self._geographic)
+
+    def _changes(self) -> tuple[int, int]:
+        """What differs after each change of what the rule compares, of the hull and of the other one."""
         state = self.hull.state
-        self._changes, self._points = state.hull.changes, state.counts.points
-        if self._rule.silence:
-            self._points = state.counts.revision  # whatever it has changed
-        elif not self._rule.of_points:
-            self._vertices = state.hull.vertices()  # `state.vertices` keeps them for watches that resume, too
+        own = state.hull.changes if self._rule.of_outline else state.counts.revision
+        return own, 0 if self.other is None else self.other.state.hull.changes
+
+    @property
+    def _geographic(self) -> bool:
+        return self.hull.row.settings.geographic
 
     @property
     def vertex_count(self) -> int:
@@ -91,19 +107,19 @@ class Watched:
             return self.standing.since + self._rule.hold
         return None
 
-    def changed(self) -> "tuple[Points, int] | None":
-        """The vertices and the number of points before, if they have changed since this was last asked; else None."""
-        if not self._differs:
+    def changed(self) -> Seen | None:
+        """What was seen of the hull before, if it has changed since this was last asked; else None."""
+        if self._as_of == self._changes():
             return None
-        before = self._vertices, self._points
+        before = self._seen
         self._look()
         return before
 
     def touched(self, now: int) -> bool:
         """Whether a new revision of the hull changes anything for the alarm; takes note of it if it does not."""
-        if self.fresh or not self._differs:
+        if self.fresh or self._as_of == self._changes():
             return self.fresh
-        rule, before = self._rule, (self._vertices, self._points)
+        rule, before = self._rule, self._seen
         if rule.silence and self.raised:
             return True
         self._look()
@@ -112,7 +128,7 @@ class Watched:
             return False
         changes = self.holds(rule.clears) if self.raised else self.holds(rule.raises) != self.waits
         if changes:  # `changed` says what was before
-            self._changes, (self._vertices, self._points) = NEVER, before
+            self._as_of, self._seen = NEVER, before
         return changes
 
     def look_again(self) -> None:
@@ -121,28 +137,28 @@ class Watched:
         if self.hull.committed is not None:
             self.moved = self.hull.committed.time
 
-    @property
-    def _differs(self) -> bool:
-        state = self.hull.state
-        if self._rule.silence:
-            return state.counts.revision != self._points
-        if self._rule.of_points:
-            return state.counts.points != self._points
-        return state.hull.changes != self._changes
-
     def holds(self, condition: Condition) -> bool:
         """Whether a condition of the rule holds for the hull as it was last looked at."""
-        if self._rule.of_points:
-            return condition.holds((self._points > condition.limit) - (self._points < condition.limit))
-        geographic = self.hull.row.settings.geographic
-        return condition.holds(sign_of(self._vertices, condition, geographic=geographic))
+        return holds(condition, self._seen, self._rule, geographic=self._geographic)
 
-    def value(self, before: "tuple[Points, int] | None" = None) -> float:
-        """The measure as it was last looked at, or of vertices and a number of points before."""
-        vertices, points = (self._vertices, self._points) if before is None else before
-        if self._rule.of_points:
-            return float(points)
-        return value_of(vertices, self._rule.raises.measure, geographic=self.hull.row.settings.geographic)
+    def value(self, before: Seen | None = None) -> float:
+        """The measure as it was last looked at, or of what was seen before."""
+        return value_of(self._seen if before is None else before, self._rule, geographic=self._geographic)
+
+    def keys(self) -> "Keys | None":
+        """The keys of the vertices that the alarm is about, at most MOST_KEYS; None for other alarms and hulls."""
+        state, raises = self.hull.state, self._rule.raises
+        if not raises.of_vertices or self.hull.row.settings.identity == "multiset":
+            return None
+        if raises.measure == "vertex":
+            found = [str(raises.subject)] if self._seen.number else []
+        else:
+            other = None if self.other is None else self.other.state
+            rows = rows_in(raises.subject, state, other, geographic=self._geographic)[:MOST_KEYS]
+            found = state.vertex_keys()[rows].tolist()
+        if self.hull.row.settings.identity == "str":
+            return PackedKeys.pack(found)
+        return np.array(list(map(int, found)), np.uint64)
 
     @property
     def of_silence(self) -> bool:
@@ -162,11 +178,13 @@ class WatchedHulls:
         created: the time of its creation, in microseconds since 1970: for hulls of which no commit is known.
 
     Attributes:
+        other: the other hull that the rule names, with which all are compared; None if it names none.
         of: the hulls by name.
         raised: those for which the alarm is raised, by name.
     """
 
     def __init__(self, rule: AlarmRule, created: int) -> None:
+        self.other: Hull | None = None
         self.of: dict[str, Watched] = {}
         self.raised: dict[str, Watched] = {}
         self._rule = rule
@@ -181,12 +199,12 @@ class WatchedHulls:
         """Watch a hull that has changed at that time last; None for its last commit."""
         if moved is None:
             moved = self._created if hull.committed is None else hull.committed.time
-        watched = self.of[hull.name] = Watched(self._rule, hull, moved)
+        watched = self.of[hull.name] = Watched(self._rule, hull, moved, self.other)
         return watched
 
     def remove(self, name: str) -> None:
         """Watch a hull no longer, which is deleted."""
-        del self.of[name]
+        self.of.pop(name, None)
         self.raised.pop(name, None)
 
     def put_raised(self, watched: Watched, *, raised: bool) -> None:
@@ -197,9 +215,21 @@ class WatchedHulls:
         else:
             self.raised.pop(watched.hull.name, None)
 
-    def renewed(self) -> "WatchedHulls":
+    def at(self, name: str) -> list[Watched]:
+        """What is compared after a change of a hull: the hull, or all if it is the other one. By name."""
+        if self.other is not None and name == self.other.name:
+            return [each for _, each in sorted(self.of.items())]
+        return [self.of[name]]
+
+    def weight(self, name: str) -> int:
+        """The number of vertices of all that is compared after a change of a hull."""
+        beside = 0 if self.other is None else self.other.vertex_count
+        return sum(each.vertex_count + beside for each in self.at(name))
+
+    def renewed(self, other: "Hull | None") -> "WatchedHulls":
         """The same hulls as they are now, of which nothing is known otherwise."""
         found = WatchedHulls(self._rule, self._created)
+        found.other = other
         for each in self.of.values():
             found.add(each.hull, None if each.hull.committed is not None else each.moved)
         return found

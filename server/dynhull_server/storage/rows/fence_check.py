@@ -9,8 +9,9 @@ import numpy as np
 from dynhull.arrays import Points
 from dynhull.keys import Keys, PackedKeys
 
+from ...state.alarms.values import seen
 from ...state.contents import replayed
-from ...state.contents.live import layer_of
+from ...state.contents.live import AnyHull, layer_of
 from ...state.fences.events.order import EventOrder
 from ...state.fences.model.config import FenceConfig
 from ...state.fences.model.faults import FenceFault
@@ -74,7 +75,6 @@ class _Check:
         self._hulls = {hull.row.name: hull for hull in ledger.hulls.values() if not hull.row.settings.shards}
         self._names = sorted(self._hulls)
         self._outlines: dict[tuple[str, int], tuple[Points, Center | None]] = {}
-        self._counts: dict[str, int] = {}  # the points of hulls whose outlines are there
 
     def run(self) -> list[FenceReport]:
         fences = sorted(self._ledger.fences.values(), key=lambda fence: fence.row.name)
@@ -100,8 +100,10 @@ class _Check:
         first = bisect_left(self._names, config.subjects)
         begin_so = takewhile(lambda name: name.startswith(config.subjects), islice(self._names, first, None))
         if config.rule is not None:
-            rule = config.rule
-            return {name for name in begin_so if rule.suits(geographic=self._hulls[name].row.settings.geographic)}
+            suits, other = config.rule.suits, config.rule.other
+            settings = None if other is None else self._hulls[other].row.settings
+            named = (name for name in begin_so if config.compares(name))
+            return {name for name in named if suits(self._hulls[name].row.settings, settings)}
         return {name for name in begin_so if self._hulls[name].row.settings.identity != "multiset"}
 
     def _follow(self, fences: list[FenceRows]) -> list[_Stored]:
@@ -141,10 +143,14 @@ class _Check:
             config = each.kept.row.config
             area = config.area_hull
             if config.rule is not None:
-                (vertices, _), standing = self._outline(name), each.kept.delays.get((name, ""))
-                waits, geographic = standing is not None and standing.enters, hull.row.settings.geographic
-                state = vertices, self._counts[name], geographic, name in each.sides, waits
-                found.alarms.append(AlarmState(each.report.name, config.rule, *state))
+                standing, geographic = each.kept.delays.get((name, "")), hull.row.settings.geographic
+                other = None if area is None else _Outline(None, *self._outline(area))
+                own = _Outline(self._replayed(name) if config.rule.counts else None, *self._outline(name))
+                looked = seen(config.rule, own, other, geographic=geographic)
+                waits = standing is not None and standing.enters
+                found.alarms.append(
+                    AlarmState(each.report.name, config.rule, looked, geographic, name in each.sides, waits)
+                )
                 continue
             if config.kind == "other":
                 assert area is not None  # checked when the fence was created
@@ -171,8 +177,28 @@ class _Check:
             contents = replayed(read_hull(self._reader, hull, NEWEST), hull.row.settings)
             center = None if contents.globe is None else contents.globe.center
             self._outlines[name, layer] = layer_of(contents.hull, layer), center
-            self._counts[name] = len(contents.hull)
         return self._outlines[name, layer]
+
+    def _replayed(self, name: str) -> AnyHull:
+        """A hull with its points."""
+        hull = self._hulls[name]
+        return replayed(read_hull(self._reader, hull, NEWEST), hull.row.settings).hull
+
+
+@dataclass(frozen=True, slots=True)
+class _Outline:
+    """What an alarm asks of the state of a hull."""
+
+    replayed: AnyHull | None
+    corners: Points
+    center: Center | None
+
+    @property
+    def hull(self) -> "AnyHull | _Outline":
+        return self if self.replayed is None else self.replayed
+
+    def vertices(self) -> Points:
+        return self.corners
 
 
 def _packed(keys: list[Key], identity: str) -> Keys:

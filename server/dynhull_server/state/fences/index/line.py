@@ -70,7 +70,7 @@ class Line:
         subjects: the hulls whose keys are compared, by name.
         areas: the hulls that are areas of keys, by name.
         pairs: the fences that compare a hull as a whole with another one, by the names of both.
-        alarms: the alarms at a hull, by its name.
+        alarms: the alarms that compare a hull, or others with it, by its name.
         restless: the number of alarms to which a batch may mean something that leaves the outline as it is.
     """
 
@@ -90,12 +90,12 @@ class Line:
         self.fences[fence.name] = fence
         self.restless += _is_restless(fence)
         self.subjects.update(fence.subjects)
-        for name in () if fence.watched is None else fence.watched.of:
+        for name in _looked_at(fence):
             self.alarms.setdefault(name, []).append(fence)
         if fence.pair is not None:
             for hull in (fence.pair.area, fence.pair.other):
                 self.pairs.setdefault(hull.name, []).append(fence)
-        elif fence.area is not None:
+        elif fence.area is not None and fence.watched is None:
             area = self.areas.get(fence.area.name)
             if area is None:
                 area = self.areas[fence.area.name] = AreaHull(fence.area, as_of=fence.area.state.hull.changes)
@@ -108,14 +108,14 @@ class Line:
         for name, subjects in fence.subjects.items():
             if not subjects.fences:
                 self.subjects.pop(name, None)  # or another of the fences that are removed has done it
-        for name in () if fence.watched is None else fence.watched.of:
+        for name in _looked_at(fence):
             self.alarms[name].remove(fence)
             if not self.alarms[name]:
                 del self.alarms[name]
         if fence.pair is not None:
             for hull in (fence.pair.area, fence.pair.other):
                 self.pairs[hull.name].remove(fence)
-        elif fence.area is not None:
+        elif fence.area is not None and fence.watched is None:
             area = self.areas[fence.area.name]
             del area.fences[fence.number]
             if not area.fences:
@@ -142,16 +142,18 @@ class Line:
         """Whether a new revision of a hull may mean anything for one of the alarms at it: as a rule it does not."""
         name, found = hull.name, False
         for fence in self.alarms.get(name, ()):
-            if fence.watched is not None and fence.watched.of[name].touched(now):
-                found = True  # the others take note of the revision, too
+            for watched in () if fence.watched is None else fence.watched.at(name):
+                if watched.touched(now):
+                    found = True  # the others take note of the revision, too
         return found
 
     def watching(self, names: Iterable[str]) -> Iterator[tuple[Fence, Watched]]:
-        """The alarms at the hulls with these names."""
+        """What alarms compare after a change of the hulls with these names; something may come several times."""
         for name in names:
             for fence in self.alarms.get(name, ()):
                 if fence.watched is not None:
-                    yield fence, fence.watched.of[name]
+                    for watched in fence.watched.at(name):
+                        yield fence, watched
 
     def admit(self, hull: Hull) -> None:
         """Compare the keys of a new hull with the areas of the fences whose prefix its name has, and watch it."""
@@ -167,7 +169,8 @@ class Line:
                 fence.subjects = fence.subjects | {hull.name: subjects}
         for fence in prefixes:
             rule = fence.row.config.rule
-            if fence.watched is not None and rule is not None and rule.suits(geographic=hull.row.settings.geographic):
+            other = None if fence.area is None else fence.area.row.settings
+            if fence.watched is not None and rule is not None and rule.suits(hull.row.settings, other):
                 fence.watched.add(hull)
                 self.alarms.setdefault(hull.name, []).append(fence)
 
@@ -202,11 +205,9 @@ class Line:
 
     def weight(self, name: str) -> int:
         """The number of subjects that a change of a hull may concern beside its own rows."""
-        measured = 0
+        area, measured = self.areas.get(name), 0
         for fence in self.alarms.get(name, ()):
-            if fence.watched is not None:
-                measured += MEASURED * fence.watched.of[name].vertex_count
-        area = self.areas.get(name)
+            measured += 0 if fence.watched is None else MEASURED * fence.watched.weight(name)
         if area is None:
             return measured
         return sum(fence.subject_count for fence in area.fences.values()) + (PEELED if area.layered else 0) + measured
@@ -215,7 +216,7 @@ class Line:
         """The fences that compare the keys of a hull, and those that compare it as a whole, alarms among them."""
         subjects = self.subjects.get(name)
         pairs = [fence for fence in self.pairs.get(name, ()) if fence.row.config.subjects == name]
-        pairs += self.alarms.get(name, ())
+        pairs += [fence for fence in self.alarms.get(name, ()) if fence.row.config.area_hull != name]
         return pairs if subjects is None else [*subjects.fences.values(), *pairs]
 
     def alone(self, name: str) -> Subjects | None:
@@ -248,3 +249,11 @@ class Line:
 def _is_restless(fence: Fence) -> bool:
     rule = fence.row.config.rule
     return rule is not None and not rule.of_outline
+
+
+def _looked_at(fence: Fence) -> list[str]:
+    """The names of the hulls after whose changes an alarm is compared."""
+    if fence.watched is None:
+        return []
+    other = fence.watched.other
+    return [*fence.watched.of, *([] if other is None else [other.name])]

@@ -90,7 +90,9 @@ class FenceConfig:
 
     @property
     def area_hull(self) -> str | None:
-        """The name of the hull that is the area, None for other areas."""
+        """The name of the hull that is the area, or which the rule of an alarm names; None for others."""
+        if isinstance(self.area, AlarmRule):
+            return self.area.other
         return self.area.name if isinstance(self.area, HullArea) else None
 
     @property
@@ -108,9 +110,9 @@ class FenceConfig:
 
     def compares(self, name: str) -> bool:
         """Whether the keys of a hull of that name are subjects, or those of an alarm the hull as a whole."""
-        return (
-            name.startswith(self.subjects) if self.kind == "prefix" else self.kind == "hull" and name == self.subjects
-        )
+        if self.kind != "prefix":
+            return self.kind == "hull" and name == self.subjects
+        return name.startswith(self.subjects) and (self.rule is None or name != self.rule.other)
 
     def concerns(self, name: str) -> bool:
         """Whether the fence depends on a hull of that name."""

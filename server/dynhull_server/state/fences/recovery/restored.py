@@ -82,6 +82,7 @@ def bring_back(kept: Sequence[KeptFence], registry: Registry) -> list[Fence]:
             fence.pair = Pair(fence.area, registry.get(config.subjects), config.near)
             fence.pair.look()
         if fence.watched is not None:
+            fence.watched.other = fence.area
             for name in registry.compared(config):
                 fence.watched.add(registry.get(name))
             watch_again(fence, each)

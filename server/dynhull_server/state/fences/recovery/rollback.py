@@ -46,7 +46,7 @@ def give_back(part: FencePart, restored: Restored, registry: Registry) -> None:
             fence.pair.look()
             fence.count_inside()
         if fence.watched is not None:
-            fence.watched = fence.watched.renewed()
+            fence.watched = fence.watched.renewed(fence.area)
             watch_again(fence, kept)
             fence.count_inside()
     adopt(restored, part.touched())

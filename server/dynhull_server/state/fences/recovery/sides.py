@@ -12,9 +12,8 @@ from dynhull.globe import Gnomonic, project_hull
 from dynhull.keys import Keys, key_list
 from dynhull.range_search import RangeSearch
 
-from ...alarms.conditions import Condition
 from ...alarms.rule import AlarmRule
-from ...alarms.values import sign_of
+from ...alarms.values import Seen, holds, seen
 from ...records import Center, Contents
 from ..events.order import one_by_one
 from ..index.globe import laid_polygons, rings_of
@@ -67,8 +66,7 @@ class AlarmState:
 
     alarm: str
     rule: AlarmRule
-    vertices: Points
-    points: int
+    seen: Seen
     geographic: bool
     raised: bool
     waits: bool
@@ -79,17 +77,13 @@ class AlarmState:
         if rule.silence:
             return None
         if self.raised:
-            return FenceFault(self.alarm, hull, None, 0, "cleared", "raised") if self._holds(rule.clears) else None
-        holds = self._holds(rule.raises)
-        if holds != self.waits if rule.hold else holds:
-            expected = "not" if not holds else "to wait" if rule.hold else "raised"
+            cleared = holds(rule.clears, self.seen, rule, geographic=self.geographic)
+            return FenceFault(self.alarm, hull, None, 0, "cleared", "raised") if cleared else None
+        raises = holds(rule.raises, self.seen, rule, geographic=self.geographic)
+        if raises != self.waits if rule.hold else raises:
+            expected = "not" if not raises else "to wait" if rule.hold else "raised"
             return FenceFault(self.alarm, hull, None, 0, expected, "waiting" if self.waits else "not raised")
         return None
-
-    def _holds(self, condition: Condition) -> bool:
-        if self.rule.of_points:
-            return condition.holds((self.points > condition.limit) - (self.points < condition.limit))
-        return condition.holds(sign_of(self.vertices, condition, geographic=self.geographic))
 
 
 @dataclass(slots=True)
@@ -128,9 +122,9 @@ def sides_of(name: str, fences: Iterable[Fence]) -> Sides:
             continue
         if fence.watched is not None and config.rule is not None:
             watched = fence.watched.of[name]
-            state = watched.hull.state
-            seen = state.vertices(), state.counts.points, watched.hull.row.settings.geographic
-            found.alarms.append(AlarmState(fence.name, config.rule, *seen, watched.raised, watched.waits))
+            geographic, other = watched.hull.row.settings.geographic, None if fence.area is None else fence.area.state
+            looked = seen(config.rule, watched.hull.state, other, geographic=geographic)
+            found.alarms.append(AlarmState(fence.name, config.rule, looked, geographic, watched.raised, watched.waits))
             continue
         subjects = fence.subjects[name]
         if found.contents is None:

@@ -1,15 +1,14 @@
 """What a change of a hull, or time, means for an alarm: it waits, is raised, and is cleared."""
 
-from dynhull.arrays import Points
+import math
 
 from ...alarms.rule import AlarmRule
+from ...alarms.values import Seen
 from ...alarms.watched import Watched, WatchedHulls
 from ...records import NO_TIME
 from ..model.fence import Fence
 from ..model.records import AlarmStanding, Cause, Delay, EventType
 from .leg import FenceLeg
-
-Before = tuple[Points, int]
 
 
 def look(leg: FenceLeg, watched: Watched, cause: Cause, now: int) -> None:
@@ -62,11 +61,11 @@ def put_standing(leg: FenceLeg, watched: Watched, *, acknowledged: int | None = 
     _put(leg, watched, None if put == Delay(False, NO_TIME, 0, 0, AlarmStanding()) else put)
 
 
-def _begun(leg: FenceLeg, watched: Watched, cause: Cause, before: Before | None, now: int) -> Delay:
+def _begun(leg: FenceLeg, watched: Watched, cause: Cause, before: Seen | None, now: int) -> Delay:
     """That the condition holds from this revision on."""
-    previous = None if before is None else watched.value(before)
+    previous = None if before is None else _finite(watched.value(before))
     standing = _standing(watched)._replace(previous=previous, acknowledged=NO_TIME)
-    return Delay(True, leg.time(now), watched.hull.state.counts.revision, int(cause), standing)
+    return Delay(True, leg.time(now), _revision(watched, cause), int(cause), standing)
 
 
 def _raise(leg: FenceLeg, watched: Watched, now: int, more: int = 0) -> None:
@@ -76,7 +75,7 @@ def _raise(leg: FenceLeg, watched: Watched, now: int, more: int = 0) -> None:
     watched_hulls(leg.fence).put_raised(watched, raised=True)
     _put(leg, watched, waiting._replace(enters=False))
     previous = None if waiting.standing is None else waiting.standing.previous
-    value = watched.silent(now) if rule.silence else watched.value()
+    value = watched.silent(now) if rule.silence else _finite(watched.value())
     leg.alarmed(
         EventType.BEGIN,
         waiting.causes | more,
@@ -84,19 +83,30 @@ def _raise(leg: FenceLeg, watched: Watched, now: int, more: int = 0) -> None:
         (value, rule.raises.limit, previous),
         (waiting.reports, waiting.since),
         now,
+        watched.keys(),
     )
 
 
-def _clear(
-    leg: FenceLeg, watched: Watched, cause: Cause, before: Before | None, now: int, *, gone: bool = False
-) -> None:
+def _clear(leg: FenceLeg, watched: Watched, cause: Cause, before: Seen | None, now: int, *, gone: bool = False) -> None:
     rule = _rule(leg)
     watched_hulls(leg.fence).put_raised(watched, raised=False)
     _put(leg, watched, _rest(watched))
-    value = None if gone else 0.0 if rule.silence else watched.value()
-    previous = None if before is None else watched.value(before)
-    began = watched.hull.state.counts.revision, leg.time(now)
+    value = None if gone else 0.0 if rule.silence else _finite(watched.value())
+    previous = None if before is None else _finite(watched.value(before))
+    began = _revision(watched, cause), leg.time(now)
     leg.alarmed(EventType.CEASE, cause, watched, (value, rule.clears.limit, previous), began, now)
+
+
+def _revision(watched: Watched, cause: Cause) -> int:
+    """The revision of the hull that has changed: of the other one if it was that alone."""
+    other = watched.other
+    changed = other if other is not None and cause is Cause.AREA else watched.hull
+    return changed.state.counts.revision
+
+
+def _finite(value: float) -> float | None:
+    """A value; None for the distance from an empty hull."""
+    return value if math.isfinite(value) else None
 
 
 def _rest(watched: Watched) -> Delay | None:

@@ -120,9 +120,12 @@ class Comparison:
                     self.cross(subjects, crossings, areas, swap, now, changed.get(name), carried.get(name, NOBODY))
                 for fence, pair, causes in line.paired(hulls):
                     self.leg(fence).paired(pair, causes, now)
-                for fence, watched in line.watching(hull.name for hull in hulls) if line.alarms else ():
+                names = {hull.name for hull in hulls}
+                for fence, watched in line.watching(names) if line.alarms else ():
                     if watched.touched(now):
-                        alarm_at(self.leg(fence), watched, Cause.EXPIRED if swap is EXPIRY else Cause.MOVED, now)
+                        own, other = (each is not None and each.name in names for each in (watched.hull, watched.other))
+                        cause = (Cause.EXPIRED if swap is EXPIRY else Cause.MOVED) if own else Cause(0)
+                        alarm_at(self.leg(fence), watched, cause | (Cause.AREA if other else Cause(0)), now)
         except BaseException:  # an index may have lost crossings
             self.tear(hulls)
             raise

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from ...alarms.rule import AlarmRule
+from ...alarms.values import require_area
 from ...errors import FenceExistsError, HullNotFoundError, HullUnsuitableError, InvalidFenceError, LimitExceededError
 from ...hull import Hull
 from ..events.sequences import Swap
@@ -100,27 +101,32 @@ class Definition:
         """Create an alarm, which is raised for the hulls for which its condition holds."""
         config, birth = request.config, request.birth
         fence = Fence(FenceRow(number, request.name, birth.uid, birth.created, config))
-        leg, hulls = FenceLeg(fence, created=True), self._watched(config, rule)
+        fence.area = self._area(config)
+        hulls, watching = self._watched(config, rule, fence.area), watched_hulls(fence)
+        watching.other = fence.area
+        leg = FenceLeg(fence, created=True)
         self._watching += len(hulls)
         if self._watching > self._ground.room:
             raise LimitExceededError("max_alarm_hulls", self._ground.limits.max_alarm_hulls)
         for hull in hulls:
-            look(leg, watched_hulls(fence).add(hull), Cause.CREATED, request.time)
+            _require_area(hull, rule)
+            look(leg, watching.add(hull), Cause.CREATED, request.time)
         self._comparison.legs[number] = leg
         return fence
 
-    def _watched(self, config: FenceConfig, rule: AlarmRule) -> list[Hull]:
-        """The hulls that a new alarm watches, by name."""
+    def _watched(self, config: FenceConfig, rule: AlarmRule, area: Hull | None) -> list[Hull]:
+        """The hulls that a new alarm watches, by name; `area` is the other hull that its rule names."""
+        other = None if area is None else area.row.settings
         if config.kind == "prefix":
             found = [leg.after for _, leg in sorted(self._ground.hulls.items()) if config.compares(leg.name)]
             hulls = [hull for hull in found if hull is not None]
             for hull in hulls:
                 _require_whole(hull)
-            return [hull for hull in hulls if rule.suits(geographic=hull.row.settings.geographic)]
+            return [hull for hull in hulls if rule.suits(hull.row.settings, other)]
         hull = self._hull(config.subjects)
-        if not rule.suits(geographic=hull.row.settings.geographic):
-            globe = "is geographic, where hulls have no width" if hull.row.settings.geographic else "is a plane"
-            raise HullUnsuitableError(hull.name, f"{globe}: {rule.when!r} does not suit it", field="rule.when")
+        if not rule.suits(hull.row.settings, other):
+            reason = _why_unsuited(hull, rule, area)
+            raise HullUnsuitableError(hull.name, f"{reason}: {rule.when!r} does not suit it", field="rule.when")
         return [hull]
 
     def replace(self, request: ReplaceFence, fence: Fence) -> Fence:
@@ -255,3 +261,25 @@ def _waits(config: FenceConfig, sequence: int, time: int) -> Waits:
 def _require_whole(hull: Hull) -> None:
     if hull.divided:
         raise HullUnsuitableError(hull.name, "is divided among shards, which no fence compares")
+
+
+def _require_area(hull: Hull, rule: AlarmRule) -> None:
+    """Raise HullUnsuitableError if the area of a rule is invalid where the hull is."""
+    if rule.raises.measure == "vertex in":
+        try:
+            require_area(rule.raises.subject, geographic=hull.row.settings.geographic)
+        except ValueError as error:
+            raise HullUnsuitableError(
+                hull.name, f"{rule.when!r} does not suit it: {error}", field="rule.when"
+            ) from None
+
+
+def _why_unsuited(hull: Hull, rule: AlarmRule, area: Hull | None) -> str:
+    settings = hull.row.settings
+    frame = "is geographic" if settings.geographic else "is a plane"
+    if area is not None and area.row.settings.geographic != settings.geographic:
+        return f"{frame}, and {area.name!r} is not"
+    if rule.raises.measure == "vertex":
+        keys = {"multiset": "has points without keys", "int": "has keys that are integers"}
+        return keys.get(settings.identity, frame)
+    return f"{frame}, where hulls have no width" if settings.geographic else frame

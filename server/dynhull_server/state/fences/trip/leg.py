@@ -172,6 +172,7 @@ class FenceLeg:
         values: tuple[float | None, float, float | None],
         began: tuple[int, int],
         now: int,
+        keys: Keys | None = None,
     ) -> None:
         """Make the event that an alarm is raised or cleared for a hull.
 
@@ -183,11 +184,13 @@ class FenceLeg:
             began: the revision with which the condition began to hold, and its time: the revision of the area and the
                 event time.
             now: the time.
+            keys: those of the vertices that it is about: who is inside.
         """
         hull, (value, bound, previous), (revision, time) = watched.hull, values, began
         hulls = kind, causes, hull.name, None, hull.state.counts.revision, revision
         before = None if previous is None else (previous, bound)
-        self.events.append(FenceEvent(self.last + 1, *hulls, None, before, value, time, self.time(now)))
+        inside = () if keys is None or not len(keys) else (Members(hull.name, keys, hull.state.counts.revision),)
+        self.events.append(FenceEvent(self.last + 1, *hulls, None, before, value, time, self.time(now), inside=inside))
 
     def left(self, subjects: Subjects, keys: Keys, cause: Mapping[Key, int] | int, now: int) -> None:
         """Make an exit of each of some keys of a hull that are gone, given why; with the positions they still have."""
