@@ -264,8 +264,25 @@ class WatchedHulls:
                 self.plan(watched)
         return None
 
-    def take(self, now: int, most: int) -> Iterator[Watched]:
-        """At most that many hulls for which time raises the alarm now."""
+    def first_due_after(self, time: int) -> int | None:
+        """As `first_due`, of hulls for which that is after a time. O(the others): it looks at the top of the heap."""
+        plans, stack, found = self._due[:], [0], []
+        while stack:
+            place = stack.pop()
+            if place >= len(plans):
+                continue
+            due: int | None
+            due, name = plans[place]
+            if due <= time:
+                stack += 2 * place + 1, 2 * place + 2
+                watched = self.of.get(name)
+                due = None if watched is None else watched.due
+            if due is not None and due > time:
+                found.append(due)
+        return min(found, default=None)
+
+    def take(self, now: int, most: int) -> Iterator[tuple[Watched, int]]:
+        """At most that many hulls for which time raises the alarm now, each with the time at which it was due."""
         for _ in range(most):
             due = self.first_due
             if due is None or due > now:
@@ -273,7 +290,7 @@ class WatchedHulls:
             _, name = heappop(self._due)
             watched = self.of[name]
             watched.planned = None
-            yield watched
+            yield watched, due
 
     @property
     def newest(self) -> int:

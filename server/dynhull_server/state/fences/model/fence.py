@@ -140,6 +140,8 @@ class Fence:
             times.append(since + self.row.config.dwell)
         if self.delays is not None and (since := self.delays.first_after(time - self.row.config.min_dwell)) is not None:
             times.append(since + self.row.config.min_dwell)
+        if self.watched is not None and (due := self.watched.first_due_after(time)) is not None:
+            times.append(due)
         return min(times, default=None)
 
     @property

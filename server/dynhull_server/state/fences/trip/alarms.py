@@ -35,12 +35,12 @@ def look(leg: FenceLeg, watched: Watched, cause: Cause, now: int) -> None:
     watched_hulls(leg.fence).plan(watched)
 
 
-def pass_time(leg: FenceLeg, watched: Watched, now: int) -> None:
+def pass_time(leg: FenceLeg, watched: Watched, due: int) -> None:
     """Raise an alarm for a hull for which the condition has held, or which has been silent, for long enough."""
     if _rule(leg).silence:
         revision, kept = watched.hull.state.counts.revision, _standing(watched)
         _put(leg, watched, Delay(True, watched.moved, revision, 0, kept._replace(acknowledged=NO_TIME)))
-    _raise(leg, watched, now, Cause.TIME)
+    _raise(leg, watched, due, Cause.TIME)
 
 
 def deleted(leg: FenceLeg, watched: Watched, now: int) -> None:

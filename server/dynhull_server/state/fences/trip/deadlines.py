@@ -19,9 +19,9 @@ def pass_time(request: PassTime, fence: Fence, comparison: Comparison) -> None:
     """Make the events for which time has passed, in the order of times, hulls and keys."""
     if fence is not request.fence:
         return
-    for watched in () if fence.watched is None else fence.watched.take(request.time, MOST_DUE):
+    for watched, due in () if fence.watched is None else fence.watched.take(request.time, MOST_DUE):
         comparison.applied = True
-        raise_by_time(comparison.leg(fence), watched, request.time)
+        raise_by_time(comparison.leg(fence), watched, due)
     config, stays = fence.row.config, _Stays(fence, comparison, request.time)
     made = 0
     while made < MOST_DUE:  # the others at the next look
