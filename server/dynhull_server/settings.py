@@ -195,7 +195,10 @@ class Settings(BaseModel):
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
     max_alarms: int = Field(100_000, ge=1, description="Largest number of alarms.")
     max_alarm_hulls: int = Field(
-        1_000_000, ge=1, description="Largest number of hulls that alarms watch, each counted once for each alarm."
+        1_000_000,
+        ge=1,
+        description="Largest number of hulls that alarms watch, each counted once for each alarm. Beyond it "
+        "alarms, and new hulls with their prefixes, are refused.",
     )
     max_fence_corners: int = Field(100_000, ge=3, description="Largest number of corners of the area of a fence.")
     max_fence_consumers: int = Field(

@@ -54,6 +54,9 @@ def fence_families(fences: Fences, now: int) -> Iterator[Metric]:
     yield from (backlog, oldest, lost)
     alarms = alarms_among(fences)
     yield GaugeMetricFamily("dynhull_alarms", "Alarms.", value=len(alarms))
+    watched = sum(len(each.fence.watched) for each in alarms if each.fence.watched is not None)
+    help_text = "Hulls that alarms watch, each counted once for each alarm, of at most --max-alarm-hulls."
+    yield GaugeMetricFamily("dynhull_alarm_hulls", help_text, value=watched)
     raised = sum(each.fence.inside for each in alarms)
     yield GaugeMetricFamily("dynhull_alarm_raised", "Hulls for which an alarm is raised, of all alarms.", value=raised)
 

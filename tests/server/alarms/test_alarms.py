@@ -324,3 +324,26 @@ def test_exactly_one_raise_between_two_clears(tmp_path: Path) -> None:
         square(client, "fleet", 1)
         (cleared,) = seen(client, "size", after=3)
         assert (cleared.type, cleared.sequence) == ("cleared", 4)
+
+
+def test_hulls_that_come_later_count_too() -> None:
+    """One that would not be watched is refused, until there is room."""
+    with (
+        server_process("--max-alarm-hulls", "3", "--create-on-write") as process,
+        HullClient(process.address) as client,
+    ):
+        client.create_alarm("many", prefix="f/", when="count > 1")
+        for hull in ("f/a", "f/b", "f/c", "other"):
+            client.create_hull(hull)
+        with pytest.raises(LimitExceededError, match="max_alarm_hulls"):
+            client.create_hull("f/d")
+        with pytest.raises(LimitExceededError, match="max_alarm_hulls"):
+            client.apply("f/d", insert=[(0, 0)])
+        with pytest.raises(LimitExceededError, match="max_alarm_hulls"):
+            client.create_alarm("more", hull="other", when="count > 1")
+        client.delete_hull("f/a")
+        client.apply("f/d", insert=[(0, 0), (1, 1)])
+        assert (client.get_alarm("many").hulls, client.get_alarm("many").raised) == (3, 1)
+        assert [each.name for each in client.list_hulls("f/")] == ["f/b", "f/c", "f/d"]
+        client.delete_alarm("many")
+        client.create_hull("f/e")

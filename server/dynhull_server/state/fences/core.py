@@ -78,7 +78,7 @@ class FenceCore:
         lines = [queue.line for queue in queues if queue.line is not None]
         limits = self._registry.limits.fences
         creates = any(isinstance(request, CreateFence) and request.config.rule is not None for request in requests)
-        room = limits.max_alarm_hulls - (self._registry.watched if creates else 0)
+        room = limits.max_alarm_hulls - (self._registry.watched if creates or births else 0)
         ground = Ground(legs, lines, fences, numbers, self._registry.tallies, limits, room)
         return Trip(legs, requests, now, pause, places, FencePart(ground, requests))
 

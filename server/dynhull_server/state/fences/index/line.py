@@ -155,10 +155,18 @@ class Line:
                     for watched in fence.watched.at(name):
                         yield fence, watched
 
+    def watching_new(self, hull: Hull) -> list[Fence]:
+        """The alarms that are to watch a new hull, by their prefix."""
+        found = []
+        for fence in self._prefixes(hull.name):
+            rule, other = fence.row.config.rule, None if fence.area is None else fence.area.row.settings
+            if rule is not None and rule.suits(hull.row.settings, other):
+                found.append(fence)
+        return found
+
     def admit(self, hull: Hull) -> None:
         """Compare the keys of a new hull with the areas of the fences whose prefix its name has, and watch it."""
-        prefixes = self._prefixes(hull.name)
-        fences = [fence for fence in prefixes if fence.watched is None]
+        fences = [fence for fence in self._prefixes(hull.name) if fence.watched is None]
         if fences and hull.row.settings.identity != "multiset":
             subjects = Subjects(hull)
             for fence in fences:
@@ -167,10 +175,8 @@ class Line:
             for fence in fences:
                 subjects.fences[fence.number] = fence
                 fence.subjects = fence.subjects | {hull.name: subjects}
-        for fence in prefixes:
-            rule = fence.row.config.rule
-            other = None if fence.area is None else fence.area.row.settings
-            if fence.watched is not None and rule is not None and rule.suits(hull.row.settings, other):
+        for fence in self.watching_new(hull):
+            if fence.watched is not None:
                 fence.watched.add(hull)
                 self.alarms.setdefault(hull.name, []).append(fence)
 

@@ -42,7 +42,7 @@ class Ground:
         numbers: the numbers of new fences, by name; those without one are too many.
         tallies: what is counted of fences, as of the last commit.
         limits: the limits on fences.
-        room: how many more hulls alarms may watch, if it creates any.
+        room: how many more hulls alarms may watch, if it creates alarms or hulls.
     """
 
     hulls: Mapping[str, Leg]

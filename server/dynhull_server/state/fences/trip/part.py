@@ -14,6 +14,7 @@ from ...errors import (
     HullFencedError,
     HullNotFoundError,
     HullUnsuitableError,
+    LimitExceededError,
 )
 from ...hull import Hull
 from ...leg import Leg
@@ -63,7 +64,17 @@ class FencePart:
         examined: the numbers of the fences that are examined after a failure.
     """
 
-    __slots__ = ("_comparison", "_definition", "_ended", "_ground", "creates", "events", "examined", "structural")
+    __slots__ = (
+        "_comparison",
+        "_definition",
+        "_ended",
+        "_ground",
+        "_watching",
+        "creates",
+        "events",
+        "examined",
+        "structural",
+    )
 
     def __init__(self, ground: Ground, requests: Sequence[Request]) -> None:
         self.structural = bool(requests) and isinstance(requests[0], STRUCTURAL)
@@ -74,6 +85,7 @@ class FencePart:
         self._comparison = Comparison(ground)
         self._definition = Definition(ground, self._comparison)
         self._ended: dict[str, set[Key]] = {}
+        self._watching: dict[str, int] = {}  # the alarms at new hulls
 
     @property
     def lines(self) -> Sequence[Line]:
@@ -113,10 +125,19 @@ class FencePart:
     # Changes of hulls
 
     def admit(self, hull: Hull) -> None:
-        """Compare the keys of a new hull."""
+        """Compare the keys of a new hull, and watch it.
+
+        Raises:
+            HullUnsuitableError: it is divided.
+            LimitExceededError: alarms watch too many hulls with it.
+        """
         if hull.divided:
             reason = "begins with the prefix of a fence, which does not compare a hull that is divided among shards"
             raise HullUnsuitableError(hull.name, reason, field="config.shards")
+        watching = sum(len(line.watching_new(hull)) for line in self.lines)
+        if watching and sum(self._watching.values()) + watching > self._ground.room:
+            raise LimitExceededError("max_alarm_hulls", self._ground.limits.max_alarm_hulls)
+        self._watching[hull.name] = watching
         for line in self.lines:
             line.admit(hull)
 
@@ -325,5 +346,6 @@ class FencePart:
         self._definition.undo()
 
     def _dismiss(self, name: str) -> None:
+        self._watching.pop(name, None)
         for line in self.lines:
             line.dismiss(name)
