@@ -12,7 +12,7 @@ from ._keys import decode_keys
 from ._times import decode_time
 
 AlarmEventType = Literal["raised", "cleared", "snapshot", "closed", "lost", "progress", "unknown"]
-AlarmCause = Literal["batch", "expired", "hull_deleted", "alarm_created", "time_passed", "other_hull"]
+AlarmCause = Literal["batch", "expired", "hull_deleted", "alarm_created", "time_passed", "other_hull", "recentered"]
 
 TYPES: dict[int, AlarmEventType] = words_of(alarm_pb2.AlarmEventType.items(), "ALARM_EVENT_TYPE_")
 CAUSES: dict[int, AlarmCause] = words_of(alarm_pb2.AlarmCause.items(), "ALARM_CAUSE_")

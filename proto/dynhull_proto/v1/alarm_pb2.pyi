@@ -30,6 +30,7 @@ class AlarmCause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     ALARM_CAUSE_ALARM_CREATED: _ClassVar[AlarmCause]
     ALARM_CAUSE_TIME_PASSED: _ClassVar[AlarmCause]
     ALARM_CAUSE_OTHER_HULL: _ClassVar[AlarmCause]
+    ALARM_CAUSE_RECENTERED: _ClassVar[AlarmCause]
 ALARM_EVENT_TYPE_UNSPECIFIED: AlarmEventType
 ALARM_EVENT_TYPE_RAISED: AlarmEventType
 ALARM_EVENT_TYPE_CLEARED: AlarmEventType
@@ -42,6 +43,7 @@ ALARM_CAUSE_HULL_DELETED: AlarmCause
 ALARM_CAUSE_ALARM_CREATED: AlarmCause
 ALARM_CAUSE_TIME_PASSED: AlarmCause
 ALARM_CAUSE_OTHER_HULL: AlarmCause
+ALARM_CAUSE_RECENTERED: AlarmCause
 
 class Alarm(_message.Message):
     __slots__ = ("name", "rule", "create_time", "uid", "last_sequence", "first_sequence", "hull_count", "raised_count", "consumers")

@@ -376,7 +376,7 @@ class LiveHull:
             NotStoredError: the storage has failed.
         """
         result: tuple[Counts, bool] = await self._driver.ask(
-            Recenter(Waiter(), self.name, center, rows=self.counts.points)
+            Recenter(Waiter(), self.name, center, self._driver.time(), rows=self.counts.points)
         )
         return result
 

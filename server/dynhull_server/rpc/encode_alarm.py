@@ -28,6 +28,7 @@ CAUSES = {
     Cause.CREATED: alarm_pb2.ALARM_CAUSE_ALARM_CREATED,
     Cause.TIME: alarm_pb2.ALARM_CAUSE_TIME_PASSED,
     Cause.AREA: alarm_pb2.ALARM_CAUSE_OTHER_HULL,
+    Cause.CHANGED: alarm_pb2.ALARM_CAUSE_RECENTERED,
 }
 OF_OTHER = Cause.AREA, Cause.AREA | Cause.TIME  # the other hull alone has changed
 

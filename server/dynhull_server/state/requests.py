@@ -83,10 +83,12 @@ class Recenter(Request):
     Attributes:
         name: its name.
         center: the new centre; None for the mean direction of its points.
+        time: the server's clock, in microseconds since 1970.
     """
 
     name: str
     center: Center | None
+    time: int = 0
 
 
 @dataclass(slots=True, eq=False)

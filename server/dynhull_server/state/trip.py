@@ -302,8 +302,8 @@ class Trip:
     def _recenter(self, request: Recenter, leg: Leg) -> tuple[Counts, bool]:
         hull = leg.after
         if self.fences is not None:
-            # The projection of fences and subjects stays the same, and no measure changes without a batch.
-            self.fences.require_free(leg.name, prefixes=True)
+            # The projection of fences and subjects stays the same; of alarms it does not.
+            self.fences.require_free(leg.name, recenters=True)
         if hull is None:
             raise HullNotFoundError(leg.name)
         try:
@@ -311,6 +311,8 @@ class Trip:
         except MisfitError as misfit:
             raise HullUnsuitableError(leg.name, str(misfit), field=misfit.field) from None
         self.applied = True
+        if self.fences is not None:
+            self.fences.recentered(hull, request.time)
         return hull.state.counts, hull_changed
 
     def _new_hull(self, request: CreateHull | WriteBatch, leg: Leg) -> Hull:

@@ -65,7 +65,7 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     rule = AlarmRule(f"{measure} > 1000", f"{measure} <= 1000")
     for kind, subjects in [("prefix", "fleet/")] if prefix else [("other", hull) for hull in HULLS]:
         step(core, CreateFence(None, marked(subjects), 1, FenceConfig(rule, kind, subjects), CREATED))
-    counted(monkeypatch, counts, watched, "sign_of")
+    counted(monkeypatch, counts, watched, "holds")
     counted(monkeypatch, counts, watched.Watched, "touched")
     counted(monkeypatch, counts, _comparison, "_sign")
     for number in range(BATCHES):
@@ -76,7 +76,7 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     for number in range(BATCHES):
         step(core, moved(HULLS[0], {"c": (4, 4 + number)}))
     exactly = 0 if dynhull.KERNEL == "cpp" or measure not in ("diameter", "width") else BATCHES
-    assert counts == Counter(touched=BATCHES, sign_of=BATCHES) + Counter(_sign=exactly)
+    assert counts == Counter(touched=BATCHES, holds=BATCHES) + Counter(_sign=exactly)
     step(core, moved(HULLS[0], {"e": (2, -1)}))
     line = core.line(HULLS[0])
     assert line is not None

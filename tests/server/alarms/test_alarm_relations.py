@@ -215,3 +215,19 @@ def test_they_outlive_a_kill(tmp_path: Path) -> None:
         assert (event.hull, event.keys) == ("w/a", ("e",))
         square(client, "w/b", 0.5)
     assert dynhull("check", str(tmp_path)).exit_code == 0
+
+
+def test_hulls_with_alarms_get_another_centre(client: HullClient, name: str) -> None:
+    for hull in ("a", "b"):
+        client.create_hull(f"{name}/{hull}", geographic=True)
+    client.create_alarm(f"{name}/size", prefix=f"{name}/", when="area > 100 km2")
+    client.create_alarm(f"{name}/near", hull=f"{name}/a", when=f"near {name}/b 100 km")
+    client.apply(f"{name}/a", insert=[(13, 52), (14, 52), (13, 53)])
+    for hull in ("a", "b"):
+        client.recenter(f"{name}/{hull}", (20, 50))
+    client.apply(f"{name}/b", insert=[(14, 52)])
+    client.recenter(f"{name}/b", (30, 50))
+    client.apply(f"{name}/a", delete=[(14, 52)])
+    events = [(each.type, each.revision) for alarm in ("size", "near") for each in seen(client, f"{name}/{alarm}")]
+    assert events == [("raised", 1), ("cleared", 3), ("raised", 2)]
+    assert client.verify(f"{name}/a").fence_differences == ()

@@ -88,8 +88,8 @@ class Watched:
 
     @property
     def vertex_count(self) -> int:
-        """The number of vertices when it was last looked at; 0 for a rule that needs none."""
-        return len(self._vertices)
+        """The number of vertices that were compared when it was last looked at; 0 for a rule that needs none."""
+        return len(self._seen.vertices) + len(self._seen.others)
 
     @property
     def waits(self) -> bool:
@@ -130,6 +130,10 @@ class Watched:
         if changes:  # `changed` says what was before
             self._as_of, self._seen = NEVER, before
         return changes
+
+    def doubt(self) -> None:
+        """Compare the hull anew when it is touched next, even if its vertices have not changed."""
+        self._as_of = NEVER
 
     def look_again(self) -> None:
         """Take note of the hull as the storage has it: what it was noted for has not been committed."""
@@ -223,8 +227,7 @@ class WatchedHulls:
 
     def weight(self, name: str) -> int:
         """The number of vertices of all that is compared after a change of a hull."""
-        beside = 0 if self.other is None else self.other.vertex_count
-        return sum(each.vertex_count + beside for each in self.at(name))
+        return sum(each.vertex_count for each in self.at(name))
 
     def renewed(self, other: "Hull | None") -> "WatchedHulls":
         """The same hulls as they are now, of which nothing is known otherwise."""

@@ -190,15 +190,25 @@ class FencePart:
         found = {hull.name: each for hull, each in changed.items()}
         self._comparison.compare(list(changed), now, EXPIRY if expiry else None, found)
 
-    def require_free(self, name: str, *, prefixes: bool = False) -> None:
-        """Raise HullFencedError if a fence or an alarm depends on the hull, if `prefixes` also by a prefix."""
+    def recentered(self, hull: Hull, now: int) -> None:
+        """Compare a hull that has another centre, by which a measure may be rounded otherwise."""
+        for line in self.lines:
+            for fence, watched in line.watching([hull.name]):
+                watched.doubt()
+                if watched.touched(now):
+                    cause = Cause.CHANGED if watched.hull.name == hull.name else Cause.AREA
+                    look(self._comparison.leg(fence), watched, cause, now)
+
+    def require_free(self, name: str, *, recenters: bool = False) -> None:
+        """Raise HullFencedError if a fence or an alarm names the hull; if it `recenters`, if a fence depends on it."""
         for line in self.lines:
             for fence in line.fences.values():
-                config = fence.row.config
-                if name == config.area_hull or (config.kind != "prefix" and name == config.subjects):
-                    raise HullFencedError(name, unmarked(fence.name), "fence" if fence.watched is None else "alarm")
-                if prefixes and name in (fence.subjects if fence.watched is None else fence.watched.of):
-                    raise HullFencedError(name, unmarked(fence.name), "fence" if fence.watched is None else "alarm")
+                config, is_fence = fence.row.config, fence.watched is None
+                depends = name == config.area_hull or (config.kind != "prefix" and name == config.subjects)
+                if recenters:
+                    depends = is_fence and (depends or name in fence.subjects)
+                if depends:
+                    raise HullFencedError(name, unmarked(fence.name), "fence" if is_fence else "alarm")
 
     def hull_deleted(self, name: str, now: int) -> None:
         """The keys of a deleted hull leave the fences with its prefix, and alarms are cleared for it."""
