@@ -21,7 +21,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster torture cluster upgrade ray kafka objects simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties robustness robustness-cluster torture cluster upgrade ray kafka languages objects simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -197,6 +197,9 @@ build/kafka/.jars: tests/bridges/kafka/pom.xml
 
 objects: .venv/.test  ## servers that keep the past of hulls in an object store, which fails, hangs and answers in halves
 	OBJECTS_CASES=all $(BIN)/pytest tests/storage/test_objects.py tests/server/lives/test_object_store.py
+
+languages: .venv/.test  ## the programs in Go, Java and Rust on their pages, each where its tools are: built, and run beside a server that is killed
+	PATH="$(CURDIR)/$(BIN):$$PATH" LANGUAGES_CASES=all $(BIN)/pytest tests/docs/test_languages.py
 
 kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, which Maven brings (Debian: maven, default-jre-headless)
 	KAFKA_CASES=all $(BIN)/pytest tests/bridges/test_kafka.py

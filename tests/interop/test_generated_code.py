@@ -15,6 +15,8 @@ FILES = [
 
 
 @pytest.mark.parametrize("file", FILES, ids=[file.name for file in FILES])
-def test_each_file_names_its_package_for_go(file):
+def test_each_file_names_its_package_for_other_languages(file):
     # protoc-gen-go stops at a file without it; one package for all of them, as they are one in the contract.
-    assert file.GetOptions().go_package == "dynhull/v1;dynhullv1"
+    options = file.GetOptions()
+    assert options.go_package == "dynhull/v1;dynhullv1"
+    assert (options.java_package, options.csharp_namespace) == ("dynhull.v1", "Dynhull.V1")
