@@ -145,11 +145,11 @@ def laid_polygons(frame: Gnomonic, area: Area, *, anywhere: bool) -> Rings:
             require_circle(frame, area)
         return projected(frame, rings)
     polygons = [[without_border(ring) for ring in polygon] for polygon in rings]
-    corners = np.vstack([polygon[0] for polygon in polygons])
-    middle_of_all = Gnomonic.about(np.unique(corners, axis=0))
-    if frame.angle(middle_of_all.center) - middle_of_all.angles(corners).max() > REACH + SURELY:
-        return []
     places = [[project_far(frame, ring) for ring in polygon] for polygon in polygons]
+    if any(np.isnan(xy).any() for flat in places for xy in flat):
+        center, radius = _cap(area)
+        if frame.angle(center) - radius > REACH + SURELY:
+            return []
     for number, (polygon, flat) in enumerate(zip(polygons, places, strict=True)):
         for ring, xy in zip(polygon, flat, strict=True):
             if np.isnan(xy).any():
@@ -215,6 +215,14 @@ def _projected(frame: Gnomonic, ring: Points, name: str) -> Points:
     if misplaced is not None:
         raise ValueError(f"{name} has the corner {misplaced.place}: {misplaced.problem}")
     return frame.project(ring)[0]
+
+
+@lru_cache(maxsize=64)  # all hulls of a prefix ask for that of one area
+def _cap(area: Area) -> tuple[Center, float]:
+    """The middle of a circle or of polygons, and the greatest angle between it and a corner."""
+    corners = np.vstack([without_border(polygon[0]) for polygon in rings_of(area, None)])
+    frame = Gnomonic.about(np.unique(corners, axis=0))
+    return frame.center, float(frame.angles(corners).max())
 
 
 @lru_cache(maxsize=1024)  # 11 kB each; more are computed again
