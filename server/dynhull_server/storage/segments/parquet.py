@@ -22,6 +22,7 @@ from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
 from .gathered import key_codes
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from io import IOBase
 
     import numpy.typing as npt
@@ -32,9 +33,8 @@ if TYPE_CHECKING:
 
     Rows = npt.NDArray[np.intp]
 
-# The columns of numbers that may have none, and what stands for it.
-NOTHING = dict.fromkeys(("revision", "commit", "committed", "clock", "place", "event_time"), NO_TIME)
-NOTHING["expire_time"] = FOREVER
+# The columns of numbers in which a row may have none, and what stands for it.
+NOTHING = dict.fromkeys(("commit", "committed", "clock", "event_time"), NO_TIME) | {"expire_time": FOREVER}
 
 VERSION = 1
 FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
@@ -234,13 +234,14 @@ def _all(file: pq.ParquetFile) -> SegmentColumns:
     import pyarrow as pa
 
     identity: Any = file.schema_arrow.metadata[b"dynhull.identity"].decode()
-    belongs = _belongs(file.read(columns=["revision", "row"]))
+    revision, belongs, place = _heads(file.read(columns=["revision", "row"]))
     count, at = len(belongs), 0
-    arrays: dict[str, npt.NDArray[Any]] = {}
+    arrays: dict[str, npt.NDArray[Any]] = {"revision": revision, "place": place}
+    columns = ["cause", "kind", "op", "key", "x", "y", *_with_values(file, (*NOTHING, "detail"))]
     detail: list[str | None] = [None] * count
     codes, words, number = np.full(count, NONE, np.int32), list[pa.Array](), 0
     for group in range(file.num_row_groups):
-        table = file.read_row_group(group)
+        table = file.read_row_group(group, columns=columns)
         rows = belongs[at : at + len(table)]
         at += len(table)
         for name, values in _arrays(table).items():
@@ -253,35 +254,45 @@ def _all(file: pq.ParquetFile) -> SegmentColumns:
         codes[rows] = np.where(of_group == NONE, NONE, of_group + number)
         words.append(there)
         number += len(there)
-        said = table.column("detail")
-        if said.null_count < len(said):
-            for row, text in zip(rows.tolist(), said.to_pylist(), strict=True):
+        if "detail" in columns:
+            for row, text in zip(rows.tolist(), table.column("detail").to_pylist(), strict=True):
                 detail[row] = text
-    empty = _arrays(file.schema_arrow.empty_table())
-    for name, values in empty.items():
+    for name, values in _arrays(file.schema_arrow.empty_table()).items():
         arrays.setdefault(name, _constant(NOTHING[name], count) if name in NOTHING else values)
     keyed = codes != NONE
     keys = _packed(words, codes[keyed], identity)
     return SegmentColumns(identity=identity, **arrays, keyed=keyed, keys=keys, detail=detail)
 
 
-def _belongs(table: pa.Table) -> Rows:
-    """The place of each row in the order of revisions, of which it says itself where it belongs.
+def _with_values(file: pq.ParquetFile, names: Iterable[str]) -> list[str]:
+    """The columns that have a value in some row."""
+    groups = [file.metadata.row_group(group) for group in range(file.num_row_groups)]
 
-    ValueError if one is missing.
+    def has_values(place: int) -> bool:
+        of_groups = ((group.num_rows, group.column(place).statistics) for group in groups)
+        return any(found is None or not found.has_null_count or found.null_count < rows for rows, found in of_groups)
+
+    return [name for name in names if has_values(file.schema_arrow.names.index(name))]
+
+
+def _heads(table: pa.Table) -> tuple[Integers, Rows, Integers]:
+    """Of rows that say themselves where they belong: all revisions in order, the place of each row, and the places.
+
+    ValueError if a row is missing.
     """
     count = len(table)
-    revision, belongs = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
+    revision, place = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
     if not count:
-        return belongs
+        return revision, place, place
     first, last = int(revision.min()), int(revision.max())
-    if last - first >= count or int(belongs.min()) < 0:
+    if last - first >= count or int(place.min()) < 0:
         raise ValueError("a row is missing")
     counts = np.bincount(revision - first)
-    belongs = belongs + (np.cumsum(counts) - counts)[revision - first]
+    starts = np.cumsum(counts) - counts
+    belongs = place + starts[revision - first]
     if int(belongs.max()) >= count or not np.bincount(belongs, minlength=count).all():
         raise ValueError("a row is missing")
-    return belongs
+    return np.repeat(np.arange(first, last + 1), counts), belongs, np.arange(count) - np.repeat(starts, counts)
 
 
 def _of_keys(table: pa.Table, values: list[Any]) -> Rows:
@@ -311,6 +322,8 @@ def _columns(table: pa.Table, found: dict[bytes, bytes], order: Rows) -> Segment
     keyed = codes != NONE
     keys = _packed([words], codes[keyed], identity)
     arrays = {name: values[order] for name, values in _arrays(table).items()}
+    for name, column in (("revision", "revision"), ("place", "row")):
+        arrays[name] = _integers(table, column, NO_TIME)[order]
     of_detail, said = _coded(table.column("detail"))
     texts = [*said.to_pylist(), None]
     detail = [texts[code] for code in of_detail[order].tolist()]
@@ -318,19 +331,14 @@ def _columns(table: pa.Table, found: dict[bytes, bytes], order: Rows) -> Segment
 
 
 def _arrays(table: pa.Table) -> dict[str, npt.NDArray[Any]]:
-    """The columns of numbers."""
+    """The columns of words, positions and numbers, without those of numbers that are not there."""
+    there = {name: none for name, none in NOTHING.items() if name in table.schema.names}
     return {
-        "revision": _integers(table, "revision", NO_TIME),
-        "commit": _integers(table, "commit", NO_TIME),
-        "committed": _integers(table, "committed", NO_TIME),
         "cause": _codes(table, "cause", CAUSES),
-        "clock": _integers(table, "clock", NO_TIME),
-        "place": _integers(table, "row", NO_TIME),
         "kind": _codes(table, "kind", KINDS),
         "op": _codes(table, "op", OPS),
         "points": np.column_stack([_coordinates(table, name) for name in "xy"]),
-        "event_time": _integers(table, "event_time", NO_TIME),
-        "expire_time": _integers(table, "expire_time", FOREVER),
+        **{name: _integers(table, name, none) for name, none in there.items()},
     }
 
 
