@@ -15,6 +15,7 @@ from dynhull_server.state.alarms.rule import AlarmRule, marked
 from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.core import Core
 from dynhull_server.state.events import Arrived, Commit, Committed, Event
+from dynhull_server.state.fences.events.block import AppendEvents
 from dynhull_server.state.fences.index.line import MEASURED
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.requests import CreateFence
@@ -84,3 +85,36 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     step(core, moved(HULLS[0], {"e": (2, 1)}))
     for hull in HULLS:
         assert core.get(hull).counts.revision == 1 + 3 * BATCHES + (BATCHES + 2 if hull == HULLS[0] else 0)
+
+
+@pytest.mark.parametrize("keeps", [False, True])
+def test_batches_that_are_applied_at_once_make_the_same_events(*, keeps: bool) -> None:
+    """As on a server in memory, whose commits are carried out within a step."""
+    random, made = np.random.default_rng(7), []
+    sides = random.uniform(1, 5, (BATCHES, len(HULLS))).tolist()
+    for immediate in (False, True):
+        core, events = Core(LIMITS, immediate=immediate, keeps=keeps), []
+
+        def take(event: Event, core: Core = core, events: list[Any] = events) -> None:
+            for effect in core.step(event):
+                if isinstance(effect, Commit):
+                    blocks = [each.block.by_fence() for each in effect.changes if isinstance(each, AppendEvents)]
+                    events += [(number, each) for block in blocks for number, found in block.items() for each in found]
+                    if effect.ticket is not None:
+                        take(Committed(effect.ticket))
+
+        for hull in HULLS:
+            take(CreateHull(None, hull, CREATED, HullSettings("str")))
+        for when, clear in (("area > 9", "area < 6"), ("width > 2", "width <= 2"), ("count > 4", "count <= 4")):
+            rule = FenceConfig(AlarmRule(when, clear), "prefix", "fleet/")
+            take(CreateFence(None, marked(when.split()[0]), 1, rule, CREATED))
+        for number, each in enumerate(sides):
+            for hull, side in zip(HULLS, each, strict=True):
+                take(moved(hull, {key: (x * side / 4, y * side / 3) for key, (x, y) in CORNERS.items()}))
+                take(moved(hull, {f"inside {number % 2}": (0.5, 0.5)}))
+        made.append(events)
+        assert core.get(HULLS[0]).counts.revision == 2 * BATCHES
+        assert not core.busy
+        core.check()
+    assert len(made[0]) > 3 * len(HULLS)
+    assert made[0] == made[1]
