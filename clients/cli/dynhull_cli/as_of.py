@@ -19,7 +19,10 @@ At = Annotated[
 
 
 def as_of(client: "HullClient", name: str, at: str | None) -> Any:
-    """What reads a hull: as it is, or as it was."""
+    """What reads a hull: as it is, or as it was; a line says if it may lack keys that were erased."""
     if at is None:
         return Present(client, name)
-    return client.at(name, moment_of(at))
+    past = client.at(name, moment_of(at))
+    if past.erased:
+        typer.echo(f"{name} at revision {past.revision:,}: keys that were erased from its past are missing", err=True)
+    return past

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 from dynhull_surface.reasons import Exit
 
+from .as_of import At, as_of
 from .completion import hulls
 from .connected import AsJson, connected
 from .json_lines import json_line, members
@@ -24,6 +25,7 @@ def verify(
         list[str] | None, typer.Argument(metavar="HULL", help="Names of the hulls. Default: all.", autocompletion=hulls)
     ] = None,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds that each hull may take.")] = 600.0,
+    at: At = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare hulls, vertex by vertex, with what Chan's algorithm computes from their stored points.
@@ -32,12 +34,15 @@ def verify(
     with each other and with who is inside.
 
         dynhull verify fleet/north && deploy
+        dynhull verify fleet/north --at 2026-11-24T16:00Z
+
+    With --at they are rebuilt as they were, and fences are not compared.
 
     If a hull differs, its line shows the first difference and the exit code is 1.
     """
     different = 0
     for name in names or listed([info.name for info in client.list_hulls()], "no hulls"):
-        found = client.verify(name, timeout=timeout)
+        found = as_of(client, name, at).verify(timeout=timeout)
         different += not found.whole
         typer.echo(
             json_line(name=name, whole=found.whole, **members(found)) if as_json else f"{name}: {_summary(found)}"

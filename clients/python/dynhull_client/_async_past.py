@@ -1,14 +1,15 @@
 """A hull as it was, for the asyncio client."""
 
-from collections.abc import Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine
 from datetime import datetime
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from . import _calls as calls
 from . import _layers as peeling
+from . import _quarantine as quarantine
 from . import _uses as uses
-from ._calls import Call
-from ._methods import answer_of
+from ._calls import Call, Pages
+from ._methods import answer_of, described
 from ._past import AsOf, without_name
 
 P = ParamSpec("P")
@@ -25,6 +26,37 @@ def _asking(
         return answer
 
     without_name(method, describe, answer_of(describe))
+    return method
+
+
+def _reading(
+    describe: Callable[Concatenate[str, P], Call[Result]],
+) -> Callable[Concatenate["AsyncPast", P], AsyncIterator[Result]]:
+    """The method that reads one revision of a hull part by part."""
+
+    def method(self: "AsyncPast", /, *arguments: P.args, **options: P.kwargs) -> AsyncIterator[Result]:
+        parts: AsyncIterator[Result] = self._connection.parts(self._call(describe, arguments, options))
+        return parts
+
+    without_name(method, describe, f"AsyncIterator[{answer_of(describe)}]")
+    return method
+
+
+def _listing(
+    describe: Callable[Concatenate[str, P], Pages[Result]],
+) -> Callable[Concatenate["AsyncPast", P], AsyncIterator[Result]]:
+    """The method that returns a list of one revision of a hull, one after the other."""
+
+    async def method(self: "AsyncPast", /, *arguments: P.args, **options: P.kwargs) -> AsyncIterator[Result]:
+        page, token = described(describe, self.name, *arguments, **options), ""
+        while True:
+            found, token = await self._connection.answer(self._of_then(page(token)))
+            for each in found:
+                yield each
+            if not token:
+                return
+
+    without_name(method, describe, f"AsyncIterator[{answer_of(describe)}]")
     return method
 
 
@@ -51,6 +83,8 @@ class AsyncPast(AsOf):
     count = _asking(calls.count)
     positions = _asking(calls.positions)
     entities = _asking(calls.entities)
+    read_points = _reading(calls.read_points)
+    list_held = _listing(quarantine.list_held)
     sample_points = _asking(calls.sample_points)
     layers = _asking(peeling.layers)
     influence = _asking(peeling.influence)

@@ -85,7 +85,10 @@ class AsOf:
 
     def _call(self, describe: Callable[..., Call[Result]], arguments: Any, options: Any) -> Call[Result]:
         """The call that asks about this revision."""
-        call = described(describe, self.name, *arguments, **options)
+        return self._of_then(described(describe, self.name, *arguments, **options))
+
+    def _of_then(self, call: Call[Result]) -> Call[Result]:
+        """A call, asked about this revision."""
         request: Any = call.request
         request.at_revision = self.revision
         request.at_uid = self._uid

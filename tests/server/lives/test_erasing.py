@@ -86,6 +86,9 @@ def test_a_key_is_erased_from_what_can_be_read_of_the_past(tmp_path):
         assert said.stdout == "fleet: 31 moves of 1 key erased from revisions 1 to 34\n"
         assert "no segment has this key" in dynhull("history", "erase", "fleet", "--key", KEYS[3], *place).stdout
         assert "1 key erased from revisions 1 to 34, 31 moves" in dynhull("history", "fleet", *place).stdout
+        said = dynhull("verify", "fleet", "--at", "12", *place)
+        assert "fleet: verified at revision 12: 37 points" in said.stdout
+        assert said.stderr == "fleet at revision 12: keys that were erased from its past are missing\n"
         server.process.kill()
         server.process.wait()
         files = list(tmp_path.rglob("*.parquet"))

@@ -277,6 +277,19 @@ def test_points_and_what_is_held_are_read_as_they_were(served):
         seen.append((client.get_hull("held").info.revision, listed()))
         for revision, expected in reversed(seen):
             assert listed(at_revision=revision) == expected
+        held, released = client.at("held", seen[1][0]), client.at("held", seen[2][0])
+        assert [[each.key for each in past.list_held()] for past in (held, released)] == [["d"], []]
+        points = [[tuple(part.keys) for part in past.read_points()] for past in (held, released)]
+        assert points == [[("a", "b", "c")], [("a", "b", "c", "d")]]
+
+    async def listed_then():
+        async with AsyncHullClient(address) as client:
+            past = await client.at("held", seen[1][0])
+            return [each.key async for each in past.list_held()], [
+                part.info.revision async for part in past.read_points()
+            ]
+
+    assert asyncio.run(listed_then()) == (["d"], [seen[1][0]])
 
 
 def test_a_hull_that_is_made_again_has_nothing_of_the_one_before(served):
