@@ -29,7 +29,7 @@ RETRY_SECONDS = 1.0
 TICK_SECONDS = 1.0
 SEARCH_SECONDS = 0.2
 VERIFY_SECONDS = 30.0
-KEPT_SECONDS = 5.0
+KEPT_SECONDS = 2.0
 # Seconds to wait for what the server has kept, before the time lines begin without it.
 PAST_SECONDS = 2.0
 

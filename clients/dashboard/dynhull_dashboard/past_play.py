@@ -219,4 +219,5 @@ class PastPlay:
 
 
 def _is_hole(hull: PastHull) -> bool:
-    return hull.trouble is not None and hull.kept.first is not None and not isinstance(hull.trouble, UnavailableError)
+    """Whether its past is kept, but cannot be read."""
+    return hull.trouble is not None and hull.trouble.reason == "STORAGE_FAILED"

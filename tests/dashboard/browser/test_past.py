@@ -19,9 +19,15 @@ PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "i
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, str]]:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the server has its data."""
+    return tmp_path_factory.mktemp("past")
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[tuple[Server, str]]:
     """A server that keeps the past."""
-    with server_process("--data", str(tmp_path_factory.mktemp("past")), "--snapshot-points", "200") as running:
+    with server_process("--data", str(folder), "--snapshot-points", "200", complaints=None) as running:
         yield running, ""
 
 
@@ -128,6 +134,24 @@ def test_what_is_missing_is_said(browser: Browser, url: str, client: HullClient,
         assert f"{forgetful} keeps no past. Keep it: dynhull history set {forgetful} 30d" in advice
         assert run(*advice.rpartition("dynhull ")[2].split()).returncode == 0
         expect(page.locator(".why")).to_be_hidden()
+
+
+def test_a_hole_is_said_and_heals(browser: Browser, url: str, client: HullClient, fleet: str, folder: Path) -> None:
+    time = moment(client, fleet, 2) + 0.001
+    client.remove(fleet, ["inner"])
+    client.erase_history(fleet, ["inner"])  # which makes segments of what the journal has
+    (segment,) = (folder / "history" / client.get_hull(fleet).info.uid).glob("*.batches.parquet")
+    content = segment.read_bytes()
+    segment.unlink()
+    with opened(browser, url, fleet) as page:
+        wait_for_vertices(page, fleet, corners(3))
+        page.wait_for_function("time => recorder.kept <= time", arg=time)
+        page.evaluate("time => recorder.go(time)", time)
+        expect(row(page, fleet)).to_contain_text("cannot be read")
+        wait_for_vertices(page, fleet, [])
+        page.wait_for_function("() => time_bar.holes.length > 0")
+        segment.write_bytes(content)
+        wait_for_vertices(page, fleet, corners(1))
 
 
 def test_a_hull_whose_past_begins_later(browser: Browser, url: str, client: HullClient, name: str, fleet: str) -> None:

@@ -1,5 +1,5 @@
 // The bar below the picture: which moment is shown, how far one can go back, and what is missing there.
-const LEAST_STEP = 0.1, MOST_STEPS = 1000, ASK_MILLISECONDS = 150
+const LEAST_STEP = 0.1, MOST_STEPS = 1000, ASK_MILLISECONDS = 150, MOST_HOLES = 1000
 const moment_format = new Intl.DateTimeFormat("en", {year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit",
   second: "2-digit", hourCycle: "h23", timeZoneName: "short"})
 class TimeBar {
@@ -50,7 +50,7 @@ class TimeBar {
     this.slider.setAttribute("aria-valuetext", text)
     put(this.oldest, this.recorder.kept == undefined ? "" : `Kept since ${moment_format.format(this.recorder.kept)}`)
     put(this.why, live ? "" : this.hulls.map(({words}) => words).filter(Boolean).join(" "))
-    if (past?.holes.length) this.holes.push(moment)
+    if (past?.holes.length && this.holes.at(-1) != moment) this.holes = [...this.holes.slice(1 - MOST_HOLES), moment]
     this.draw(earliest, now)
   }
   // A line a hull, as far as its past goes back: thin where keys were erased, with marks where it could not be read.
