@@ -2,7 +2,7 @@
 
 from bisect import insort
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ...state.changes import Change
@@ -325,8 +325,9 @@ class Group:
 
     def _drop_snapshot(self, step: DropSnapshot) -> None:
         now = self._hull(step.number)
-        if now is None or step.snapshot not in now.rows.snapshots:
+        if now is None or step.snapshot not in now.rows.snapshots or step.snapshot.id in now.gone:
             return
+        now.gone.add(step.snapshot.id)
 
         def drop() -> None:
             now.rows.snapshots.remove(step.snapshot)
@@ -403,8 +404,9 @@ class Group:
     def _drop_batches(self, step: DropBatches) -> None:
         now = self._hull(step.number)
         count = len(step.ids)
-        if now is None or now.rows.ids[:count] != step.ids:
+        if now is None or now.trimmed or now.rows.ids[:count] != step.ids:
             return
+        now.trimmed = True
         now.batches, now.sum = now.batches - count, now.sum - step.weights
         self.totals = self.totals.plus(0, -count, -step.weights)
         self.statements.append(Remove("batches", step.ids))
@@ -451,10 +453,16 @@ class Group:
 
 @dataclass(slots=True)
 class _Now:
-    """A hull after a part of the changes; `rows` is its present state in the ledger."""
+    """A hull after a part of the changes; `rows` is its present state in the ledger.
+
+    `gone` are the snapshots that were dropped, and `trimmed` is whether batches were: who trims a hull after a snapshot
+    and who does so after a segment may come to the same rows in one group.
+    """
 
     rows: HullRows
     batches: int
     sum: int
     last: int
     deleted: bool = False
+    gone: set[int] = field(default_factory=set)
+    trimmed: bool = False
