@@ -650,12 +650,13 @@ def _settings(op: Operation) -> HullSettings:
     window = Window(**op["window"]) if "window" in op else None
     if op["name"] in ("w", "gw") and window is None:
         window = Window(max_points=2)
-    by_event_time, center = op.get("by_event_time", False), op.get("center")
-    if op["name"] not in GLOBE:
-        rules = QuarantineRules(**op["quarantine"]) if "quarantine" in op else None
-        return HullSettings(identity, op.get("max_points", 0), window, by_event_time, quarantine=rules)
-    center = None if center is None else tuple(center)
-    return HullSettings(identity, op.get("max_points", 0), window, by_event_time, "geographic", center)
+    more: dict[str, Any] = {name: op[name] for name in ("history", "history_bytes") if name in op}
+    if op["name"] in GLOBE:
+        center = op.get("center")
+        more |= {"frame": "geographic", "center": None if center is None else tuple(center)}
+    elif "quarantine" in op:
+        more["quarantine"] = QuarantineRules(**op["quarantine"])
+    return HullSettings(identity, op.get("max_points", 0), window, op.get("by_event_time", False), **more)
 
 
 def config_of(op: Operation) -> FenceConfig:

@@ -20,6 +20,9 @@ from dynhull_server.engine.threads import Clock, Machine, Threads
 from .model import Finding, Model
 from .schedule import Schedule
 
+# Pauses are as long as the work before them, in which other pauses may pass here: they would grow without end.
+LONGEST_PAUSE = 60.0
+
 
 class Loop(asyncio.AbstractEventLoop):
     """An event loop in simulated time.
@@ -318,19 +321,20 @@ class _Pool:
 class SimulatedClock(Clock):
     """Simulated time."""
 
-    def __init__(self, loop: Loop) -> None:
+    def __init__(self, loop: Loop, model: Model) -> None:
         self._loop = loop
+        self._model = model
 
     def monotonic(self) -> float:
         return self._loop.now
 
     def wall(self) -> float:
-        return 1e9 + self._loop.now
+        return self._model.wall + self._loop.now
 
     async def sleep(self, seconds: float) -> None:
-        await asyncio.sleep(seconds)
+        await asyncio.sleep(min(seconds, LONGEST_PAUSE))
 
 
 def simulated_machine(loop: Loop, threads: SimulatedThreads, model: Model) -> Machine:
     """All seams together."""
-    return Machine(SimulatedClock(loop), threads, model.uid)
+    return Machine(SimulatedClock(loop, model), threads, model.uid)

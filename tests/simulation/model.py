@@ -11,13 +11,14 @@ its x, and all points of a parabola are vertices: so an answer names the batches
 * No answer to a later request is older than an answer that has been seen.
 * Positions are held out of a hull, and let in, as its rules say: see `quarantine_model`.
 * Events of fences follow from the revisions: see `fence_model`.
+* The past is what was committed: see `past_model`.
 * A restored backup is taken for what there was before by nobody, least of all by writers: see `incarnation`.
 * There is no refusal without its reason: a fault, the end of the server, or what the truth says.
 """
 
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -40,10 +41,12 @@ from dynhull_server.state.records import (
     QuarantineRules,
     Record,
 )
+from dynhull_server.storage.rows.group import EraseKeys, SetHistory
 
 from .entities import Effect, Entities, Entity, Key
 from .fence_model import FENCE_CHANGES, PREFIX, UNIT, FenceModel
 from .globe import FAR, GLOBE, mean, points
+from .past_model import PastTruth, past_of
 from .quarantine_model import BrokenRuleError, Carried, Verdict
 
 Content = tuple[float, ...]
@@ -73,6 +76,7 @@ class Truth:
     `corners` is for fences. `since` is the number of commits when it was made.
     `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
     `restored` is whether a backup has brought it back.
+    `past` is what must be read of earlier revisions.
     """
 
     row: HullRow
@@ -91,8 +95,10 @@ class Truth:
     corners: dict[int, Rings] = field(default_factory=dict)
     since: int = 0
     entities: Entities = field(init=False)
+    past: PastTruth = field(init=False)
 
     def __post_init__(self) -> None:
+        self.past = past_of(self.row)
         self.entities = Entities(self.row.name, self.row.settings)
         self.centers = [self.row.settings.center]
 
@@ -155,9 +161,12 @@ class Model:
         stopping: whether the server has begun to stop.
         repeats: whether numbered batches that have no answer are sent again, before their callers.
         days: whether producers may have been forgotten.
+        forgets: whether the past of all hulls together is limited, so that of each any part may go.
         fences: the fences.
         numbers: the numbers of all hulls and fences.
         commits: how many there have been.
+        latest: the time of the last one.
+        wall: what the clock on the wall has when a life begins.
         uids_ever: the uids that there were before a restore.
         finding: the first promise that was broken.
     """
@@ -168,8 +177,9 @@ class Model:
         self.fences = FenceModel(self)
         self.numbers: set[int] = set()
         self.uids_ever: set[str] = set()
-        self.commits = 0
-        self.faulty = self.stopping = self.days = self.repeats = False
+        self.commits = self.latest = 0
+        self.wall = 1e9
+        self.faulty = self.stopping = self.days = self.repeats = self.forgets = False
         self.finding: str | None = None
         self._hulls: dict[int, Truth] = {}
         self._uids: dict[str, Truth] = {}
@@ -216,9 +226,10 @@ class Model:
 
     # What is kept
 
-    def landed(self, changes: Sequence[Any]) -> None:
-        """The storage has kept these changes, by one commit."""
+    def landed(self, changes: Sequence[Any], now: int) -> None:
+        """The storage has kept these changes, by one commit at a time by the server's clock."""
         self.commits += 1
+        self.latest = max(self.latest, now)
         appended: list[int | None] = []
         of_fences: list[Any] = []
         before: dict[str, tuple[Truth, int]] = {}
@@ -230,6 +241,10 @@ class Model:
                     truth = self._hulls[change.number]
                     before[truth.row.name] = truth, truth.revision
                     appended += [self._append(truth, record) for record in change.records]
+                case SetHistory() if not self._hulls[change.number].deleted:
+                    self._keep_past(self._hulls[change.number], change)
+                case EraseKeys() if not self._hulls[change.number].deleted:
+                    self._hulls[change.number].past.erased = change.stored.erasure.last
                 case Delete():
                     truth = self._hulls[change.number]
                     truth.deleted = True
@@ -255,8 +270,24 @@ class Model:
         self.numbers.add(row.number)
         self.alive[row.name] = self._hulls[row.number] = self._uids[row.uid] = Truth(row)
         self.alive[row.name].since = self.commits
+        self.alive[row.name].past.whole &= not self.forgets
+
+    def _keep_past(self, truth: Truth, change: SetHistory) -> None:
+        settings = replace(truth.row.settings, history=change.max_age, history_bytes=change.max_bytes)
+        truth.row = replace(truth.row, settings=settings)
+        truth.past.keeps(settings)
+
+    def truth_of(self, number: int) -> Truth:
+        """The hull with a number, as the storage has kept it."""
+        return self._hulls[number]
 
     def _append(self, truth: Truth, record: Record) -> int | None:
+        """Take a revision into the truth, and into its past."""
+        attempt = self._revised(truth, record)
+        truth.past.add(record, self.latest, dict(truth.entities.quarantine.waiting))
+        return attempt
+
+    def _revised(self, truth: Truth, record: Record) -> int | None:
         """Take a revision into the truth. Returns the number of its batch, None for an expiry."""
         if truth.deleted:
             raise self.finds("a batch is kept of a hull that has been deleted")

@@ -29,6 +29,7 @@ from .operations import (
     random_rules,
     settings_of,
 )
+from .past_plan import add_past, may_keep
 from .scenes import (
     WITH_SCENES,
     add_earlier_acks,
@@ -91,6 +92,9 @@ WITH_DELETED_FENCES = 0.3
 
 # The share of plans with immediate commits in which a stream goes on after a batch that is refused.
 WITH_REFUSED_STREAMS = 0.3
+
+# The share of the engine's plans in which the past is read: on SQLite, where hulls keep it, and in memory.
+WITH_PAST = {"sqlite": 0.4, "shell": 0.15}
 
 SWARM = (0, 1, 1, 5)
 
@@ -203,6 +207,10 @@ def random_plan(seed: int, layer: str) -> Plan:
         for _ in range(queries.choice(QUERIES)):
             client = queries.choice(queries.choice(lives)["clients"])
             client.insert(queries.randint(0, len(client)), query(queries, (*names, *timed)))
+    past = random.Random(f"past {seed}")
+    keeping = may_keep((*names, *timed))
+    if keeping and past.random() < WITH_PAST.get(layer, 0.0) and not immediate:
+        add_past(past, plan, keeping)
     return plan
 
 

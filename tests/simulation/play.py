@@ -2,6 +2,7 @@
 
 import logging
 import traceback
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,10 +17,11 @@ from .cluster_plan import Plan
 from .core_life import CoreServer
 from .link_life import LinkedServer
 from .model import Finding, Model
+from .past_plan import small_segments
 from .schedule import Schedule
 from .shell_life import ShellServer
 from .sqlite_store import SQLiteLives
-from .store import FaultyStorage
+from .store import FaultyStorage, KilledError
 
 # How often a fence is made anew at the end of a life.
 ANEW = 0.3
@@ -58,8 +60,14 @@ def play(plan: Plan) -> Outcome:
 def _play(plan: Plan) -> Outcome:
     if plan["layer"] == "cluster":
         return _play_cluster(plan)
+    with small_segments(plan.get("segment_rows")):
+        return _play_lives(plan)
+
+
+def _play_lives(plan: Plan) -> Outcome:
     limits = Limits(**plan["limits"], fences=FenceLimits(**plan.get("fences", {})))
     model, schedule = Model(limits), Schedule(plan["seed"])
+    model.forgets = plan.get("history_bytes", 0) > 0
     storage = _storage(plan, model)
     lives = 0
     where = ""
@@ -95,7 +103,7 @@ def _play_cluster(plan: Plan) -> Outcome:
 
 def _storage(plan: Plan, model: Model) -> FaultyStorage:
     if plan["storage"] == "sqlite":
-        return SQLiteLives(model, plan["faults"])
+        return SQLiteLives(model, plan["faults"], plan.get("history_bytes", 0))
     return FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=plan["storage"] == "immediate")
 
 
@@ -115,6 +123,7 @@ def _live(
         storage.restore()
     server: CoreServer | ShellServer = LAYERS[layer](limits, storage, model, schedule)
     model.new_life()
+    model.wall += life.get("clock", 0)
     server.check()
     storage.calm = False
     clients = [Client(number, server, model) for number in range(len(life["clients"]))]
@@ -123,6 +132,17 @@ def _live(
     if life.get("restored"):
         for client, former in zip(clients, before, strict=False):
             client.remember(former)
+    with suppress(KilledError):  # where the plan says so
+        _lead(server, life, model, schedule, storage)
+    storage.dead, storage.killing = True, False
+    server.kill()
+    return clients
+
+
+def _lead(
+    server: CoreServer | ShellServer, life: dict[str, Any], model: Model, schedule: Schedule, storage: FaultyStorage
+) -> None:
+    """Lead a life to its end."""
     if "after" in life:
         for _ in range(life["after"]):
             if not server.turn():
@@ -134,9 +154,6 @@ def _live(
         server.stop()
         if server.waiting():
             raise model.finds(f"after the end these wait: {server.waiting()}")
-    storage.dead = True
-    server.kill()
-    return clients
 
 
 def _look(server: CoreServer | ShellServer, model: Model, schedule: Schedule, storage: FaultyStorage) -> None:
@@ -153,4 +170,6 @@ def _look(server: CoreServer | ShellServer, model: Model, schedule: Schedule, st
         server.probe(probe_fence(server, model, name, anew=schedule.random.random() < ANEW))
     server.let_leave()
     server.check()
+    if isinstance(server, ShellServer) and storage.keeps_past:
+        server.look_at_past()
     storage.calm = False

@@ -30,9 +30,11 @@ from .core_life import compare
 from .fence_model import PREFIX
 from .machine import Loop, SimulatedClock, SimulatedThreads, simulated_machine
 from .model import Finding, Model
+from .past_plan import OF_PAST
+from .past_reader import PastReader
 from .queries import Queries
 from .schedule import Schedule
-from .store import FaultyStorage
+from .store import FaultyStorage, KilledError
 
 # Simulated seconds within which every waiting actor has to be answered, once nothing fails.
 FOREVER = 600.0
@@ -47,7 +49,7 @@ class WatchedSupervisor(Supervisor):
     """The real one; errors that it takes for a bug are findings."""
 
     def __init__(self, model: Model, loop: Loop) -> None:
-        super().__init__(SimulatedClock(loop), lambda _: None, self._process_ends)
+        super().__init__(SimulatedClock(loop, model), lambda _: None, self._process_ends)
         self._model, self._loop_of_life = model, loop
 
     def failed(self, name: str, error: BaseException) -> None:
@@ -110,6 +112,8 @@ class ShellServer:
     def turn(self) -> bool:
         """One turn; a promise that it broke is raised here."""
         went_on = self.schedule.turn()
+        if self._storage.killing:
+            raise KilledError
         if self.model.finding is not None:
             raise Finding(self.model.finding)
         return went_on
@@ -206,12 +210,18 @@ class ShellServer:
                     return
 
     async def special(self, client: Client, op: Operation) -> None:
-        """Let time pass, make a backup, send a stream of reads, or watch a hull."""
+        """Let time pass, set the clock, make a backup, read the past, send a stream of reads, or watch a hull."""
         if op["do"] == "rest":
             await asyncio.sleep(op["seconds"])
             return
         if op["do"] == "backup":
             self._storage.back_up()
+            return
+        if op["do"] == "clock":
+            self.model.wall += op["seconds"]
+            return
+        if op["do"] in OF_PAST:
+            await PastReader(self._engine, self.model).ask(client, op)
             return
         if op["do"] == "query":
             await Queries(self._engine, self.model).ask(client, op)
@@ -259,6 +269,12 @@ class ShellServer:
     def probe(self, probe: Coroutine[Any, Any, None]) -> None:
         """Run a probe to its end."""
         self._drive(probe, "a probe")
+
+    def look_at_past(self) -> None:
+        """The past of each hull is as it was, and has the files that it needs, and no others."""
+        self._until(self._storage.files_are_needed, "what is to be filed")
+        for name in sorted(self.model.alive):
+            self.probe(PastReader(self._engine, self.model).probe(name))
 
     def let_leave(self) -> None:
         """Whoever should have left by now leaves, and who has been inside for long makes an event."""

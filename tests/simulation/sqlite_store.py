@@ -4,6 +4,7 @@ A kill takes a copy of the database and its log, as they are between two calls, 
 and checkpoints in the middle of a commit are not simulated: SQLite does its work within one turn.
 """
 
+import os
 import shutil
 import sqlite3
 import tempfile
@@ -17,13 +18,15 @@ from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import Progress, StoredContents
+from dynhull_server.storage.segments.archive import HISTORY
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.sqlite.disk import Disk, OpenMode
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 from .incarnation import Backup
 from .model import Model
-from .store import FaultyStorage
+from .past_archive import FaultyArchive
+from .store import ERRORS, FaultyStorage
 
 FAILED = {"full": sqlite3.SQLITE_FULL, "lost": sqlite3.SQLITE_IOERR, "ghost": sqlite3.SQLITE_IOERR_FSYNC}
 # Where the folders of the lives are: in memory, where there is such a place.
@@ -33,14 +36,18 @@ MANY = 10**6
 
 
 class SQLiteLives(FaultyStorage):
-    """A folder with a database; each life has a storage of its own on it."""
+    """A folder with a database; each life has a storage of its own on it.
 
-    def __init__(self, model: Model, faults: Sequence[dict[str, Any]]) -> None:
+    `most_bytes` of the past of all hulls are kept at most; 0 for any number.
+    """
+
+    def __init__(self, model: Model, faults: Sequence[dict[str, Any]], most_bytes: int = 0) -> None:
         super().__init__(MemoryStorage(), model, faults, immediate=False)
         self._home = tempfile.TemporaryDirectory(dir=SHARED_MEMORY if SHARED_MEMORY.is_dir() else None)
         self._folders = 1
         self._disk = _FaultyDisk(self.fault, self._landed)
-        self._pending: Sequence[Any] = ()
+        self._pending: tuple[Sequence[Any], int] = (), 0
+        self._most_bytes = most_bytes
         self._backup: tuple[Path, Backup] | None = None
         self._restores = False
 
@@ -61,7 +68,8 @@ class SQLiteLives(FaultyStorage):
             self._follow(left)
             self._disk.drop()
             shutil.rmtree(left)
-        self._inner = SQLiteStorage(self._folder, Durability.SYNC, self._disk)
+        self._archive = FaultyArchive(self._folder / HISTORY, self._most_bytes, self._at_file)
+        self._inner = SQLiteStorage(self._folder, Durability.SYNC, self._disk, archive=self._archive)
         contents = super().open(progress)
         if self._restores and self._backup is not None:
             self._backup[1].restore(self._model, contents, self._fences(contents))
@@ -74,8 +82,23 @@ class SQLiteLives(FaultyStorage):
             list(copies.copy_all([(self._backup[0], self._folder)], lambda *_: None, restores=True))
             return
         for file in left.iterdir():
-            if not file.name.endswith("-shm"):
+            if file.is_dir():
+                shutil.copytree(file, self._folder / file.name, copy_function=os.link)
+            elif not file.name.endswith("-shm"):
                 shutil.copy(file, self._folder)
+
+    def _at_file(self, place: str) -> None:
+        self.give_way()
+        kind = self.fault(place)
+        if kind is not None:
+            raise ERRORS[kind](f"a file of the past fails at {place}, as planned")
+
+    def files_are_needed(self) -> bool:
+        """Whether each file of the past is one of a segment, and nothing is to be filed."""
+        assert isinstance(self._inner, SQLiteStorage)
+        hulls = self._inner._ledger.hulls.values()
+        named = {each.file for hull in hulls for each in hull.segments}
+        return self._archive.names() == named and all(hull.due == hull.filed for hull in hulls)
 
     def _fences(self, contents: StoredContents) -> list[KeptFence]:
         """The fences in the folder, each with all of its events."""
@@ -97,16 +120,16 @@ class SQLiteLives(FaultyStorage):
     def commit(self, changes: Sequence[Any], now: int = 0) -> CommitStamp:
         """Keep the changes."""
         self.give_way()
-        self._pending = changes
+        self._pending = changes, now
         try:
             commit = self._inner.commit(changes, now)
         finally:
-            self._pending = ()
+            self._pending = (), 0
         self.give_way()
         return commit
 
     def _landed(self) -> None:
-        self._model.landed(self._pending)
+        self._model.landed(*self._pending)
 
     def close(self) -> None:
         """The server ends."""

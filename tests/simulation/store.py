@@ -2,16 +2,24 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from contextlib import closing
+from typing import Any, TypeVar
 
 from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
-from dynhull_server.state.records import CommitStamp, HullRow, Kept, Keys
-from dynhull_server.storage.past import Erasure
+from dynhull_server.state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
+from dynhull_server.state.tracks import KeyChanges
+from dynhull_server.storage.past import Erasure, Hole, Moment, StoredHistory
 from dynhull_server.storage.port import NEWEST, NotCommittedError, Progress, Storage, StorageStep, StoredContents
 
 from .model import Model
 
 ERRORS: dict[str, type[Exception]] = {"os": OSError, "memory": MemoryError}
+
+Found = TypeVar("Found")
+
+
+class KilledError(Exception):
+    """The server was killed where the plan says so."""
 
 
 class FaultyStorage:
@@ -26,6 +34,7 @@ class FaultyStorage:
     Attributes:
         calm: whether nothing fails any more.
         dead: whether the server has been killed: its remains cannot touch the storage.
+        killing: whether it is to be killed now, where a thread has come to.
         give_way: called where another thread may go on: before a commit or read, and after it.
     """
 
@@ -33,7 +42,7 @@ class FaultyStorage:
         self.immediate = immediate
         self.keeps = True
         self.epoch = 0
-        self.calm = self.dead = False
+        self.calm = self.dead = self.killing = False
         self.give_way: Callable[[], None] = lambda: None
         self._inner = inner
         self._model = model
@@ -48,6 +57,10 @@ class FaultyStorage:
             raise SystemExit("a killed server's remains come to the storage")
         self._calls[place] += 1
         kind = None if self.calm else self._faults.get((place, self._calls[place]))
+        if kind == "kill":
+            self.killing = True
+            self.give_way()
+            raise SystemExit("a thread goes on after a kill")
         if kind is not None:
             self._model.faulty = True
         return kind
@@ -94,7 +107,7 @@ class FaultyStorage:
         return commit
 
     def _keep(self, changes: Sequence[Any], now: int) -> CommitStamp:
-        self._model.landed(changes)
+        self._model.landed(changes, now)
         try:
             return self._inner.commit(changes, now)
         except Exception as error:
@@ -184,23 +197,87 @@ class FaultyStorage:
             self._fail("sweep")
             yield step
 
+    # The past
+
     def file_history(self, now: int) -> Iterator[StorageStep]:
         """Steps; each may fail."""
-        for step in self._inner.file_history(now):
-            self.give_way()
-            self._fail("history")
-            yield step
+        yield from self._steps(self._inner.file_history(now))
 
     def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator[StorageStep]:
         """Steps; each may fail."""
-        for step in self._inner.erase(number, keys, until, now):
-            self.give_way()
-            self._fail("history")
-            yield step
+        yield from self._steps(self._inner.erase(number, keys, until, now))
+
+    def _steps(self, steps: Iterator[StorageStep]) -> Iterator[StorageStep]:
+        with closing(steps):  # type: ignore[type-var]  # all are generators
+            for step in steps:
+                self.give_way()
+                self._fail("history")
+                yield step
+                self.give_way()
+
+    def why_no_history(self) -> str:
+        """Why it keeps none."""
+        return self._inner.why_no_history()
+
+    def set_history(self, number: int, max_age: int, max_bytes: int) -> StorageStep:
+        """The step that changes how much is kept."""
+        return self._inner.set_history(number, max_age, max_bytes)
+
+    @property
+    def keeps_past(self) -> bool:
+        """Whether what is before the newest snapshots is kept."""
+        return not self.immediate
+
+    def files_are_needed(self) -> bool:
+        """Whether each file of the past is one of a segment, and nothing is to be filed."""
+        return True
 
     def erasures(self, number: int) -> tuple[Erasure, ...]:
         """What was erased."""
         return self._inner.erasures(number)
+
+    def history(self, number: int) -> StoredHistory:
+        """What there is."""
+        return self._of_past(lambda: self._inner.history(number))
+
+    def holes(self) -> list[Hole]:
+        """What could not be read."""
+        return self._inner.holes()
+
+    def oldest_moment(self, number: int, *, timed: bool = False) -> Moment:
+        """The oldest revision."""
+        return self._of_past(lambda: self._inner.oldest_moment(number, timed=timed))
+
+    def moment(self, number: int, time: int) -> Moment | None:
+        """The revision as of a time."""
+        return self._of_past(lambda: self._inner.moment(number, time))
+
+    def state(self, number: int, until: int) -> Kept:
+        """A kept state."""
+        return self._of_past(lambda: self._inner.state(number, until))
+
+    def batches(self, number: int, after: int, until: int) -> list[Record]:
+        """Some batches."""
+        return self._of_past(lambda: self._inner.batches(number, after, until))
+
+    def gathered(self, number: int, after: int, until: int) -> list[Record]:
+        """What some batches come to."""
+        return self._of_past(lambda: self._inner.gathered(number, after, until))
+
+    def key_state(self, number: int, keys: Keys, until: int) -> tuple[int, Any, Contents]:
+        """A kept state of some keys."""
+        return self._of_past(lambda: self._inner.key_state(number, keys, until))
+
+    def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
+        """What some batches do to some keys."""
+        return self._of_past(lambda: self._inner.key_changes(number, keys, after, until))
+
+    def _of_past(self, read: Callable[[], Found]) -> Found:
+        self.give_way()
+        self._fail("past")
+        found = read()
+        self.give_way()
+        return found
 
     def sync(self) -> None:
         """Fails, perhaps."""

@@ -1,0 +1,109 @@
+"""What must hold of the past of a hull.
+
+* Each of its revisions that is kept is the one that was committed, batch by batch and as a whole.
+* The revision as of a time is the last one committed at or before it, by a clock that does not go back.
+* Of a hull that is created with a history for ever nothing is ever lost.
+* A key that was erased is nowhere in it, and all else is as it was.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dynhull.keys import PackedKeys
+from dynhull_server.state.records import FOREVER, HullRow, HullSettings, KeyRows, Record
+from dynhull_server.storage.past import created
+
+if TYPE_CHECKING:
+    from .entities import Key
+    from .quarantine_model import Waiting
+
+# Who has numbered a batch is no part of the past.
+NUMBERED = ("producer", "sequence", "may_skip")
+
+# A key that is put and removed, and then erased.
+ERASED = 7
+
+
+@dataclass(slots=True, eq=False)
+class PastTruth:
+    """The past of one hull as the storage has kept it.
+
+    Attributes:
+        times: when each revision was committed; the first is the time of the creation.
+        records: the batches of the revisions after the first.
+        waiting: the positions in quarantine at each revision.
+        whole: whether it was to be kept for ever from the beginning on.
+        erased: the revision up to which `ERASED` was erased.
+    """
+
+    times: list[int]
+    whole: bool
+    records: list[Record] = field(default_factory=list)
+    waiting: list[dict["Key", "Waiting"]] = field(default_factory=lambda: [{}])
+    erased: int = 0
+
+    def add(self, record: Record, time: int, waiting: dict["Key", "Waiting"]) -> None:
+        """A revision has been committed."""
+        self.records.append(record)
+        self.times.append(time)
+        self.waiting.append(waiting)
+
+    def at(self, time: int) -> int | None:
+        """The last revision committed at or before a time; None before the first."""
+        return max((revision for revision, each in enumerate(self.times) if each <= time), default=None)
+
+    def keeps(self, settings: HullSettings) -> None:
+        """From now on that much is kept."""
+        self.whole = self.whole and _for_ever(settings)
+
+    def batch(self, revision: int) -> object:
+        """The batch of a revision as it must be read, as `plain`."""
+        return plain(self.records[revision - 1], erased=revision <= self.erased)
+
+
+def past_of(row: HullRow) -> PastTruth:
+    """The past of a new hull."""
+    return PastTruth([created(row).time], _for_ever(row.settings))
+
+
+def _for_ever(settings: HullSettings) -> bool:
+    return settings.history == FOREVER and not settings.history_bytes
+
+
+def plain(value: object, *, erased: bool = False) -> object:
+    """A record in lists and numbers, to be compared, perhaps without `ERASED`; its commit is compared elsewhere."""
+    if erased and isinstance(value, KeyRows):
+        return _without(plain(value))
+    if is_dataclass(value) and not isinstance(value, type):
+        compared = [each.name for each in fields(value) if each.compare and each.name not in NUMBERED]
+        return {name: plain(getattr(value, name), erased=erased) for name in compared}
+    if isinstance(value, PackedKeys):
+        return list(value)
+    if isinstance(value, np.ndarray):
+        return [repr(each) for each in (value.astype(float) if value.ndim > 1 else value).tolist()]
+    return value
+
+
+def _without(rows: Any) -> object:
+    """A batch of keys without `ERASED`."""
+    left = _left(rows["keys"])
+    for name in ("keys", "points", "times", "deadlines"):
+        rows[name] = _picked(rows[name], left)
+    rows["removes"] = _picked(rows["removes"], _left(rows["removes"]))
+    held = rows["held"]
+    if held is not None:
+        held["dropped"] = _picked(held["dropped"], _left(held["dropped"]))
+        left = _left(held["rows"]["keys"])
+        held["rows"] = {name: _picked(column, left) for name, column in held["rows"].items()}
+    return rows
+
+
+def _left(keys: Iterable[Any]) -> list[int]:
+    return [place for place, key in enumerate(keys) if key != str(ERASED)]
+
+
+def _picked(column: Any, left: list[int]) -> Any:
+    return None if column is None else [column[place] for place in left]

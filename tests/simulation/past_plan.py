@@ -1,0 +1,123 @@
+"""Plans with hulls that keep their past: they are written to until segments close, and read as they were."""
+
+import random
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from dynhull_server.state.records import FOREVER
+from dynhull_server.storage.rows import filing, past_rows
+
+from .cluster_plan import Operation, Plan
+from .globe import GLOBE
+from .operations import TIMED
+from .past_archive import FILE_PLACES
+from .past_model import ERASED
+
+# What clients ask of the past.
+OF_PAST = ("as_of", "feed", "replay", "track", "keep_past", "erase")
+READS = ("as_of", "as_of", "as_of", "feed", "replay", "track")
+
+# How much is kept: for ever, for some seconds, or some bytes: about one segment, or some.
+HISTORIES = [*[(FOREVER, 0)] * 5, (3_000_000, 0), (FOREVER, 4_000), (FOREVER, 20_000), (0, 0)]
+SERVER_BYTES = (0, 0, 0, 0, 15_000)
+
+# Points and keys after which a segment ends, and of which reads have some at a time; None for as many as usual.
+SEGMENT_ROWS = (None, 1, 3)
+
+# Seconds after which a hull may have a snapshot, and a segment be closed.
+ROUND = 1.1
+JUMPS = (-3600.0, -2.0, 2.0, 3600.0)
+
+# How the files of the past fail.
+FILE_FAULTS = ("os", "os", "memory", "kill", "kill", "kill")
+
+
+def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
+    """Hulls keep their past; clients write to them, read them as they were, and perhaps erase from it."""
+    plan["limits"] |= {"max_hulls": 10, "max_points": 100}
+    plan["history_bytes"] = draw.choice(SERVER_BYTES)
+    plan["segment_rows"] = draw.choice(SEGMENT_ROWS)
+    files = plan["storage"] == "sqlite"
+    for life in plan["lives"]:
+        life["clock"] = draw.choice((0, 0, *JUMPS))
+        if "after" in life:
+            life["after"] = int(draw.expovariate(1 / 400))
+        for client in life["clients"]:
+            for op in client:
+                if op["do"] == "create" and files:
+                    op |= _kept(draw)
+            for _ in range(draw.randint(0, 3)):
+                client.insert(draw.randint(0, len(client)), _of_past(draw, draw.choice(names), files=files))
+        life["clients"].append(_written_until_filed(draw, draw.choice(names), files=files))
+    if files and draw.random() < 0.6:
+        plan["faults"] += [_fault(draw) for _ in range(draw.choice((1, 1, 2, 3)))]
+
+
+def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list[Operation]:
+    """A hull is written to, and rests until its snapshots and segments are written, again and again."""
+    create: Operation = {"do": "create", "name": name, "max_points": 0}
+    if name == "w":
+        create["window"] = {"max_points": 2}
+    scene = [create | _kept(draw) if files else create]
+    write: Operation = {"do": "write", "name": name, "create": False, "numbered": False, "rows": 1}
+    put = write | {"do": "put", "removes": [], "time": 0}
+    for _ in range(draw.randint(2, 6)):
+        for _ in range(draw.randint(1, 4)):
+            if name not in TIMED:
+                scene.append(write | ({"delete": "lenient"} if draw.random() < 0.3 else {}))
+            else:
+                keys = draw.sample((0, 1, 2, 3, ERASED), draw.choice((1, 2, 2)))
+                removes = [key for key in (ERASED, draw.randrange(4)) if draw.random() < 0.3]
+                scene.append(put | {"keys": keys, "removes": removes})
+        if draw.random() < 0.8:
+            scene.append({"do": "rest", "name": name, "seconds": draw.choice((0.3, ROUND, ROUND, 2 * ROUND))})
+        scene += [_of_past(draw, name, files=files) for _ in range(draw.choice((0, 1, 2)))]
+    return scene
+
+
+def _of_past(draw: random.Random, name: str, *, files: bool) -> Operation:
+    """A request about the past."""
+    do = draw.choice((*READS * 3, *(("keep_past", "erase", "erase") if files else ())))
+    if draw.random() < 0.05:
+        return {"do": "clock", "name": name, "seconds": draw.choice(JUMPS)}
+    op: Operation = {"do": do, "name": name, "at": draw.random() ** draw.choice((1, 3))}
+    if do == "keep_past":
+        op["history"], op["history_bytes"] = draw.choice(HISTORIES)
+    if do == "as_of" and draw.random() < 0.5:
+        op["by"] = draw.choice((-1, 0, 0, 1, 1_000, 500_000))
+    if do == "feed":
+        op["most"] = draw.choice((1, 5, 100))
+    if draw.random() < 0.15:
+        op["leave"] = int(draw.expovariate(1 / 5))
+    return op
+
+
+def _kept(draw: random.Random) -> Operation:
+    history, most_bytes = draw.choice(HISTORIES)
+    return {"history": history, "history_bytes": most_bytes}
+
+
+def _fault(draw: random.Random) -> dict[str, Any]:
+    at = draw.choice((*FILE_PLACES, "history", "past"))
+    kind = draw.choice(FILE_FAULTS if at in FILE_PLACES else ("os", "memory"))
+    return {"at": at, "nth": 1 + int(draw.expovariate(1 / 4)), "kind": kind, "calls": draw.choice((1, 1, 1, 2, 5, 20))}
+
+
+def may_keep(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The hulls of a plan that may keep their past: those that a client can make with one request."""
+    return tuple(name for name in names if name not in GLOBE)
+
+
+@contextmanager
+def small_segments(rows: int | None) -> Iterator[None]:
+    """Have segments, and reads of the past, of few rows."""
+    if rows is None:
+        yield
+        return
+    before = filing.MOST_ROWS, past_rows.STEP_ROWS, past_rows.STEP_POINTS
+    filing.MOST_ROWS, past_rows.STEP_ROWS, past_rows.STEP_POINTS = rows, rows, rows
+    try:
+        yield
+    finally:
+        filing.MOST_ROWS, past_rows.STEP_ROWS, past_rows.STEP_POINTS = before
