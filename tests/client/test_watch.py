@@ -297,6 +297,10 @@ def test_watches_end_that_were_left_in_the_middle_of_a_wait() -> None:
                 await asyncio.wait([reader])
             del reader
             await asyncio.to_thread(wait_until, lambda: watchers() == 0)
+            watch = client.watch("a")
+            await anext(watch)
+            del watch  # between two reads
+            await asyncio.to_thread(wait_until, lambda: watchers() == 0)
 
     with measured() as (server, metrics):
         work = leave(server.address, lambda: scrape(metrics)["dynhull_watchers"])

@@ -96,9 +96,12 @@ class AsyncFollower(AsyncIterator[Happening]):
         await self.close()
 
     def __del__(self) -> None:
-        if self._reading is not None:  # of a wait that was cancelled: it holds the call
-            with suppress(RuntimeError):  # the loop has ended
-                self._reading.cancel()
+        # A read whose wait was cancelled holds the call, and a call and its iterator hold each other: until a collection
+        # of garbage, which may be hours away.
+        with suppress(RuntimeError):  # the loop has ended
+            for each in (self._reading, self._call):
+                if each is not None:
+                    each.cancel()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self._place.subject}>"
