@@ -62,7 +62,7 @@ def _flat(vectors: Vectors) -> Points:
 def _cut(vectors: Vectors, xy: Points, near: npt.NDArray[np.bool_]) -> Points:
     """The corners of what is left of a convex polygon within the square where the plane ends.
 
-    I. E. Sutherland and G. W. Hodgman (1974), with vectors as homogeneous coordinates: each side of the square is a
+    Sutherland and Hodgman (1974), with vectors as homogeneous coordinates: each side of the square is a
     great circle, and so are the edges.
     """
     rows = np.arange(len(vectors))

@@ -56,7 +56,7 @@ def test_a_program_goes_on_after_the_server_was_killed(
         server.kill()
         server.start()
         with HullClient(server.address) as client:
-            client.put("fleet", ["south"], [(0, -9)])
+            client.put("convoy", ["south"], [(0, -9)])
         second = program.stdout.readline()
         program.kill()
     server.kill()

@@ -58,9 +58,10 @@ def calls(described: dict[str, Any], path: str, operation: dict[str, Any]) -> It
 
 
 def remove(gateway: Gateway, hulls: list[str]) -> None:
-    """Delete all fences, then these hulls."""
-    for each in gateway.get("/fences?limit=1000").json["fences"]:
-        gateway.call("DELETE", f"/fences/{quote(each['name'], safe='')}")
+    """Delete all fences and alarms, then these hulls."""
+    for kind in ("fences", "alarms"):
+        for each in gateway.get(f"/{kind}?limit=1000").json[kind]:
+            gateway.call("DELETE", f"/{kind}/{quote(each['name'], safe='')}")
     for name in hulls:
         gateway.call("DELETE", f"/hulls/{name}")
 
@@ -86,7 +87,7 @@ def test_every_example_of_the_description_works(gateway: Gateway) -> None:
                         "?prefix=fleet&begin=true"
                         if at == "/feed"
                         else "?after=0"
-                        if "fences" in at or "/feed" in at
+                        if "fences" in at or "alarms" in at or "/feed" in at
                         else ""
                     )
                     events = Events(gateway, at + start)

@@ -13,12 +13,12 @@ from starlette.routing import Route
 import dynhull_client
 from dynhull_client import AsyncHullClient
 
-from . import fences, handlers, health, hulls, people, points, questions, tracks, uploads
+from . import alarms, fences, handlers, health, hulls, people, points, questions, tracks, uploads
 from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
 from .events import replays
 from .events import routes as events
-from .events.documents import FeedBatch, FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
+from .events.documents import AlarmEvent, FeedBatch, FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
 from .events.shared import SharedWatches
 from .figures import Figures, Measured
 from .gathering import Gatherer
@@ -38,15 +38,15 @@ DESCRIPTION = """Exact convex hulls of points that are inserted, moved and delet
 
 Every error is an `application/problem+json` (RFC 9457) that names the field, the position and the value at fault. A
 token of the server is sent as `Authorization: Bearer`. Numbers are doubles; there is null where a double is infinite or
-not a number. A slash in the name of a hull or a fence is written `%2F` in a path. Of a
-name that is given twice in an object of JSON, the last one counts.
+not a number. A slash in the name of a hull, a fence or an alarm is written `%2F` in a path.
+Of a name that is given twice in an object of JSON, the last one counts.
 
 The examples work as they are written, each after those that create what it names: hulls first, then points, fences,
-questions."""
+alarms, questions."""
 # What the descriptions of routes refer to by name.
 REFERRED: tuple[type[BaseModel], ...] = (
     *(Problem, Batch, Feature, FeatureCollection, Item),
-    *(HullSnapshot, HullChange, HullProgress, Hulls, FenceEvent, FeedBatch),
+    *(HullSnapshot, HullChange, HullProgress, Hulls, FenceEvent, AlarmEvent, FeedBatch),
 )
 SEEN_BY_PAGES = ["Idempotency-Key", "Last-Event-ID", "Authorization", "Content-Type"]
 
@@ -72,9 +72,8 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()
-    routers = [
-        module.router for module in (hulls, points, uploads, fences, questions, tracks, events, replays, maps, health)
-    ]
+    modules = hulls, points, uploads, fences, alarms, questions, tracks, events, replays, maps, health
+    routers = [module.router for module in modules]
     for router in routers:
         app.include_router(router)
     app.openapi = partial(_description, app)  # type: ignore[method-assign]  # the framework's way to have one's own

@@ -60,3 +60,8 @@ PAST_FENCES = _named(
 REPLACED = _named(
     yard=("A larger polygon", {"area": {"exterior": [[-2, -2], [6, -2], [6, 6]]}, "subjects": "fleet"}),
 )
+ALARMS = _named(
+    spread=("The diameter", {"name": "spread", "hull": "fleet", "when": "diameter > 3", "clear": "diameter < 2"}),
+    crowd=("Many points, and for long", {"name": "crowd", "prefix": "fleet", "when": "count > 100", "for": 30}),
+    silent=("Nothing comes", {"name": "silent", "prefix": "fleet", "when": "silent 5m"}),
+)

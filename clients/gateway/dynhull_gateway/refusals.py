@@ -66,9 +66,10 @@ def of_refusal(error: DynhullError, body: Any = None, *, waited: Sequence[str] =
 def of_value_error(error: ValueError | TypeError, body: Any = None) -> Response:
     """The response for an argument that the SDK does not take; nothing was sent."""
     found = SDK.fullmatch(str(error))
-    if found is None or not isinstance(body, dict) or found[1] not in body:
+    name = "" if found is None else found[1].removesuffix("_")  # as Python writes what is a word of its own
+    if found is None or not isinstance(body, dict) or name not in body:
         return problem(HTTPStatus.BAD_REQUEST, str(error), reason="INVALID_FIELD")
-    path: list[str | int] = [found[1], *([] if found[2] is None else [int(found[2])])]
+    path: list[str | int] = [name, *([] if found[2] is None else [int(found[2])])]
     value = shown(_at(body, path))
     cause = Cause(detail=found[3], pointer=pointer(path), value=value)
     return problem(HTTPStatus.BAD_REQUEST, said(cause), reason="INVALID_FIELD", **named(cause, path))

@@ -92,6 +92,7 @@ AnyHullPath = Annotated[
     ),
 ]
 FencePath = Annotated[Segment, Path(alias="name", description=f"The fence: {NAMES}.", examples=["yard"])]
+AlarmPath = Annotated[Segment, Path(alias="name", description=f"The alarm: {NAMES}.", examples=["spread"])]
 ConsumerPath = Annotated[
     Segment, Path(alias="consumer", description=f"The durable consumer: {NAMES}.", examples=["billing"])
 ]
@@ -730,7 +731,7 @@ class NewFence(FenceSettings):
 
 @answering(sdk.FenceConsumer)
 class Consumer(Response):
-    """A durable reader of a fence."""
+    """A durable reader of a fence or an alarm."""
 
 
 class Acknowledgement(Request):
@@ -739,7 +740,9 @@ class Acknowledgement(Request):
     model_config = example(sequence=1)
 
     sequence: Count
-    uid: StrictStr = Field("", max_length=200, description="The uid of the fence, to notice that it was replaced.")
+    uid: StrictStr = Field(
+        "", max_length=200, description="The uid of the fence or alarm, to notice that it was replaced."
+    )
 
 
 @answering(sdk.SubjectsInside)

@@ -1,17 +1,15 @@
 """The feed of a hull, or of many: every batch, each once and in order."""
 
-import asyncio
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from dataclasses import dataclass
-
-import grpc
+from functools import partial
 
 from dynhull_cli.feed_lines import batch_members
-from dynhull_client import AsyncFeed, AsyncHullClient, DynhullError, FeedBatch, HullReplacedError, UnavailableError
+from dynhull_client import AsyncFeed, AsyncHullClient, FeedBatch, HullReplacedError, UnavailableError
 
-from .messages import COMMENT, message, place, problem
-from .shared import RETRY_SECONDS
+from .messages import COMMENT, message, place
+from .shared import over_restarts
 
 
 @dataclass(slots=True)
@@ -56,21 +54,14 @@ async def look(client: AsyncHullClient, reading: FeedReading) -> None:
                     return
 
 
-async def batches(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:
+def batches(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:
     """The batches as text, over restarts of the server; a comment when there is none for long."""
-    while True:
-        try:
-            async for text in _read(client, reading, keepalive):
-                yield text
-        except HullReplacedError:
-            reading.uid, reading.after = "", 0
-            yield message("replaced", "", {"hull": reading.name})
-        except DynhullError as error:
-            if error.code != grpc.StatusCode.UNAVAILABLE:
-                yield problem(error)
-                return
-            yield COMMENT
-            await asyncio.sleep(RETRY_SECONDS)
+
+    def begin_again() -> bytes:
+        reading.uid, reading.after = "", 0
+        return message("replaced", "", {"hull": reading.name})
+
+    return over_restarts(partial(_read, client, reading, keepalive), HullReplacedError, begin_again)
 
 
 async def _read(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:

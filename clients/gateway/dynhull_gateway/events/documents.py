@@ -77,6 +77,13 @@ class FenceEvent(BaseModel):
     inside: list[SubjectsInside] = Field([], description="Of snapshot and closed, who was inside, by hull.")
 
 
+@answering(dynhull_client.AlarmEvent, partial=True)
+class AlarmEvent(BaseModel):
+    """The data of an event of an alarm; fields that do not apply are left out."""
+
+    cause: list[str] = Field([], description="Why it happened.")
+
+
 @answering(dynhull_client.FeedHeld, partial=True)
 class FeedHeld(BaseModel):
     """What a batch has changed in the quarantine of a hull; fields that do not apply are left out."""
@@ -143,6 +150,13 @@ OF_FENCE = (
     "event: enter\nid: beb1f1fb68d6cfdb:2\n"
     'data: {"type":"enter","sequence":2,"fence":"yard","uid":"beb1f1fb68d6cfdb","cause":["subject_appeared"],'
     '"hull":"fleet","key":"LH400","revision":1,"position":[0.0,0.0],"time":"2026-01-31T12:00:00Z"}\n\n'
+)
+OF_ALARM = (
+    "retry: 1000\n\n"
+    "event: raised\nid: 3ac87ec5d5b4ff0a:1\n"
+    'data: {"type":"raised","sequence":1,"alarm":"spread","uid":"3ac87ec5d5b4ff0a","hull":"fleet","revision":2,'
+    '"value":12.0,"bound":9.0,"cause":["batch"],"cause_revision":2,"cause_hull":"fleet",'
+    '"cause_time":"2026-01-31T12:00:00Z","previous":6.0,"time":"2026-01-31T12:00:00Z"}\n\n'
 )
 OF_PAST_FENCE = (
     "retry: 1000\n\n"

@@ -4,13 +4,11 @@ import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
-import grpc
-
 from dynhull_cli.fences.shown import event_members
-from dynhull_client import AsyncHullClient, DynhullError, FenceEvent, FenceReplacedError
+from dynhull_client import AsyncHullClient, FenceEvent, FenceReplacedError
 
-from .messages import COMMENT, message, place, problem
-from .shared import RETRY_SECONDS
+from .messages import COMMENT, message, place
+from .shared import over_restarts
 
 
 @dataclass(slots=True)
@@ -36,24 +34,19 @@ class Reading:
     ended: bool = False
 
 
-async def events(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:
+def events(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:
     """The events as text, over restarts of the server; a comment when there is none for long."""
-    while True:
-        try:
+
+    async def read() -> AsyncIterator[bytes]:
+        while not reading.ended:
             async for text in _watched(client, reading, keepalive):
                 yield text
-        except FenceReplacedError:
-            reading.uid, reading.after = "", 0
-            yield message("replaced", "", {"fence": reading.name})
-        except DynhullError as error:
-            if error.code != grpc.StatusCode.UNAVAILABLE:
-                yield problem(error)
-                return
-            yield COMMENT
-            await asyncio.sleep(RETRY_SECONDS)
-        else:
-            if reading.ended:
-                return
+
+    def begin_again() -> bytes:
+        reading.uid, reading.after = "", 0
+        return message("replaced", "", {"fence": reading.name})
+
+    return over_restarts(read, FenceReplacedError, begin_again)
 
 
 async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:

@@ -1,6 +1,6 @@
 """Where events are read."""
 
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Annotated, Any
@@ -9,7 +9,7 @@ import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
 from pydantic import Field
 
-from dynhull_client import AsyncHullClient, DeadlineError, HullNotFoundError, UnavailableError
+from dynhull_client import Alarm, AsyncHullClient, DeadlineError, Fence, HullNotFoundError, UnavailableError
 from dynhull_surface.as_of import moment_of
 
 from .. import examples, schemas
@@ -17,8 +17,9 @@ from ..bodies import JsonRoute
 from ..callers import Caller, address_of, token_of
 from ..fences import arguments_of
 from ..problems import ProblemError
-from ..schemas import LARGEST, NAME, FencePath, HullPath, Prefix
+from ..schemas import LARGEST, NAME, AlarmPath, FencePath, HullPath, Prefix
 from . import documents
+from .alarm_events import AlarmReading, alarm_events
 from .batches import FeedReading, batches, look
 from .feeds import PATIENCE_SECONDS, Feed
 from .fence_events import Reading
@@ -214,9 +215,37 @@ async def follow_fence(
     resume = resumed(ident)
     uid, place = ("", after) if resume is None or consumer is not None else resume
     reading = Reading(name, consumer, uid, place, conflate, exact)
-    await _require_fence(client, reading, "after" if resume is None else "Last-Event-ID")
+    await _require_events(client.get_fence, reading, "after" if resume is None else "Last-Event-ID")
     state = request.app.state
     texts = fence_events(client, reading, state.settings.keepalive_seconds)
+    return EventStream(texts, state.health, state.figures)
+
+
+@router.get("/alarms/{name}/events", response_class=Described, responses=events(documents.OF_ALARM))
+async def follow_alarm(
+    request: Request,
+    client: Caller,
+    name: AlarmPath,
+    consumer: Consumer = None,
+    after: AfterSequence = None,
+    last_event_id: LastEventId = None,
+) -> Response:
+    """Follow an alarm: each event once and in order, named by its type, with ids UID:SEQUENCE.
+
+    It begins with the next event unless Last-Event-ID, a sequence or a consumer says where; a consumer acknowledges
+    with `PUT /alarms/{name}/consumers/{consumer}`, and is sent what it has not acknowledged. The data is JSON, as
+    described by the schema AlarmEvent. Also: "replaced", when another alarm has the name now, and "problem", which ends
+    the stream.
+    """
+    if consumer is not None and after is not None:
+        raise ValueError("give either consumer, which knows its place, or after")
+    admit(request)
+    resume = resumed(last_event_id)
+    uid, place = ("", after) if resume is None or consumer is not None else resume
+    reading = AlarmReading(name, consumer, uid, place)
+    await _require_events(client.get_alarm, reading, "after" if resume is None else "Last-Event-ID")
+    state = request.app.state
+    texts = alarm_events(client, reading, state.settings.keepalive_seconds)
     return EventStream(texts, state.health, state.figures)
 
 
@@ -300,14 +329,16 @@ async def _require_keys(client: AsyncHullClient, name: str) -> None:
         return
 
 
-async def _require_fence(client: AsyncHullClient, reading: Reading, field: str) -> None:
-    """Refuse a fence that is not there, or has no such event yet. While the server is away the stream waits for it."""
+async def _require_events(
+    get: Callable[[str], Awaitable[Fence | Alarm]], reading: Reading | AlarmReading, field: str
+) -> None:
+    """Refuse what is not there, or has no such event yet. While the server is away the stream waits for it."""
     with suppress(UnavailableError):
-        fence = await client.get_fence(reading.name)
-        if reading.uid not in ("", fence.uid):
+        there = await get(reading.name)
+        if reading.uid not in ("", there.uid):
             reading.after = 0  # "replaced" follows, whatever the sequence
-        elif reading.after is not None and reading.after > fence.last_sequence:
-            detail = f"{field}: {reading.after} is after the last event, {fence.last_sequence}"
+        elif reading.after is not None and reading.after > there.last_sequence:
+            detail = f"{field}: {reading.after} is after the last event, {there.last_sequence}"
             raise ProblemError(409, detail, "SEQUENCE_AHEAD", field=field, value=str(reading.after))
 
 

@@ -11,6 +11,8 @@ import grpc
 
 from dynhull_client import DynhullError
 
+from .messages import COMMENT, problem
+
 log = logging.getLogger(__name__)
 
 RETRY_SECONDS = 0.5
@@ -111,3 +113,31 @@ class SharedWatches:
                 if self._feeds.get(view) is feed:
                     del self._feeds[view]
                 await feed.close()
+
+
+async def over_restarts(
+    read: Callable[[], AsyncIterator[bytes]],
+    replaced: type[DynhullError],
+    begin_again: Callable[[], bytes],
+) -> AsyncIterator[bytes]:
+    """The texts of a watch, and of those that follow it when the server was away, until one ends.
+
+    Args:
+        read: the texts of a watch from where the reader is.
+        replaced: the error that says that another thing has the name now.
+        begin_again: goes to the beginning of that, and returns the text that says so.
+    """
+    while True:
+        try:
+            async for text in read():
+                yield text
+        except replaced:
+            yield begin_again()
+        except DynhullError as error:
+            if error.code != grpc.StatusCode.UNAVAILABLE:
+                yield problem(error)
+                return
+            yield COMMENT
+            await asyncio.sleep(RETRY_SECONDS)
+        else:
+            return

@@ -1,0 +1,57 @@
+"""The events of an alarm, each once and in order."""
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from functools import partial
+
+from dynhull_cli.alarms.shown import event_members
+from dynhull_client import AlarmReplacedError, AsyncHullClient
+
+from .messages import COMMENT, message, place
+from .shared import over_restarts
+
+
+@dataclass(slots=True)
+class AlarmReading:
+    """What is read, and how far.
+
+    Attributes:
+        name: the alarm.
+        consumer: a durable consumer that knows its place; None for `uid` and `after`.
+        uid: the uid of the alarm; empty if it is not known yet.
+        after: the sequence of the last event that the reader has; None for new events only.
+    """
+
+    name: str
+    consumer: str | None
+    uid: str
+    after: int | None
+
+
+def alarm_events(client: AsyncHullClient, reading: AlarmReading, keepalive: float) -> AsyncIterator[bytes]:
+    """The events as text, over restarts of the server; a comment when there is none for long."""
+
+    def begin_again() -> bytes:
+        reading.uid, reading.after = "", 0
+        return message("replaced", "", {"alarm": reading.name})
+
+    return over_restarts(partial(_read, client, reading, keepalive), AlarmReplacedError, begin_again)
+
+
+async def _read(client: AsyncHullClient, reading: AlarmReading, keepalive: float) -> AsyncIterator[bytes]:
+    """One watch, which continues over lost connections itself once it has begun."""
+    if reading.consumer is None and not (reading.uid and reading.after is not None):
+        alarm = await client.get_alarm(reading.name)
+        reading.uid = alarm.uid
+        reading.after = alarm.last_sequence if reading.after is None else reading.after
+        yield place(f"{reading.uid}:{reading.after}")  # a reader that is cut off before the first event misses none
+    after = None if reading.consumer else reading.after
+    async with client.watch_alarm(
+        reading.name, reading.consumer, after, uid=reading.uid, progress_interval=keepalive
+    ) as watch:
+        async for event in watch:
+            if event.type == "progress":
+                yield COMMENT
+                continue
+            reading.uid, reading.after = event.uid, event.sequence
+            yield message(event.type, f"{event.uid}:{event.sequence}", event_members(event))
