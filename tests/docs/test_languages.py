@@ -2,14 +2,12 @@
 
 import shutil
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from blocks import blocks
+from command_line import dynhull
 from mortal_server import MortalServer
-
-from dynhull_client import HullClient
 
 pytestmark = [pytest.mark.long, pytest.mark.only_with("LANGUAGES_CASES")]
 ROOT = Path(__file__).parents[2]
@@ -22,30 +20,19 @@ LANGUAGES = {
 }
 
 
-@pytest.fixture
-def take_all(site: Path, tmp_path: Path) -> Callable[[str], Path]:
-    """Saves all blocks with a title of a page, as a reader would."""
-
-    def take(page: str) -> Path:
-        for block in blocks((site / page / "index.html").read_text()):
-            if block.title:
-                file = tmp_path / "program" / block.title
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.write_text(block.text.replace("PROTO", str(ROOT / "proto")))
-        return tmp_path / "program"
-
-    return take
-
-
 @pytest.mark.timeout(BUILDING)
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_a_program_goes_on_after_the_server_was_killed(
-    language: str, take_all: Callable[[str], Path], tmp_path: Path
-) -> None:
+def test_a_program_goes_on_after_the_server_was_killed(language: str, site: Path, tmp_path: Path) -> None:
     tool, command = LANGUAGES[language]
     if not shutil.which(tool):
         pytest.skip(f"no {tool}")
-    folder = take_all(f"how-to/{language}")
+    folder, page = tmp_path / "program", [*blocks((site / "how-to" / language / "index.html").read_text())]
+    for block in page:
+        if block.title:
+            (folder / block.title).parent.mkdir(parents=True, exist_ok=True)
+            (folder / block.title).write_text(block.text.replace("PROTO", str(ROOT / "proto")))
+    lines = [line.split() for block in page for line in block.text.splitlines()]
+    (moves,) = [words[1:] for words in lines if words[:2] == ["dynhull", "put"]]
     built = subprocess.run(["sh", "-eu", "build.sh"], cwd=folder, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stdout + built.stderr
     server = MortalServer(tmp_path)
@@ -55,8 +42,8 @@ def test_a_program_goes_on_after_the_server_was_killed(
         first = program.stdout.readline()
         server.kill()
         server.start()
-        with HullClient(server.address) as client:
-            client.put("convoy", ["south"], [(0, -9)])
+        done = dynhull(*moves, env={"DYNHULL_ADDRESS": server.address})
+        assert done.exit_code == 0, done.stderr
         second = program.stdout.readline()
         program.kill()
     server.kill()

@@ -17,7 +17,8 @@ from command_line import dynhull
 from server_process import server_process
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
-ELSEWHERE = {"tutorial", "how-to/brokers", "how-to/serve"}  # their commands have tests of their own
+LANGUAGES = {"how-to/go", "how-to/java", "how-to/rust"}
+ELSEWHERE = {"tutorial", "how-to/brokers", "how-to/serve"} | LANGUAGES  # their commands have tests of their own
 PIECES = "reference/sdk"  # of programs: they begin with a client that is there
 
 ENDING = (

@@ -96,8 +96,8 @@ class AsyncFollower(AsyncIterator[Happening]):
         await self.close()
 
     def __del__(self) -> None:
-        # A read whose wait was cancelled holds the call, and a call and its iterator hold each other, until a collection of
-        # garbage, which may be hours away.
+        # A read whose wait was cancelled holds the call; and a call and its iterator hold each other until garbage is
+        # collected, in a quiet program perhaps never.
         with suppress(RuntimeError):  # the loop has ended
             for each in (self._reading, self._call):
                 if each is not None:
