@@ -15,7 +15,7 @@ BUILDING = 1200  # seconds: a first build takes its packages from a registry
 
 LANGUAGES = {
     "go": ("go", ["./fleet"]),
-    "java": ("mvn", ["sh", "-c", 'java -cp "target/classes:$(cat classpath)" Fleet "$0"']),
+    "java": ("mvn", ["sh", "-c", 'exec java -cp "target/classes:$(cat classpath)" Fleet "$0"']),
     "rust": ("cargo", ["target/debug/fleet"]),
 }
 
