@@ -20,7 +20,7 @@ class TimeBar {
     this.button.onclick = () => recorder.toggle()
     this.back.onclick = () => recorder.go_live()
     at("select").onchange = ({target}) => recorder.speed = +target.value
-    this.slider.oninput = () => recorder.go(+this.slider.value <= +this.slider.min ? recorder.earliest : Date.now() + 1000 * this.slider.value)
+    this.slider.oninput = () => recorder.go(this.slider.value - this.slider.step / 2 < this.leftmost ? recorder.earliest : Date.now() + 1000 * this.slider.value)
     this.field.onchange = () => this.field.value && recorder.go(new Date(this.field.value).getTime())
     this.update()
     setInterval(() => this.update(), 1000)
@@ -35,6 +35,7 @@ class TimeBar {
   update() {
     const {live, moment, earliest, paused_at, past} = this.recorder, now = Date.now()
     const seconds = Math.max(1, (now - earliest) / 1000), step = Math.max(LEAST_STEP, Math.floor(seconds / MOST_STEPS))
+    this.leftmost = +this.slider.min  // whoever went there may be told of it when the bar has grown
     this.slider.step = step
     this.slider.min = -Math.ceil(seconds / step) * step
     if (!this.slider.matches(":active")) this.slider.value = live ? 0 : (moment - now) / 1000
