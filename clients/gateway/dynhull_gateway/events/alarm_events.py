@@ -30,12 +30,7 @@ class AlarmReading:
 
 def alarm_events(client: AsyncHullClient, reading: AlarmReading, keepalive: float) -> AsyncIterator[bytes]:
     """The events as text, over restarts of the server; a comment when there is none for long."""
-
-    def begin_again() -> bytes:
-        reading.uid, reading.after = "", 0
-        return message("replaced", "", {"alarm": reading.name})
-
-    return over_restarts(partial(_read, client, reading, keepalive), AlarmReplacedError, begin_again)
+    return over_restarts(partial(_read, client, reading, keepalive), reading, "alarm", AlarmReplacedError)
 
 
 async def _read(client: AsyncHullClient, reading: AlarmReading, keepalive: float) -> AsyncIterator[bytes]:

@@ -56,12 +56,7 @@ async def look(client: AsyncHullClient, reading: FeedReading) -> None:
 
 def batches(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:
     """The batches as text, over restarts of the server; a comment when there is none for long."""
-
-    def begin_again() -> bytes:
-        reading.uid, reading.after = "", 0
-        return message("replaced", "", {"hull": reading.name})
-
-    return over_restarts(partial(_read, client, reading, keepalive), HullReplacedError, begin_again)
+    return over_restarts(partial(_read, client, reading, keepalive), reading, "hull", HullReplacedError)
 
 
 async def _read(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:

@@ -42,11 +42,7 @@ def events(client: AsyncHullClient, reading: Reading, keepalive: float) -> Async
             async for text in _watched(client, reading, keepalive):
                 yield text
 
-    def begin_again() -> bytes:
-        reading.uid, reading.after = "", 0
-        return message("replaced", "", {"fence": reading.name})
-
-    return over_restarts(read, FenceReplacedError, begin_again)
+    return over_restarts(read, reading, "fence", FenceReplacedError)
 
 
 async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) -> AsyncIterator[bytes]:

@@ -5,13 +5,13 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Hashable
 from contextlib import AbstractAsyncContextManager, aclosing, suppress
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import grpc
 
 from dynhull_client import DynhullError
 
-from .messages import COMMENT, problem
+from .messages import COMMENT, message, problem
 
 log = logging.getLogger(__name__)
 
@@ -115,24 +115,32 @@ class SharedWatches:
                 await feed.close()
 
 
+class Place(Protocol):
+    """How far a reader is: the name of what is read, its uid, and what the reader goes on after."""
+
+    name: Any
+    uid: str
+    after: Any
+
+
 async def over_restarts(
-    read: Callable[[], AsyncIterator[bytes]],
-    replaced: type[DynhullError],
-    begin_again: Callable[[], bytes],
+    read: Callable[[], AsyncIterator[bytes]], place: Place, kind: str, replaced: type[DynhullError]
 ) -> AsyncIterator[bytes]:
     """The texts of a watch, and of those that follow it when the server was away, until one ends.
 
     Args:
         read: the texts of a watch from where the reader is.
-        replaced: the error that says that another thing has the name now.
-        begin_again: goes to the beginning of that, and returns the text that says so.
+        place: where the reader is.
+        kind: what is read, such as "fence".
+        replaced: the error that says that another one has the name now: the reader goes to the beginning of that.
     """
     while True:
         try:
             async for text in read():
                 yield text
         except replaced:
-            yield begin_again()
+            place.uid, place.after = "", 0
+            yield message("replaced", "", {kind: place.name})
         except DynhullError as error:
             if error.code != grpc.StatusCode.UNAVAILABLE:
                 yield problem(error)
