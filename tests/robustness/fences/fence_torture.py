@@ -204,7 +204,9 @@ class Torture:
             self.dispatch(Tick(self.time / 10**6, self.time, self))
         elif dice < 0.995 and self.waiting:
             self.dispatch(Gone(rng.choice(self.waiting)))
-        elif dice > 0.998:
+        elif dice < 0.998:
+            self.time += rng.choice([TICK // 3, TICK])
+        else:
             self.kill()
 
     def ask(self, request: Any) -> None:

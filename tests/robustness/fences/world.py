@@ -157,7 +157,7 @@ class World:
         removed: dict[str, set[str]] = {}
         for part in parts:
             if self._ends(part):
-                self._expire(part.name, part.arrived)
+                self._expire(part.name, self._clock(part.name, part.arrived))
                 if not together:
                     self._judge(before)
                     before = self._now()
@@ -194,15 +194,20 @@ class World:
         return hull(self.zone if name == ZONE else self.positions[str(name)].values())
 
     def _ends(self, part: Write) -> bool:
-        clock = self.clocks.get(part.name)
-        return clock is not None and any(end <= part.arrived for end in self.deadlines[part.name].values())
+        if self.clocks.get(part.name) is None:
+            return False
+        clock = self._clock(part.name, part.arrived)
+        return any(end <= clock for end in self.deadlines[part.name].values())
+
+    def _clock(self, name: str, time: int) -> int:
+        """The clock of a hull for a batch: it goes in ticks, and never back."""
+        return max(self.clocks[name] or 0, time - time % TICK)
 
     def _expire(self, name: str, time: int) -> None:
-        ended = [key for key, end in self.deadlines[name].items() if end <= time]
-        for key in ended:
+        self.clocks[name] = clock = max(self.clocks[name] or 0, time)
+        for key in [key for key, end in self.deadlines[name].items() if end <= clock]:
             del self.positions[name][key], self.deadlines[name][key]
         self.revisions[name] += 1
-        self.clocks[name] = max(self.clocks[name] or 0, time)
 
     def _apply(self, part: Write) -> None:
         batch, name = part.batch, part.name
@@ -216,7 +221,7 @@ class World:
             self.zone += map(exact, batch.inserts.tolist())
             return
         if self.clocks[name] is not None or batch.ttl is not None:
-            self.clocks[name] = max(self.clocks[name] or 0, part.arrived)
+            self.clocks[name] = self._clock(name, part.arrived)
         for key in batch.removes:
             self.positions[name].pop(key, None)
             self.deadlines[name].pop(key, None)
