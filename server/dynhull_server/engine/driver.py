@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Protocol, assert_never
 
 from ..state import events
-from ..state.core import Core
+from ..state.core import Core, not_stored
 from ..state.errors import StoppingError
 from ..state.events import (
     Commit,
@@ -37,7 +37,7 @@ from ..state.limits import Limits
 from ..state.records import CommitStamp, Kept
 from ..state.requests import Birth, Expire, Request, WriteBatch
 from ..state.trip import Trip
-from ..storage.port import Storage
+from ..storage.port import NotCommittedError, Storage
 from .group_commit import GroupCommit
 from .server_time import ServerTime
 from .supervisor import Supervisor
@@ -293,10 +293,13 @@ class Driver:
             await clock.sleep(pause * (clock.monotonic() - begun))
 
     async def settled(self) -> None:
-        """Wait for the commits that have begun; raises the error if their outcome cannot be decided."""
+        """Wait for the commits that have begun, or raise NotStoredError: their outcome cannot be decided at present."""
         done: asyncio.Future[None] = self._loop.create_future()
         self._commits.settle(lambda error, _: self._from_thread(partial(_settle, done, error)))
-        await done
+        try:
+            await done
+        except NotCommittedError as error:
+            raise not_stored(error) from error
 
     def commit_from_thread(self, changes: list[Any]) -> None:
         """Commit, from another thread, changes of shards; raises the error of a failure."""

@@ -103,10 +103,7 @@ class HullFeeds:
     async def settled(self) -> CommitStamp:
         """A commit that is published as a whole, with all before it: the newest one."""
         published = self._driver.published
-        try:
-            await self._driver.settled()
-        except UNREADABLE as error:
-            raise NotStoredError(words_for_callers(error)) from error
+        await self._driver.settled()
         return published
 
     async def sent_until(self, hull: LiveHull, commit: CommitStamp) -> tuple[int, bool]:
