@@ -10,7 +10,6 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
-import aiomqtt
 import nats
 import pytest
 from brokers import broker, mosquitto, nats_server
@@ -18,6 +17,7 @@ from patience import PATIENCE, wait_until
 from ports import free_port
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
 from server_process import run
+from subscriber import Subscriber
 
 from dynhull_client import HullClient
 
@@ -34,29 +34,6 @@ def client(address: str, name: str) -> Iterator[HullClient]:
 @pytest.fixture
 def port() -> int:
     return free_port()
-
-
-class Subscriber:
-    """Subscribes to all topics, and collects what arrives. The broker keeps the session of an identifier."""
-
-    def __init__(self, port: int, identifier: str | None = None) -> None:
-        self.messages: list[tuple[str, dict[str, Any]]] = []
-        self._ready = threading.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._run(port, identifier)), daemon=True)
-        self._thread.start()
-        assert self._ready.wait(PATIENCE)
-
-    async def _run(self, port: int, identifier: str | None) -> None:
-        try:
-            async with aiomqtt.Client(
-                "127.0.0.1", port, identifier=identifier, clean_session=identifier is None
-            ) as client:
-                await client.subscribe("#", qos=1)
-                self._ready.set()
-                async for message in client.messages:
-                    self.messages.append((str(message.topic), json.loads(message.payload)))
-        except aiomqtt.MqttError:  # the broker was killed
-            return
 
 
 def test_mqtt(client: HullClient, address: str, name: str, tmp_path: Path, port: int) -> None:

@@ -29,6 +29,7 @@ from dynhull_bridges.refusals.kafka import KAFKA
 from dynhull_bridges.refusals.mqtt import MQTT
 from dynhull_bridges.refusals.nats import NATS
 from dynhull_bridges.refusals.table import Meaning
+from dynhull_bridges.sources import Source
 from dynhull_bridges.target import GoneError, NotDeliveredError, RefusedError, Target
 from dynhull_bridges.webhook import Webhook
 
@@ -125,7 +126,7 @@ def test_subscriptions_of_mqtt_3() -> None:
 async def deliver(target: Target) -> Exception:
     """The error with which a letter is not delivered."""
     try:
-        await target.deliver([Letter("id", "fence", "enter", "uid", 1, "{}")])
+        await target.deliver([Letter("id", Source("fence", "fence"), "enter", "uid", 1, "{}")])
     except (NotDeliveredError, GoneError) as error:
         return error
     finally:

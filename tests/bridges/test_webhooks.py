@@ -312,19 +312,19 @@ def test_the_metrics_page(client: HullClient, address: str, name: str, endpoint:
     endpoint.answer = lambda request: (500 if '"truck-1"' in request.body else 200, {})
     with relay_process(address, tmp_path, name, "--to", endpoint.url, "--metrics-port", 0, *PLAIN) as relay:
         page = f"127.0.0.1:{relay.wait_for('relaying')['metrics_port']}"
-        assert scrape(page)[f'dynhull_relay_delivered_total{{fence="{name}"}}'] == 0
+        assert scrape(page)[f'dynhull_relay_delivered_total{{alarm="",fence="{name}"}}'] == 0
         pass_through(client, name, KEYS)
         wait_until(lambda: acknowledged(client, name) == 2)
-        wait_until(lambda: scrape(page).get(f'dynhull_relay_backlog{{fence="{name}"}}') == 8)
+        wait_until(lambda: scrape(page).get(f'dynhull_relay_backlog{{alarm="",fence="{name}"}}') == 8)
         taken = page.rpartition(":")[2]
         options = ("--address", address, "--consumer", "other", "--to", tmp_path / "other", "--metrics-port", taken)
         refused = dynhull("relay", name, *options)
         assert refused.exit_code == 2
         assert f"--metrics-port {taken}: cannot listen on 127.0.0.1: another program uses this port" in refused.stderr
         figures = scrape(page)
-        assert figures[f'dynhull_relay_delivered_total{{fence="{name}"}}'] == 2
-        assert figures[f'dynhull_relay_failed_total{{fence="{name}"}}'] >= 1
-        assert 0 < figures[f'dynhull_relay_oldest_seconds{{fence="{name}"}}'] < 300
+        assert figures[f'dynhull_relay_delivered_total{{alarm="",fence="{name}"}}'] == 2
+        assert figures[f'dynhull_relay_failed_total{{alarm="",fence="{name}"}}'] >= 1
+        assert 0 < figures[f'dynhull_relay_oldest_seconds{{alarm="",fence="{name}"}}'] < 300
 
 
 def test_a_relay_ends_when_its_fence_is_deleted(
@@ -358,9 +358,12 @@ def test_a_relay_ends_when_its_fence_is_deleted(
         (["--to", "-", "--timeout", "0s"], "--timeout '0s' must be more than 0"),
         (["--to", "127.0.0.1:8000"], "did you mean http://127.0.0.1:8000? A file of that name is ./127.0.0.1:8000"),
         (["--to", "localhost:8000/hook"], "did you mean http://localhost:8000/hook?"),
-        (["--to", "{fence}.ndjson"], "{fence} and {type} are filled in in URLs"),
-        (["--to", "mqtt://a/plant/{fnce}/{type}"], "--to: {fnce} is not {fence} or {type}; {{ and }} stand for braces"),
-        (["--to", "mqtt://a/plant/{fence"], "--to: {fence is not {fence} or {type}"),
+        (["--to", "{fence}.ndjson"], "{kind}, {name} and {type} are filled in in URLs"),
+        (
+            ["--to", "mqtt://a/plant/{fnce}/{type}"],
+            "--to: {fnce} is not {kind}, {name} or {type}; {{ and }} stand for braces",
+        ),
+        (["--to", "mqtt://a/plant/{fence"], "--to: {fence is not {kind}, {name} or {type}"),
         (["--to", "mqtt://a/b?version=5"], "no option 'version' after the question mark: there are none"),
         (["--to", "nats://a/ev ents"], "'ev ents' is no subject of NATS"),
         (["--to", "nats://a/events..{fence}"], "'events..{fence}' is no subject of NATS"),

@@ -72,9 +72,9 @@ class Receiver:
         self._server.server_close()
         self._thread.join()
 
-    def events(self, fence: str) -> list[dict[str, Any]]:
-        """The events of a fence in the order in which they were accepted, repetitions too."""
-        return [each for request in list(self.accepted) for each in request.events if each["data"]["fence"] == fence]
+    def events(self, name: str, kind: str = "fence") -> list[dict[str, Any]]:
+        """The events of a fence or an alarm in the order in which they were accepted, repetitions too."""
+        return [each for request in list(self.accepted) for each in request.events if each["data"].get(kind) == name]
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""A real relay in a process of its own, and fences with events for it to deliver."""
+"""A real relay in a process of its own, and fences and alarms with events for it to deliver."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -37,6 +37,21 @@ def pass_through(client: HullClient, name: str, keys: Iterable[str]) -> None:
         client.put(name, [key], OUTSIDE)
 
 
-def acknowledged(client: HullClient, name: str) -> int:
+def alarm(client: HullClient, name: str) -> None:
+    """An alarm about the area of a keyed hull of the same name, whose third point decides."""
+    client.create_hull(name, keyed="str")
+    client.put(name, ["a", "b", "c"], [[0, 0], [4, 0], [0, 1]])
+    client.create_alarm(name, hull=name, when="area > 10", clear="area < 9")
+
+
+def grow_and_shrink(client: HullClient, name: str, times: int) -> None:
+    """The alarm is raised and cleared so many times."""
+    for _ in range(times):
+        client.put(name, ["c"], [[0, 6]])
+        client.put(name, ["c"], [[0, 1]])
+
+
+def acknowledged(client: HullClient, name: str, kind: str = "fence") -> int:
     """The sequence that the relay has acknowledged."""
-    return max((each.acknowledged for each in client.get_fence(name).consumers), default=0)
+    found = client.get_alarm(name) if kind == "alarm" else client.get_fence(name)
+    return max((each.acknowledged for each in found.consumers), default=0)

@@ -27,7 +27,7 @@ To = Annotated[
     typer.Option(
         metavar="URL|FILE|-",
         help="Receiver: http(s)://, mqtt(s)://HOST/TOPIC, nats://HOST/SUBJECT, a file, or - for standard output. "
-        "{fence} and {type} are filled in.",
+        "{kind}, {name} and {type} of events are filled in.",
     ),
 ]
 State = Annotated[Path, typer.Option(help="Folder for dead letters.", file_okay=False, envvar="DYNHULL_RELAY_STATE")]
@@ -134,7 +134,10 @@ def dead_letters() -> None:
 @connecting
 def relay(
     connect: Connect,
-    fences: Annotated[list[str], typer.Argument(metavar="FENCE", help="Names of the fences.")],
+    sources: Annotated[
+        list[str],
+        typer.Argument(metavar="FENCE|alarm:ALARM", help="Names of fences, and of alarms after alarm:."),
+    ],
     consumer: Annotated[
         str, typer.Option(help="Name of the durable consumer. The server keeps what it has not acknowledged.")
     ],
@@ -161,16 +164,19 @@ def relay(
     metrics_host: Annotated[str, typer.Option(help="Address of the metrics page.")] = "127.0.0.1",
     log_format: Annotated[LogForm, typer.Option(help="Form of the log on standard error.")] = LogForm.TEXT,
 ) -> None:
-    """Deliver the events of fences to webhooks, MQTT, NATS JetStream or a file, at least once and in order per fence.
+    """Deliver the events of fences and alarms to webhooks, MQTT, NATS JetStream or a file, at least once and in order.
 
         dynhull relay depot --consumer alarm --to https://alarms.example/hook
-        dynhull relay depot yard --consumer plant --to 'mqtt://broker/plant/{fence}/{type}'
+        dynhull relay alarm:spread alarm:silence --consumer pager --to https://alarms.example/hook
+        dynhull relay depot alarm:spread --consumer plant --to 'mqtt://broker/plant/{kind}/{name}/{type}'
 
-    An event is acknowledged after it was delivered. Whatever is killed, it arrives, perhaps twice but with the same id.
+    The order is that of each fence and alarm. An event is acknowledged after it was delivered. Whatever is killed, it
+    arrives, perhaps twice but with the same id.
     What fails is repeated until it succeeds; only refusals, such as HTTP 400 to 499, end as dead letters, see
     `dynhull relay dead-letters`. Bodies are CloudEvents 1.0 in JSON; webhooks are signed as Standard Webhooks are.
 
-    The relay ends when all fences are deleted, or after SIGTERM; exit code 1 if a receiver answered 410 Gone.
+    The relay ends when all fences and alarms are deleted, or after SIGTERM; exit code 1 if a receiver answered 410
+    Gone.
     """
     import asyncio
 
@@ -181,9 +187,12 @@ def relay(
     from .lane import Patience
     from .relay import run
     from .signatures import read_secret
-    from .targets import TargetOptions, target_of
+    from .sources import read_source
+    from .targets import TargetOptions, check_kinds, target_of
     from .urls import without_secrets
 
+    wanted = [read_source(each) for each in sources]
+    check_kinds(to, wanted)
     keys = [read_secret(each) for each in secret or ()]
     patience = Patience(
         attempts, more_than_0(first_pause, "--first-pause"), more_than_0(longest_pause, "--longest-pause")
@@ -206,7 +215,7 @@ def relay(
                 return await run(
                     client,
                     connect.address,
-                    fences,
+                    wanted,
                     consumer,
                     target,
                     without_secrets(to),

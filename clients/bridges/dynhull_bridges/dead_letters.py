@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .letters import Letter, read_letter
+from .sources import Source
 
 UNSAFE = re.compile(r"[^A-Za-z0-9._-]")
 DIGITS_OF_A_RECEIVER = 16
@@ -80,27 +81,27 @@ class StateFolder:
         return sorted(found.values(), key=lambda each: (each.time, each.letter.sequence))
 
     def gone(self) -> dict[str, str]:
-        """The fences whose receiver wants nothing any more, each with the receiver, and what it answered."""
+        """The sources whose receiver wants nothing any more, each with the receiver, and what it answered."""
         if not self._gone.exists():
             return {}
         try:
             found = json.loads(self._gone.read_text("utf-8"))
-            return {str(fence): str(answer) for fence, answer in found.items()}
+            return {str(source): str(answer) for source, answer in found.items()}
         except (AttributeError, ValueError):
             raise ValueError(f"{self._gone} does not list the receivers that are gone: --enable removes it") from None
 
-    def disable(self, fence: str, to: str, answer: str) -> None:
-        """Remember that the receiver of a fence is gone."""
-        _store(self._gone, self.gone() | {gone_key(fence, to): answer})
+    def disable(self, source: Source, to: str, answer: str) -> None:
+        """Remember that the receiver of a source is gone."""
+        _store(self._gone, self.gone() | {gone_key(source, to): answer})
 
     def enable(self) -> None:
         """Forget which receivers are gone."""
         self._gone.unlink(missing_ok=True)
 
 
-def gone_key(fence: str, to: str) -> str:
-    """What `StateFolder.gone` calls a fence and its receiver."""
-    return f"{fence} to {to}"
+def gone_key(source: Source, to: str) -> str:
+    """What `StateFolder.gone` calls a source and its receiver."""
+    return f"{source} to {to}"
 
 
 def _store(path: Path, members: dict[str, object] | dict[str, str]) -> None:

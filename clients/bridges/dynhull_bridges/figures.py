@@ -7,6 +7,12 @@ from prometheus_client import CollectorRegistry, Counter, Gauge
 from dynhull_client import FenceConsumer
 
 from .metrics_page import serve_page
+from .sources import Source
+
+
+def labels(source: Source) -> tuple[str, str]:
+    """Its labels, fence and alarm, of which one is empty: to Prometheus that is none."""
+    return (source.name, "") if source.kind == "fence" else ("", source.name)
 
 
 class Figures:
@@ -14,7 +20,7 @@ class Figures:
 
     def __init__(self) -> None:
         self._registry = CollectorRegistry()
-        names = ["fence"]
+        names = ["fence", "alarm"]
 
         def counter(name: str, text: str) -> Counter:
             return Counter(f"dynhull_relay_{name}", text, names, registry=self._registry)
@@ -47,16 +53,16 @@ class Figures:
         """Note whether there is a connection to the server."""
         self._lost = None if connected else time.monotonic()
 
-    def add(self, fence: str) -> None:
-        """Show a fence from the start, not only after its first event."""
+    def add(self, source: Source) -> None:
+        """Show a fence or an alarm from the start, not only after its first event."""
         for each in (self.delivered, self.failed, self.dead, self.lost):
-            each.labels(fence)
+            each.labels(*labels(source))
 
-    def behind(self, fence: str, consumer: FenceConsumer) -> None:
+    def behind(self, source: Source, consumer: FenceConsumer) -> None:
         """Note what the server says about the consumer."""
         oldest = consumer.oldest
-        self._backlog.labels(fence).set(consumer.backlog)
-        self._oldest.labels(fence).set_function(
+        self._backlog.labels(*labels(source)).set(consumer.backlog)
+        self._oldest.labels(*labels(source)).set_function(
             lambda: 0.0 if oldest is None else max(0.0, time.time() - oldest.timestamp())
         )
 

@@ -11,17 +11,18 @@ from nats.js.errors import NoStreamResponseError
 from .letters import CONTENT_TYPE, Letter
 from .nats_connection import closed, connected
 from .refusals.nats import NATS, code_of
+from .sources import Kind
 from .target import NotDeliveredError, RefusedError, filled, not_delivered
 from .urls import check_subject, options_of, without_secrets
 
-SUBJECT = "dynhull.{fence}.{type}"
+SUBJECTS: dict[Kind, str] = {"fence": "dynhull.{name}.{type}", "alarm": "dynhull.alarm.{name}.{type}"}
 
 
 class JetStream:
     """Publishes to the subject in nats://[USER:PASSWORD@]HOST[:PORT][/SUBJECT], or tls:// for TLS.
 
-    {fence} and {type} in the subject are filled in. The header Nats-Msg-Id has the id of the event, so that the stream
-    drops repetitions within its duplicate window. All fences share one connection.
+    {kind}, {name} and {type} in the subject are filled in. The header Nats-Msg-Id has the id of the event, so that the
+    stream drops repetitions within its duplicate window. All sources share one connection.
     """
 
     most = 1
@@ -32,8 +33,9 @@ class JetStream:
             raise ValueError(f"--to {without_secrets(url)} has no host")
         self._server = parts._replace(path="").geturl()
         options_of(url)
-        self._subject = parts.path.removeprefix("/") or SUBJECT
-        check_subject(self._subject)
+        self._subject = parts.path.removeprefix("/")
+        if self._subject:
+            check_subject(self._subject)
         if {"*", ">"} & set(self._subject):
             raise ValueError(f"the subject {self._subject!r} has a wildcard, * or >: events go to one subject")
         self._timeout = timeout
@@ -44,13 +46,13 @@ class JetStream:
         """Publish the letters, each after the one before was stored."""
         client = await self._connected()
         for each in letters:
-            subject = filled(self._subject, each)
+            subject = self._filled(each)
             headers = {"Nats-Msg-Id": each.id, "Content-Type": CONTENT_TYPE}
             try:
                 await client.jetstream(timeout=self._timeout).publish(subject, each.text.encode(), headers=headers)
             except MaxPayloadError:
                 raise RefusedError(f"NATS: {len(each.text.encode())} bytes are too many for the server") from None
-            except BadSubjectError:  # the name of the fence has empty words
+            except BadSubjectError:  # the name of the source has empty words
                 raise RefusedError(f"NATS: {subject!r} is no subject") from None
             except NoStreamResponseError:
                 raise NotDeliveredError(f"NATS: no stream stores the subject {subject}; create one") from None
@@ -62,12 +64,15 @@ class JetStream:
 
     def place(self, letter: Letter) -> str:
         """The server and the subject."""
-        return f"{without_secrets(self._server)}/{filled(self._subject, letter)}"
+        return f"{without_secrets(self._server)}/{self._filled(letter)}"
 
     async def close(self) -> None:
         """Disconnect."""
         if self._client is not None:
             await self._disconnect(self._client)
+
+    def _filled(self, letter: Letter) -> str:
+        return filled(self._subject or SUBJECTS[letter.source.kind], letter)
 
     async def _connected(self) -> Client:
         async with self._connecting:
@@ -79,7 +84,7 @@ class JetStream:
             return self._client
 
     async def _disconnect(self, client: Client) -> None:
-        """Give up a connection, unless another fence has done so already."""
+        """Give up a connection, unless another source has done so already."""
         async with self._connecting:
             if self._client is client:
                 self._client = None

@@ -1,4 +1,4 @@
-"""One fence of a relay: its events go to the target one after the other, whatever happens to other fences."""
+"""One source of a relay: its events go to the target one after the other, whatever happens to other sources."""
 
 import asyncio
 from contextlib import suppress
@@ -10,7 +10,6 @@ from dynhull_client import (
     AsyncHullClient,
     DeadlineError,
     DynhullError,
-    FenceEvent,
     InvalidRequestError,
     LimitExceededError,
     OutcomeUnknownError,
@@ -18,8 +17,9 @@ from dynhull_client import (
 )
 
 from .dead_letters import StateFolder
-from .figures import Figures
+from .figures import Figures, labels
 from .letters import Letter, letter
+from .sources import Event, Source
 from .target import GoneError, NotDeliveredError, ReaderGoneError, RefusedError, Target
 from .waiting import growing_pauses, unless
 
@@ -48,11 +48,11 @@ class Patience:
 
 
 class Lane:
-    """Delivers the events of one fence in order, and acknowledges them once the target has them.
+    """Delivers the events of one fence or alarm in order, and acknowledges them once the target has them.
 
     Args:
         client: the client of the server.
-        fence: the name of the fence.
+        source: the fence or the alarm.
         consumer: the name of the durable consumer.
         target: the receiver.
         to: the name of the receiver.
@@ -65,7 +65,7 @@ class Lane:
     def __init__(
         self,
         client: AsyncHullClient,
-        fence: str,
+        source: Source,
         consumer: str,
         target: Target,
         to: str,
@@ -76,29 +76,30 @@ class Lane:
     ) -> None:
         self.disabled = False
         self._client = client
-        self._fence = fence
+        self._source = source
         self._consumer = consumer
         self._target = target
         self._to = to
         self._patience = patience
         self._folder = folder
         self._figures = figures
+        self._labels = labels(source)
         self._stop = stop
-        self._log = structlog.get_logger("dynhull_relay").bind(fence=fence)
+        self._log = structlog.get_logger("dynhull_relay").bind(**{source.kind: source.name})
         # Bounded: while the receiver is slow, the server keeps the events.
-        self._arrived: asyncio.Queue[FenceEvent | None] = asyncio.Queue(2 * target.most)
-        self._last: FenceEvent | None = None  # of those that have arrived
-        self._done: FenceEvent | None = None
-        self._acknowledged: FenceEvent | None = None
+        self._arrived: asyncio.Queue[Event | None] = asyncio.Queue(2 * target.most)
+        self._last: Event | None = None  # of those that have arrived
+        self._done: Event | None = None
+        self._acknowledged: Event | None = None
         self._news = asyncio.Event()
         self._begun = False
-        figures.add(fence)
+        figures.add(source)
 
     async def run(self) -> None:
-        """Deliver until the fence is deleted, its receiver is gone, or the relay stops.
+        """Deliver until the source is deleted, its receiver is gone, or the relay stops.
 
         Raises:
-            DynhullError: the server refuses to send the events, of a fence that does not exist for example.
+            DynhullError: the server refuses to send the events, of a source that does not exist for example.
             ReaderGoneError: nobody reads standard output any more.
         """
         async with asyncio.TaskGroup() as group:
@@ -119,7 +120,7 @@ class Lane:
         pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
         while True:
             try:
-                async with self._client.watch_fence(self._fence, self._consumer) as watch:
+                async with self._source.watch(self._client, self._consumer) as watch:
                     async for event in watch:
                         self._begun = True
                         pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
@@ -135,12 +136,12 @@ class Lane:
                 self._log.warning("no events from the server, trying again", error=str(error))
             await asyncio.sleep(next(pauses))
 
-    def _is_known(self, event: FenceEvent) -> bool:
+    def _is_known(self, event: Event) -> bool:
         """Whether it arrived before the watch began again; acknowledgements may be behind."""
         known = self._last
         return known is not None and event.uid == known.uid and event.sequence <= known.sequence
 
-    async def _next(self) -> list[FenceEvent]:
+    async def _next(self) -> list[Event]:
         """The next events, as many as are there and go into one delivery; none at the end."""
         if self._stop.is_set():
             return []
@@ -154,7 +155,7 @@ class Lane:
             found.append(more)
         return found
 
-    async def _deliver(self, events: list[FenceEvent]) -> None:
+    async def _deliver(self, events: list[Event]) -> None:
         """Deliver events, however long it takes."""
         letters = [letter(each) for each in events]
         pauses = growing_pauses(self._patience.first_pause, self._patience.longest_pause)
@@ -165,7 +166,7 @@ class Lane:
             except GoneError as error:
                 self._log.error("the receiver is gone: no more deliveries", to=self._to, answer=str(error))
                 try:
-                    self._folder.disable(self._fence, self._to, str(error))
+                    self._folder.disable(self._source, self._to, str(error))
                 except (OSError, ValueError) as failure:
                     self._log.error("not remembered: the next relay asks the receiver again", error=str(failure))
                 self.disabled = True
@@ -173,7 +174,7 @@ class Lane:
             except ReaderGoneError:
                 raise
             except Exception as error:
-                self._figures.failed.labels(self._fence).inc()
+                self._figures.failed.labels(*self._labels).inc()
                 refusals += isinstance(error, RefusedError)
                 if refusals >= self._patience.attempts and self._bury(letters, str(error), refusals):
                     break
@@ -188,11 +189,11 @@ class Lane:
                 )
                 await unless(self._stop, asyncio.sleep(pause))
             else:
-                self._figures.delivered.labels(self._fence).inc(len(letters))
+                self._figures.delivered.labels(*self._labels).inc(len(letters))
                 break
         else:
             return
-        self._figures.lost.labels(self._fence).inc(sum(e.last - e.first + 1 for e in events if e.type == "lost"))
+        self._figures.lost.labels(*self._labels).inc(sum(e.last - e.first + 1 for e in events if e.type == "lost"))
         self._done = events[-1]
         self._news.set()
 
@@ -204,7 +205,7 @@ class Lane:
         except OSError as failure:
             self._log.error("no dead letter can be kept", error=str(failure))
             return False
-        self._figures.dead.labels(self._fence).inc(len(letters))
+        self._figures.dead.labels(*self._labels).inc(len(letters))
         self._log.error("refused: a dead letter now", id=letters[0].id, letters=len(letters), error=reason)
         return True
 
@@ -222,23 +223,23 @@ class Lane:
                 self._log.warning("not acknowledged, trying again", error=str(error))
                 self._news.set()
                 await asyncio.sleep(next(pauses))
-            except DynhullError as error:  # of a fence that was created again, for example: the next one counts
+            except DynhullError as error:  # of a source that was created again, for example: the next one counts
                 self._log.warning("not acknowledged", error=str(error))
 
     async def _acknowledge_now(self) -> None:
         done = self._done
         if done is not None and done is not self._acknowledged and done.type != "closed":
-            consumer = await self._client.ack_fence(self._fence, self._consumer, done.sequence, uid=done.uid)
+            consumer = await self._source.acknowledge(self._client, self._consumer, done)
             self._acknowledged = done
-            self._figures.behind(self._fence, consumer)
+            self._figures.behind(self._source, consumer)
 
     async def _look(self) -> None:
         """Ask the server how far the consumer is behind, now and then: it may be all that moves."""
         while True:
             with suppress(DynhullError):  # the reader reports it
-                fence = await self._client.get_fence(self._fence)
+                consumers = await self._source.consumers(self._client)
                 self._begun = True
-                for each in fence.consumers:
+                for each in consumers:
                     if each.name == self._consumer:
-                        self._figures.behind(self._fence, each)
+                        self._figures.behind(self._source, each)
             await asyncio.sleep(SECONDS_BETWEEN_LOOKS)

@@ -1,16 +1,18 @@
-"""Events of fences as CloudEvents 1.0 in the structured JSON form."""
+"""Events of fences and alarms as CloudEvents 1.0 in the structured JSON form."""
 
 import json
 from dataclasses import dataclass
 from typing import Any
 
-from dynhull_cli.fences.shown import event_members
+from dynhull_cli.alarms.shown import event_members as alarm_event_members
+from dynhull_cli.fences.shown import event_members as fence_event_members
 from dynhull_cli.json_lines import json_line
-from dynhull_client import FenceEvent
+from dynhull_client import AlarmEvent
+
+from .sources import Event, Source
 
 CONTENT_TYPE = "application/cloudevents+json"
 BATCH_CONTENT_TYPE = "application/cloudevents-batch+json"
-TYPE_PREFIX = "dynhull.fence."
 SEQUENCE_DIGITS = 20  # of the largest 64-bit number: sequences as text then sort like numbers
 
 
@@ -20,39 +22,43 @@ class Letter:
 
     Attributes:
         id: identifies the event, wherever and however often it is delivered.
-        fence: the name of the fence.
+        source: the fence or the alarm.
         type: the type of the event, such as "enter".
-        uid: the uid of the fence.
+        uid: the uid of the fence or the alarm.
         sequence: the sequence of the event, or the last of those that it says were lost.
         text: the CloudEvent as JSON on one line.
     """
 
     id: str
-    fence: str
+    source: Source
     type: str
     uid: str
     sequence: int
     text: str
 
 
-def letter(event: FenceEvent) -> Letter:
+def letter(event: Event) -> Letter:
     """The letter with an event."""
+    subject: str | int | None
+    if isinstance(event, AlarmEvent):
+        source, subject, data = Source("alarm", event.alarm), event.hull or None, alarm_event_members(event)
+    else:
+        source, subject, data = Source("fence", event.fence), event.key, fence_event_members(event)
     place = f"{event.first}-{event.last}" if event.type == "lost" else str(event.sequence)
     identity = f"{event.uid}-{place}"
     members: dict[str, Any] = {
         "specversion": "1.0",
         "id": identity,
-        "source": f"/fences/{event.fence}",
-        "type": TYPE_PREFIX + event.type,
+        "source": f"/{source.kind}s/{source.name}",
+        "type": f"dynhull.{source.kind}.{event.type}",
         "sequence": f"{event.sequence:0{SEQUENCE_DIGITS}}",
         "datacontenttype": "application/json",
     }
-    if event.key is not None:
-        members["subject"] = str(event.key)
+    if subject is not None:
+        members["subject"] = str(subject)
     if event.time is not None:
         members["time"] = event.time.isoformat()
-    text = json_line(**members, data=event_members(event))
-    return Letter(identity, event.fence, event.type, event.uid, event.sequence, text)
+    return Letter(identity, source, event.type, event.uid, event.sequence, json_line(**members, data=data))
 
 
 def read_letter(text: str) -> Letter:
@@ -60,6 +66,7 @@ def read_letter(text: str) -> Letter:
     try:
         event = json.loads(text)
         data = event["data"]
-        return Letter(event["id"], data["fence"], data["type"], data["uid"], data["sequence"], text)
+        source = Source("alarm", data["alarm"]) if "alarm" in data else Source("fence", data["fence"])
+        return Letter(event["id"], source, data["type"], data["uid"], data["sequence"], text)
     except (KeyError, TypeError, ValueError):
-        raise ValueError(f"not an event of a fence: {text[:80]!r}") from None
+        raise ValueError(f"not an event of a fence or an alarm: {text[:80]!r}") from None

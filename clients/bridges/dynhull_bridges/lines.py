@@ -28,7 +28,7 @@ class LinesFile:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-        self._written: dict[str, int] = {}  # the last sequence of each fence, by its uid
+        self._written: dict[str, int] = {}  # the last sequence of each source, by its uid
         # Of a pipe or a device nothing is known, and nothing can be taken back.
         self._regular = stat.S_ISREG(os.fstat(self._file).st_mode)
         if self._regular:

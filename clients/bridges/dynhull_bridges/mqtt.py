@@ -13,10 +13,11 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from .letters import Letter
 from .refusals.mqtt import MQTT
+from .sources import Kind
 from .target import NotDeliveredError, filled, not_delivered
 from .urls import options_of, without_secrets
 
-TOPIC = "dynhull/{fence}/{type}"
+TOPICS: dict[Kind, str] = {"fence": "dynhull/{name}/{type}", "alarm": "dynhull/alarm/{name}/{type}"}
 PORT, TLS_PORT = 1883, 8883
 AT_LEAST_ONCE = 1
 
@@ -52,7 +53,7 @@ class _Client(aiomqtt.Client):
 class Mqtt:
     """Publishes to the topic in mqtt://[USER:PASSWORD@]HOST[:PORT][/TOPIC], or mqtts:// for TLS.
 
-    {fence} and {type} in the topic are filled in. All fences share one connection.
+    {kind}, {name} and {type} in the topic are filled in. All sources share one connection.
     """
 
     most = 1
@@ -67,7 +68,7 @@ class Mqtt:
         self._user = unquote(parts.username) if parts.username else None
         self._password = unquote(parts.password) if parts.password else None
         self._tls = ssl.create_default_context() if encrypted else None
-        self._topic = parts.path.removeprefix("/") or TOPIC
+        self._topic = parts.path.removeprefix("/")
         if {"+", "#"} & set(self._topic):
             raise ValueError(f"the topic {self._topic!r} has a wildcard, + or #: events go to one topic")
         self._timeout = timeout
@@ -79,7 +80,7 @@ class Mqtt:
         client = await self._connected()
         for each in letters:
             try:
-                reason = await client.send(filled(self._topic, each), each.text)
+                reason = await client.send(self._filled(each), each.text)
             except aiomqtt.MqttError as error:
                 await self._disconnect(client)
                 raise NotDeliveredError(f"MQTT: {error}") from None
@@ -88,12 +89,15 @@ class Mqtt:
 
     def place(self, letter: Letter) -> str:
         """The broker and the topic."""
-        return f"mqtt://{self._host}:{self._port}/{filled(self._topic, letter)}"
+        return f"mqtt://{self._host}:{self._port}/{self._filled(letter)}"
 
     async def close(self) -> None:
         """Disconnect."""
         if self._client is not None:
             await self._disconnect(self._client)
+
+    def _filled(self, letter: Letter) -> str:
+        return filled(self._topic or TOPICS[letter.source.kind], letter)
 
     async def _connected(self) -> _Client:
         async with self._connecting:
@@ -123,7 +127,7 @@ class Mqtt:
         return client
 
     async def _disconnect(self, client: _Client) -> None:
-        """Give up a connection, unless another fence has done so already."""
+        """Give up a connection, unless another source has done so already."""
         async with self._connecting:
             if self._client is client:
                 self._client = None

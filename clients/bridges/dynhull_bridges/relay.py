@@ -1,4 +1,4 @@
-"""A relay: a durable consumer of fences that delivers their events to one kind of receiver."""
+"""A relay: a durable consumer of fences and alarms that delivers their events to one kind of receiver."""
 
 import asyncio
 import signal
@@ -9,11 +9,12 @@ from functools import partial
 import structlog
 
 from dynhull_cli.closed_pipe import when_pipe_closes
-from dynhull_client import AsyncHullClient, FenceNotFoundError
+from dynhull_client import AlarmNotFoundError, AsyncHullClient, FenceNotFoundError
 
 from .dead_letters import DeadLetter, StateFolder, gone_key
 from .figures import Figures
 from .lane import FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER, PASSING, Lane, Patience
+from .sources import NOT_FOUND, Source
 from .target import GoneError, NotDeliveredError, ReaderGoneError, Target
 from .waiting import SERVER_AWAY, Absence, growing_pauses, unless
 
@@ -23,7 +24,7 @@ log = structlog.get_logger("dynhull_relay")
 async def run(
     client: AsyncHullClient,
     server: str,
-    fences: Sequence[str],
+    sources: Sequence[Source],
     consumer: str,
     target: Target,
     to: str,
@@ -34,23 +35,25 @@ async def run(
     metrics: tuple[str, int] | None,
     grace: float,
 ) -> bool:
-    """Deliver the events of the fences until all are deleted, or a signal ends the relay.
+    """Deliver the events of the sources until all are deleted, or a signal ends the relay.
 
-    Unless the server has all fences, nothing is changed: not one of them gets the consumer.
+    Unless the server has all of them, nothing is changed: not one of them gets the consumer.
 
     Returns:
         Whether every receiver wanted its events; False if one is gone.
 
     Raises:
-        DynhullError: the server refuses to send the events, or has not all of the fences.
-        ValueError: the receivers of all fences were gone earlier, and have not been enabled since then.
+        DynhullError: the server refuses to send the events, or has not all of the sources.
+        ValueError: the receivers of all sources were gone earlier, and have not been enabled since then.
     """
     gone = {} if enable else folder.gone()
-    wanted = [fence for fence in dict.fromkeys(fences) if gone_key(fence, to) not in gone]
+    wanted = [each for each in dict.fromkeys(sources) if gone_key(each, to) not in gone]
     if not wanted:
-        raise ValueError(f"{to} answered {gone[gone_key(fences[0], to)]}: --enable delivers to it again")
-    for fence in set(fences).difference(wanted):
-        log.error("the receiver is gone: no deliveries; --enable delivers to it again", fence=fence, to=to)
+        raise ValueError(f"{to} answered {gone[gone_key(sources[0], to)]}: --enable delivers to it again")
+    for source in set(sources).difference(wanted):
+        log.error(
+            "the receiver is gone: no deliveries; --enable delivers to it again", to=to, **{source.kind: source.name}
+        )
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -60,8 +63,8 @@ async def run(
     figures = Figures()
     port = {} if metrics is None else {"metrics_port": figures.serve(*metrics)}
     lanes = [Lane(client, each, consumer, target, to, patience, folder, figures, stop) for each in wanted]
-    log.info("relaying", fences=wanted, to=to, consumer=consumer, server=server, **port)
-    await unless(stop, _require_fences(client, server, wanted))
+    log.info("relaying", **_names(wanted), to=to, consumer=consumer, server=server, **port)
+    await unless(stop, _require(client, server, wanted))
     if stop.is_set():
         log.info("stopped")
         return True
@@ -85,7 +88,7 @@ async def run(
             each.cancel()
         await asyncio.gather(*running, return_exceptions=True)
     log.info("stopped")
-    return len(wanted) == len(set(fences)) and not any(lane.disabled for lane in lanes)
+    return len(wanted) == len(set(sources)) and not any(lane.disabled for lane in lanes)
 
 
 async def send_again(letters: Sequence[DeadLetter], target: Target) -> tuple[int, str | None]:
@@ -107,22 +110,30 @@ async def send_again(letters: Sequence[DeadLetter], target: Target) -> tuple[int
     return sent, None
 
 
+def _names(sources: Sequence[Source]) -> dict[str, list[str]]:
+    """The names of sources, by their kinds, for the log."""
+    found: dict[str, list[str]] = {}
+    for each in sources:
+        found.setdefault(f"{each.kind}s", []).append(each.name)
+    return found
+
+
 def _stop_from_thread(loop: asyncio.AbstractEventLoop, stop: asyncio.Event) -> None:
     with suppress(RuntimeError):  # the loop has ended
         loop.call_soon_threadsafe(stop.set)
 
 
-async def _require_fences(client: AsyncHullClient, server: str, fences: Sequence[str]) -> None:
-    """Ask the server, once it is there, for all fences; FenceNotFoundError names those that it does not have."""
+async def _require(client: AsyncHullClient, server: str, sources: Sequence[Source]) -> None:
+    """Ask the server, once it is there, for all sources; an error names those that it does not have."""
     away = Absence(SERVER_AWAY, server=server)
     pauses = growing_pauses(FIRST_PAUSE_FOR_THE_SERVER, LONGEST_PAUSE_FOR_THE_SERVER)
     while True:
-        missing = []
+        missing: list[FenceNotFoundError | AlarmNotFoundError] = []
         try:
-            for each in fences:
+            for each in sources:
                 try:
-                    await client.get_fence(each)
-                except FenceNotFoundError as error:
+                    await each.consumers(client)
+                except NOT_FOUND as error:
                     missing.append(error)
         except PASSING as error:
             away.lasts(error)
@@ -130,7 +141,7 @@ async def _require_fences(client: AsyncHullClient, server: str, fences: Sequence
             continue
         if missing:
             first = missing[0]
-            raise FenceNotFoundError("\n".join(map(str, missing)), first.code, first.reason, first.metadata)
+            raise type(first)("\n".join(map(str, missing)), first.code, first.reason, first.metadata)
         return
 
 

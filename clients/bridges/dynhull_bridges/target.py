@@ -7,7 +7,7 @@ from typing import Protocol
 from .letters import Letter
 from .refusals.table import Meaning
 
-PLACE = re.compile(r"\{fence\}|\{type\}|\{\{|\}\}")
+PLACE = re.compile(r"\{(?:kind|name|type|fence)\}|\{\{|\}\}")
 
 
 class NotDeliveredError(Exception):
@@ -41,7 +41,7 @@ class ReaderGoneError(Exception):
 
 
 class Target(Protocol):
-    """A receiver of letters. Several fences may share one; each awaits its own deliveries.
+    """A receiver of letters. Several sources may share one; each awaits its own deliveries.
 
     Attributes:
         most: the largest number of letters in one delivery.
@@ -50,7 +50,7 @@ class Target(Protocol):
     most: int
 
     async def deliver(self, letters: Sequence[Letter]) -> None:
-        """Return once the receiver has the letters, which are of one fence and in order, for good.
+        """Return once the receiver has the letters, which are of one source and in order, for good.
 
         Raises:
             NotDeliveredError: some may not have arrived. GoneError, ReaderGoneError: none will any more.
@@ -64,15 +64,17 @@ class Target(Protocol):
 
 
 def filled(template: str, letter: Letter) -> str:
-    """A URL, topic or subject with the name of the fence and the type of the event filled in.
+    """A URL, topic or subject with the source and the type of the event filled in.
 
-    Doubled braces are braces.
+    Doubled braces are braces; {fence} is what the name was called when fences were the only sources.
     """
-    values = {"{fence}": letter.fence, "{type}": letter.type, "{{": "{", "}}": "}"}
+    source = letter.source
+    values = {"{kind}": source.kind, "{name}": source.name, "{fence}": source.name, "{type}": letter.type}
+    values |= {"{{": "{", "}}": "}"}
     return PLACE.sub(lambda found: values[found[0]], template)
 
 
 def check_places(template: str) -> None:
     """ValueError where `filled` would leave a brace that is no place to fill in."""
     if rest := re.search(r"\{[^{}]*\}?|\}", PLACE.sub("", template)):
-        raise ValueError(f"--to: {rest[0]} is not {{fence}} or {{type}}; {{{{ and }}}} stand for braces")
+        raise ValueError(f"--to: {rest[0]} is not {{kind}}, {{name}} or {{type}}; {{{{ and }}}} stand for braces")

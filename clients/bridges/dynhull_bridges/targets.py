@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from .sources import Source
 from .target import Target, check_places
 
 WITHOUT_SCHEME = re.compile(r"[^/@\s]+:\d+(/.*)?")  # HOST:PORT
@@ -45,16 +46,20 @@ def target_of(to: str, options: TargetOptions) -> Target:
     scheme = urlsplit(to).scheme
     if scheme not in LINES:
         check_places(urlsplit(to)._replace(netloc="").geturl())  # a password is nothing to show
-    elif "{fence}" in to or "{type}" in to:
-        raise ValueError(
-            f"--to {to}: {{fence}} and {{type}} are filled in in URLs; one file has the events of all fences"
-        )
+    elif any(f"{{{each}}}" in to for each in ("kind", "name", "type", "fence")):
+        raise ValueError(f"--to {to}: {{kind}}, {{name}} and {{type}} are filled in in URLs; one file has all events")
     if scheme not in WEBHOOKS and options.batch > 1:
         raise ValueError("--batch is for webhooks (http and https)")
     if scheme not in TARGETS:
         *others, last = (each for each in TARGETS if each not in LINES)
         raise ValueError(f"--to {scheme}: must be a URL of {', '.join(others)} or {last}, a file or -")
     return TARGETS[scheme](to, options)
+
+
+def check_kinds(to: str, sources: Sequence[Source]) -> None:
+    """ValueError where {fence} of a URL is the name of an alarm."""
+    if "{fence}" in to and (alarm := next((each for each in sources if each.kind == "alarm"), None)):
+        raise ValueError(f"--to has {{fence}}, but {alarm} is no fence: {{name}} is the name of either")
 
 
 def _webhook(to: str, options: TargetOptions) -> Target:

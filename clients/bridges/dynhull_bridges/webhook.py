@@ -24,7 +24,7 @@ LONGEST_ANSWER = 200  # bytes of a refusal that are shown
 
 
 class Webhook:
-    """Delivers to a URL, in which {fence} and {type} are filled in.
+    """Delivers to a URL, in which {kind}, {name} and {type} are filled in.
 
     Args:
         url: http or https.

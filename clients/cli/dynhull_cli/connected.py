@@ -169,6 +169,8 @@ def _said(error: "DynhullError", address: str, *, has_token: bool, encrypted: bo
             return f"{error}\n`dynhull list` shows the hulls of the server, `dynhull create` adds one."
         case sdk.FenceNotFoundError():
             return f"{error}\n`dynhull fences list` shows the fences of the server."
+        case sdk.AlarmNotFoundError():
+            return f"{error}\n`dynhull alarms list` shows the alarms of the server."
         case sdk.InvalidRequestError():
             from .fields import in_options
 
