@@ -27,6 +27,9 @@ class Area(Protocol):
     def within(self, p: Point, margin: float) -> bool:
         """Whether p is inside, on the boundary, or at most `margin` from it. Exact."""
 
+    def is_clear(self, p: Point, margin: float, error: float) -> bool:
+        """Whether p is inside by more than an error above 0, or outside by more than `margin` and it. Exact."""
+
     def distance(self, p: Point) -> float:
         """The distance of p, rounded once: 0 inside and on the boundary, inf from an area without points."""
 
@@ -52,6 +55,13 @@ class Polygons:
         return any(
             squared_distance(p, a, b) <= most for a, b in self._edges() if not _certainly_farther(p, a, b, margin)
         )
+
+    def is_clear(self, p: Point, margin: float, error: float) -> bool:
+        """Whether p is farther than the error from the rings of a polygon that it is in, or with the margin of all."""
+        inside = [polygon for polygon in self.polygons if _where(polygon, p) > 0]
+        if inside:
+            return any(_distance_above(p, polygon, Fraction(error)) for polygon in inside)
+        return all(_distance_above(p, polygon, Fraction(margin) + Fraction(error)) for polygon in self.polygons)
 
     def distance(self, p: Point) -> float:
         """The distance of p, rounded once. O(k)."""
@@ -87,6 +97,12 @@ class DiskArea:
         """Whether p is at most radius + margin from the centre. O(1)."""
         return squared_length(self.center, p) <= (Fraction(self.radius) + Fraction(margin)) ** 2
 
+    def is_clear(self, p: Point, margin: float, error: float) -> bool:
+        """Whether p is nearer to the centre than radius - error, or farther than radius + margin + error. O(1)."""
+        square, inner = squared_length(self.center, p), Fraction(self.radius) - Fraction(error)
+        outer = Fraction(self.radius) + Fraction(margin) + Fraction(error)
+        return (inner > 0 and square < inner**2) or square > outer**2
+
     def distance(self, p: Point) -> float:
         """The distance of p, rounded once. O(1)."""
         return root_minus(squared_length(self.center, p), Fraction(self.radius))
@@ -111,6 +127,10 @@ class Segment:
     def within(self, p: Point, margin: float) -> bool:
         """Whether p is at most `margin` from the segment. O(1)."""
         return squared_distance(p, self.a, self.b) <= Fraction(margin) ** 2
+
+    def is_clear(self, p: Point, margin: float, error: float) -> bool:
+        """Whether p is farther than margin + error from the segment, which has no inside. O(1)."""
+        return squared_distance(p, self.a, self.b) > (Fraction(margin) + Fraction(error)) ** 2
 
     def distance(self, p: Point) -> float:
         """The distance of p, rounded once. O(1)."""
@@ -158,6 +178,11 @@ def root_minus(square: Fraction, less: Fraction) -> float:
         if least > 0 and rounded(least) == rounded(most):
             return rounded(least)
         bits *= 2
+
+
+def _distance_above(p: Point, polygon: Polygon, length: Fraction) -> bool:
+    """Whether p is farther than a length from each ring."""
+    return all(squared_distance(p, a, b) > length**2 for ring in polygon for a, b in _edges(ring))
 
 
 def _edges(ring: Ring) -> list[tuple[Point, Point]]:

@@ -134,6 +134,14 @@ class Fences:
         each = self._fences[fence]
         return None if each.own else np.array([each.area.distance(p) for p in as_tuples(places)], np.float64)
 
+    def clear(self, fence: int, places: Points, errors: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_] | None:
+        """Which places are farther than their errors from the boundary; None if that is of the hull of the entities."""
+        each = self._fences[fence]
+        if each.own:
+            return None
+        rows = zip(as_tuples(places), errors.tolist(), strict=True)
+        return np.array([not error or each.area.is_clear(p, each.margin, error) for p, error in rows], np.bool_)
+
     def _set(self, number: int, fence: _Fence, inside: Keys | None) -> None:
         present = self._fences.get(number)
         if present is not None and inside is None:

@@ -293,6 +293,11 @@ class Fences:
         The distances of places to the area; None if that is the hull of the entities.
         """
 
+    def clear(self, fence: int, places: dynhull.arrays.Points, errors: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.bool_] | None:
+        """
+        Which places are farther than their errors from the boundary; None if that is of the hull of the entities.
+        """
+
     def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]:
         """Let keys that were removed there and are new here have moved."""
 

@@ -319,6 +319,32 @@ struct Area {
     });
   }
 
+  // Whether p is farther than `error` from the boundary: inside of one of the polygons by more than it, or outside by
+  // more than the margin and it. True without an error.
+  bool is_clear(Point p, double error) const {
+    if (error == 0) return true;
+    const int at = where(p);
+    if (at == 0) return false;
+    if (kind == Kind::DISK) {
+      if (at < 0) return compare_distance(p, center, radius, margin, error) > 0;
+      return error < radius && compare_distance(p, center, radius, -error) < 0;
+    }
+    if (kind == Kind::SEGMENT) return compare_distance(p, nearest_part(p, segment), margin, error) > 0;
+    const double more = at > 0 ? 0 : margin;  // rounding is monotone: what is beyond the rounded sum is beyond the sum
+    const auto near = [&](const Box& box) {
+      return std::max({box.least.x - p.x, p.x - box.greatest.x, box.least.y - p.y, p.y - box.greatest.y}) <=
+             error + more;
+    };
+    const auto is_near_ring = [&](const Polygon& polygon) {
+      return polygon.any_edge_meeting(near, [&](Edge edge) {
+        return near(Box::of(edge)) && compare_distance(p, nearest_part(p, edge), more, error) <= 0;
+      });
+    };
+    if (at < 0) return !any_polygon(near, is_near_ring);
+    return any_polygon([&](const Box& box) { return box.holds(p); },
+                       [&](const Polygon& polygon) { return polygon.where(p) > 0 && !is_near_ring(polygon); });
+  }
+
   // Whether the segment from p to q, which differ, has a point of the area.
   bool meets(Point p, Point q) const {
     if (kind == Kind::DISK) {

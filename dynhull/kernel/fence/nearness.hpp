@@ -10,9 +10,9 @@ namespace dynhull {
 constexpr double NEARNESS_BOUND = 64 * EPSILON;
 constexpr double SMALLEST_SQUARE = 1e-250;  // below it the operands may have underflowed
 
-// The sign of |pq| - (r + s), for radii r, s >= 0.
-inline int compare_distance(Point p, Point q, double r, double s) {
-  const double dx = p.x - q.x, dy = p.y - q.y, reach = r + s;
+// The sign of |pq| - (r + s + t), for a sum that is not negative, and in which at most the second term is.
+inline int compare_distance(Point p, Point q, double r, double s, double t = 0) {
+  const double dx = p.x - q.x, dy = p.y - q.y, reach = r + s + t;
   const double square = dx * dx + dy * dy, most = reach * reach;
   const double bound = NEARNESS_BOUND * (square + most) + SMALLEST_SQUARE;
   if (square - most > bound) return 1;
@@ -22,23 +22,34 @@ inline int compare_distance(Point p, Point q, double r, double s) {
   sum.add(-1, {r, r});
   sum.add(-2, {r, s});
   sum.add(-1, {s, s});
+  if (t != 0) {
+    sum.add(-2, {r, t});
+    sum.add(-2, {s, t});
+    sum.add(-1, {t, t});
+  }
   return sum.sign();
 }
 
-// The sign of the distance from p to the line through a and b, minus r.
-inline int compare_distance_to_line(Point p, Point a, Point b, double r) {
+// The sign of the distance from p to the line through a and b, minus r + s, for radii r, s >= 0.
+inline int compare_distance_to_line(Point p, Point a, Point b, double r, double s = 0) {
   const double left = (a.x - p.x) * (b.y - p.y), right = (a.y - p.y) * (b.x - p.x);
   const double ux = b.x - a.x, uy = b.y - a.y;
   const double area = std::abs(left - right), error = ORIENT_BOUND * (std::abs(left) + std::abs(right));
-  const double most = r * std::hypot(ux, uy);
+  const double most = (r + s) * std::hypot(ux, uy);
   const double bound = error + NEARNESS_BOUND * (area + most) + SMALLEST_SQUARE;
   if (area - most > bound) return 1;
   if (most - area > bound) return -1;
   ExactSum<4> sum;
   const auto terms = triangle_terms(a, b, p);
-  for (const Term& s : terms)
-    for (const Term& t : terms) sum.add(s.weight * t.weight, {s.first, s.second, t.first, t.second});
-  for (const Term& term : squared_length_terms(a, b)) sum.add(-term.weight, {term.first, term.second, r, r});
+  for (const Term& one : terms)
+    for (const Term& other : terms)
+      sum.add(one.weight * other.weight, {one.first, one.second, other.first, other.second});
+  for (const Term& term : squared_length_terms(a, b)) {
+    sum.add(-term.weight, {term.first, term.second, r, r});
+    if (s == 0) continue;
+    sum.add(-2 * term.weight, {term.first, term.second, r, s});
+    sum.add(-term.weight, {term.first, term.second, s, s});
+  }
   return sum.sign();
 }
 
@@ -49,9 +60,9 @@ inline Edge nearest_part(Point p, Edge edge) {
   return edge;
 }
 
-// The sign of the distance from p to such a part, minus r.
-inline int compare_distance(Point p, Edge part, double r) {
-  return part.a == part.b ? compare_distance(p, part.a, r, 0) : compare_distance_to_line(p, part.a, part.b, r);
+// The sign of the distance from p to such a part, minus r + s.
+inline int compare_distance(Point p, Edge part, double r, double s = 0) {
+  return part.a == part.b ? compare_distance(p, part.a, r, s) : compare_distance_to_line(p, part.a, part.b, r, s);
 }
 
 // The distance from p to a segment, rounded once.

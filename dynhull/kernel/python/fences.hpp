@@ -84,6 +84,18 @@ class FenceIndex {
     return nb::cast(distances.array());
   }
 
+  // Which of some places are farther than their errors from the boundary; None around the subjects' own hull.
+  nb::object clear(std::int64_t fence, const Rows& places, const Doubles& errors) {
+    const auto area = alone(0, [&](Fences& fences) { return fences.area(fence); });
+    if (!area) return nb::none();
+    const std::size_t count = places.shape(0);
+    const Output<bool> clear(count);
+    beside_others(count, [&] {
+      for (std::size_t i = 0; i < count; ++i) clear.data()[i] = area->is_clear(points_of(places)[i], errors.data()[i]);
+    });
+    return nb::cast(clear.array());
+  }
+
   // Lets keys that were removed from the hull of another index and are new here have moved. Returns which rows have.
   // The hulls are locked one after the other.
   nb::object carry(FenceIndex& source, const nb::object& keys) {

@@ -205,6 +205,11 @@ void add_fences(nb::module_& module) {
            nb::sig("def distances(self, fence: int, places: dynhull.arrays.Points) -> "
                    "numpy.typing.NDArray[numpy.float64] | None"),
            "fence"_a, "places"_a, "The distances of places to the area; None if that is the hull of the entities.")
+      .def("clear", &FenceIndex::clear,
+           nb::sig("def clear(self, fence: int, places: dynhull.arrays.Points, errors: "
+                   "numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.bool_] | None"),
+           "fence"_a, "places"_a, "errors"_a,
+           "Which places are farther than their errors from the boundary; None if that is of the hull of the entities.")
       .def("carry", &FenceIndex::carry,
            nb::sig("def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]"),
            "source"_a, "keys"_a, "Let keys that were removed there and are new here have moved.")
