@@ -4,6 +4,7 @@ import functools
 import html
 import json
 import re
+import shlex
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
@@ -74,8 +75,9 @@ def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], si
     page = take_program("how-to/browser", "index.html")
     create, put, upload, show, wrong, more, fence = commands(site, "browser", "(curl(?! -N)|printf) ")
     follow, follow_many, follow_fence = (
-        line.split()[-1].strip("'") for line in commands(site, "browser", "curl -N .*http")
+        line.split()[-1].strip("'") for line in commands(site, "browser", r"curl -N (?!.* -d ).*http")
     )
+    (join,) = commands(site, "browser", "curl -N .* -d ")
     answers = iter(commands(site, "browser", r'\{"\w+":\S.*\}$'))
     assert commands(site, "browser", "dynhull gateway") == [f"dynhull gateway --origin {ORIGIN}"]
     with (
@@ -107,10 +109,14 @@ def test_a_page_that_follows_a_hull(take_program: Callable[[str, str], Path], si
         events.close()
         shell(fence.replace(ADDRESS, gateway.url), tmp_path)
         events = Events(gateway, follow_fence.removeprefix(ADDRESS))
-        assert events.next()[1] is None  # an id alone
+        place = events.next()[0]  # an id alone
         inside = events.next()[1]["inside"]
         assert inside == [{"hull": "browser", "keys": ["a", "d"], "revision": 3}]
         assert str(inside).replace("'", '"').replace(" ", "") in text_of(site, "browser")
+        events.close()
+        events = Events(gateway, "/streams", json.loads(shlex.split(join)[-1]))
+        assert events.next()[0] == "stream"
+        assert {events.next()[0], events.next()[0], events.next()[0]} == {"snapshot", f"depot {place}"}
         events.close()
         assert shown.locator("polygon").get_attribute("points") == "0,0 4,0 4,3 2,4"
 

@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -61,8 +62,11 @@ class Gateway:
 
 
 @contextmanager
-def gateway_process(address: str, *options: str, complaints: str = "") -> Iterator[Gateway]:
-    """`dynhull gateway` on a free port, unless the options name one. It must exit with code 0 and log nothing else."""
+def gateway_process(address: str, *options: str, complaints: str = "", killed: bool = False) -> Iterator[Gateway]:
+    """`dynhull gateway` on a free port, unless the options name one.
+
+    It must exit with code 0, unless it was `killed`, and log nothing else.
+    """
     command = [COMMAND, "gateway", "--port", "0", "--address", address, *options]
     with (
         tempfile.TemporaryFile("w+") as errors,
@@ -77,7 +81,7 @@ def gateway_process(address: str, *options: str, complaints: str = "") -> Iterat
             ended = process.wait(PATIENCE)
             errors.seek(0)
             said = errors.read()
-            assert ended == 0, said
+            assert ended == (-signal.SIGKILL if killed else 0), said
             assert complaints in said if complaints else not said, said
             assert "Traceback" not in said, said
 
@@ -85,13 +89,14 @@ def gateway_process(address: str, *options: str, complaints: str = "") -> Iterat
 class Events:
     """The events of a stream, read without a browser."""
 
-    def __init__(self, gateway: Gateway, path: str, **headers: str) -> None:
+    def __init__(self, gateway: Gateway, path: str, body: Any = None, **headers: str) -> None:
         self._connection = gateway.connection()
-        self._connection.request(
-            "GET",
-            urlsplit(gateway.url).path + path,
-            headers={name.replace("_", "-"): each for name, each in headers.items()},
-        )
+        given = {name.replace("_", "-"): each for name, each in headers.items()}
+        if body is None:
+            self._connection.request("GET", urlsplit(gateway.url).path + path, headers=given)
+        else:
+            given["Content-Type"] = "application/json"
+            self._connection.request("POST", urlsplit(gateway.url).path + path, json.dumps(body), given)
         self.response = self._connection.getresponse()
 
     def __iter__(self) -> Iterator[dict[str, str]]:

@@ -16,7 +16,7 @@ from dynhull_client import AsyncHullClient
 from . import alarms, fences, handlers, health, hulls, people, points, questions, tracks, uploads
 from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
-from .events import replays
+from .events import replays, subscriptions
 from .events import routes as events
 from .events.documents import AlarmEvent, FeedBatch, FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
 from .events.shared import SharedWatches
@@ -69,10 +69,11 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.settings = settings
     app.state.gatherer = Gatherer()
     app.state.shared = SharedWatches()
+    app.state.joined = {}
     app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()
-    modules = hulls, points, uploads, fences, alarms, questions, tracks, events, replays, maps, health
+    modules = hulls, points, uploads, fences, alarms, questions, tracks, events, replays, subscriptions, maps, health
     routers = [module.router for module in modules]
     for router in routers:
         app.include_router(router)

@@ -62,6 +62,9 @@ def gateway(
         int,
         typer.Option(min=0, help="Most of them of many hulls, per token, or without per address; 429 for more."),
     ] = 256,
+    max_subscriptions: Annotated[
+        int, typer.Option(min=0, help="Most streams that are joined to one, each of which counts as one; 429 for more.")
+    ] = 1_000,
     grace: Annotated[str, typer.Option(help="How long requests may still take after SIGTERM.")] = "10s",
     metrics_port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port of the metrics page; 0 for a free one.")
@@ -102,6 +105,7 @@ def gateway(
         keepalive_seconds=more_than_0(keepalive, "--keepalive"),
         max_streams=max_streams,
         max_many_streams_per_caller=max_many_streams_per_caller,
+        max_subscriptions=max_subscriptions,
         grace_seconds=more_than_0(grace, "--grace"),
         root_path=root_path.rstrip("/"),
         forwarded_from=forwarded_from,

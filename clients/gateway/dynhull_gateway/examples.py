@@ -65,3 +65,14 @@ ALARMS = _named(
     crowd=("Many points, and for long", {"name": "crowd", "prefix": "fleet", "when": "count > 100", "for": 30}),
     silent=("Nothing comes", {"name": "silent", "prefix": "fleet", "when": "silent 5m"}),
 )
+STREAMS = _named(
+    fleet=(
+        "A hull and a fence",
+        {
+            "subscriptions": {
+                "hull": {"path": "/hulls/fleet/events?keys=true"},
+                "yard": {"path": "/fences/yard/events?after=0"},
+            }
+        },
+    ),
+)

@@ -30,7 +30,11 @@ class Figures:
         )
         self.rows = Counter("dynhull_gateway_rows", "Rows of bodies that were applied.", registry=registry)
         self.open_streams = 0
-        streams = Gauge("dynhull_gateway_streams", "Streams of events that are open.", registry=registry)
+        streams = Gauge(
+            "dynhull_gateway_streams",
+            "Streams of events that are open, those that are joined to one included.",
+            registry=registry,
+        )
         streams.set_function(lambda: self.open_streams)
         self.refused_streams = Counter(
             "dynhull_gateway_refused_streams",
@@ -62,6 +66,15 @@ class Figures:
             "Connections that were closed because nothing was read of what waited for the caller.",
             registry=registry,
         )
+
+    @contextmanager
+    def stream(self) -> Iterator[None]:
+        """Count an open stream of events during the block."""
+        self.open_streams += 1
+        try:
+            yield
+        finally:
+            self.open_streams -= 1
 
     @contextmanager
     def many_stream(self, caller: str) -> Iterator[None]:

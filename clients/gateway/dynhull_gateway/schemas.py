@@ -105,10 +105,17 @@ After = Annotated[str, Query(max_length=200, description="Only names after this 
 Limit = Annotated[int, Query(ge=1, le=1000, description="The most that are returned.")]
 IDEMPOTENCY_KEY = r'^"?[A-Za-z0-9._/-]{1,200}:[1-9][0-9]{0,18}"?$'
 PLACE = r"^[0-9a-f]{1,32}:[0-9]{1,20}$"
+STREAM_PATH = r"^/[!-~]*$"
+EVENT_ID = r"^[!-~]*$"
+LABEL = r"^[A-Za-z0-9._-]{1,64}$"
+LABELS = "1 to 64 letters a to z and A to Z, digits and ._-"
 # What patterns say, for those who do not match them.
 PATTERNS = {
     PLACE: 'must be as the link "next" has it, UID:REVISION',
     NAME: f"must be a name: {NAMES}",
+    STREAM_PATH: "must be a path that begins with /, and a query, as they are sent",
+    EVENT_ID: "must be the id of an event",
+    LABEL: f"must be a name: {LABELS}",
     IDEMPOTENCY_KEY: f"must be PRODUCER:SEQUENCE, such as sensor-7:1: {NAMES.partition(';')[0]}, and an integer from 1",
 }
 IdempotencyKey = Annotated[
@@ -770,6 +777,28 @@ class FencePage(Response):
 
     fences: list[Fence]
     next: str | None
+
+
+class Subscription(Request):
+    """One of the streams that are joined to one."""
+
+    model_config = example(path="/hulls/fleet/events?keys=true")
+
+    path: Annotated[str, Field(strict=True, max_length=65_536, pattern=STREAM_PATH)] = Field(
+        description="The path of a stream of events with its query, below that of the gateway."
+    )
+    # Forty digits for each of at most 1024 partitions, of a feed.
+    last_event_id: Annotated[str, Field(strict=True, max_length=40_960, pattern=EVENT_ID)] | None = Field(
+        None, description="The id of the last event of this stream that was received, to go on after it."
+    )
+
+
+class Subscriptions(Request):
+    """What a stream follows from its beginning."""
+
+    subscriptions: dict[Annotated[str, Field(pattern=LABEL, description=LABELS)], Subscription] = Field(
+        {}, description="By names that the caller chooses."
+    )
 
 
 class Health(Response):

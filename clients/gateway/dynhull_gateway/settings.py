@@ -19,6 +19,7 @@ class Settings:
         keepalive_seconds: seconds without an event after which a comment is sent on a stream of events.
         max_streams: streams of events at a time.
         max_many_streams_per_caller: those of many hulls, per token, or without tokens per address.
+        max_subscriptions: streams that are joined to one.
         grace_seconds: seconds that requests may still take after SIGTERM.
         root_path: the path below which a proxy shows the gateway.
         forwarded_from: the addresses of proxies whose forwarded headers are believed, with commas between.
@@ -35,6 +36,7 @@ class Settings:
     keepalive_seconds: float = 15.0
     max_streams: int = 10_000
     max_many_streams_per_caller: int = 256
+    max_subscriptions: int = 1_000
     grace_seconds: float = 10.0
     root_path: str = ""
     forwarded_from: str = "127.0.0.1"

@@ -172,3 +172,13 @@ OF_FEED = (
     'data: {"hull":"fleet","revision":2,"uid":"fe203b7c85e2be96","commit":7,"time":"2026-01-31T12:00:00+00:00",'
     '"cause":"batch","keys":["LH400"],"points":[[8.57,50.03]]}\n\n'
 )
+OF_JOINED = (
+    "retry: 1000\n\n"
+    'event: stream\ndata: {"stream":"ZvBq3r0l4cWcA3lMFt5yVg"}\n\n'
+    "id: yard beb1f1fb68d6cfdb:1\n\n"
+    "event: snapshot\nid: hull fe203b7c85e2be96:1\n"
+    'data: {"revision":1,"points":3,"vertices":[[0.0,0.0],[4.0,0.0],[4.0,3.0]],"center":null}\n\n'
+    "event: enter\nid: yard beb1f1fb68d6cfdb:2\n"
+    'data: {"type":"enter","sequence":2,"fence":"yard","uid":"beb1f1fb68d6cfdb","cause":["subject_appeared"],'
+    '"hull":"fleet","key":"LH400","revision":1,"position":[0.0,0.0],"time":"2026-01-31T12:00:00Z"}\n\n'
+)

@@ -1,7 +1,7 @@
 """A response that lasts: events while there are any, until the reader leaves or the gateway ends."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractContextManager, nullcontext
 
 from starlette.responses import Response
@@ -11,6 +11,8 @@ from ..figures import Figures
 from ..health import State
 from .messages import AVAILABLE, FIRST, UNAVAILABLE
 
+# In the scope of a subscription: what takes the texts of its stream, which is joined to others.
+TAKE = "dynhull.take"
 # Bytes that are sent at a time: a reader that does not read has no more of an event in its buffer than this.
 PIECE = 2**16
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}  # nginx passes on what it does not buffer
@@ -43,19 +45,32 @@ class EventStream(Response):
         self._counted = nullcontext() if counted is None else counted
         self._turn = asyncio.Lock()
 
-    async def __call__(self, _: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send until the first of: no more events, the reader has left, the gateway ends."""
-        with self._counted:
-            await self._until_an_end(receive, send)
+        with self._counted, self._figures.stream():
+            if TAKE in scope:
+                await self._join(scope[TAKE], send)
+            else:
+                await self._until_an_end(receive, send)
+
+    async def _join(self, take: Callable[[bytes], Awaitable[None]], send: Send) -> None:
+        """Give all texts to a joined stream, which cancels this when it is read no more."""
+        await self._begin(send)
+        try:
+            async for text in self._texts:
+                await take(text)
+        finally:
+            await self._texts.aclose()  # type: ignore[attr-defined]  # an async generator
+
+    async def _begin(self, send: Send) -> None:
+        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
 
     async def _until_an_end(self, receive: Receive, send: Send) -> None:
         sending = asyncio.create_task(self._send(send))
         ends = [sending, asyncio.create_task(_left(receive)), asyncio.create_task(self._health.draining.wait())]
-        self._figures.open_streams += 1
         try:
             await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self._figures.open_streams -= 1
             finished = sending.done()
             for each in ends:
                 each.cancel()
@@ -66,7 +81,7 @@ class EventStream(Response):
         await send({"type": "http.response.body", "body": b"", "more_body": False})
 
     async def _send(self, send: Send) -> None:
-        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        await self._begin(send)
         await send({"type": "http.response.body", "body": FIRST, "more_body": True})
         reporting = asyncio.create_task(self._report_presence(send))
         try:
