@@ -1,6 +1,7 @@
 """All points of a hull from a server: `read_points`, and `dynhull export --address`, which writes what a folder has."""
 
 import asyncio
+import threading
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -124,14 +125,22 @@ def test_what_cannot_be_read_says_so(client: HullClient, address: str, name: str
 
 
 class Tearing(Proxy):
-    """Ends all connections after so many bytes, once."""
+    """Ends all connections whenever so many bytes have passed."""
 
-    left = 400_000
+    apart = 400_000
+
+    def __init__(self, server: str) -> None:
+        self._left, self._lock = self.apart, threading.Lock()
+        super().__init__(server)
 
     def passed(self, data: bytes) -> bytes:
-        if 0 < self.left <= len(data):
+        with self._lock:
+            self._left -= len(data)
+            torn = self._left <= 0
+            if torn:
+                self._left = self.apart
+        if torn:
             self.cut()
-        self.left -= len(data)
         return data
 
 
