@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,8 +16,9 @@ from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
 from dynhull_server.state.fences.model.records import AddFence, DropFence, Inside
-from dynhull_server.state.records import Append, Contents, Create, Delete, HullRow, HullSettings, Kept
+from dynhull_server.state.records import FOREVER, Append, Contents, Create, Delete, HullRow, HullSettings, Kept
 from dynhull_server.storage.port import DamagedError, StorageError
+from dynhull_server.storage.segments.archive import Archive
 
 
 @pytest.fixture
@@ -24,15 +26,15 @@ def url(postgres):
     return postgres.new_database()
 
 
-def on(url: str) -> PostgresStorage:
-    return PostgresStorage(Database(url), pytest.fail)
+def on(url: str, history: Path | None = None) -> PostgresStorage:
+    return PostgresStorage(Database(url), pytest.fail, archive=None if history is None else Archive(history))
 
 
 class Owner:
     """A storage that somebody uses, in all the ways that change which rows there are."""
 
-    def __init__(self, url: str, seed: int) -> None:
-        self.storage = on(url)
+    def __init__(self, url: str, seed: int, history: Path) -> None:
+        self.storage = on(url, history)
         self.storage.open(no_progress)
         self._random = random.Random(seed)
         self._revisions: dict[int, int] = {}
@@ -50,6 +52,8 @@ class Owner:
             self._undo: 2 if self._decided else 0,
             self._snapshot: 1,
             self._sweep: 0.5,
+            self._file: 1,
+            self._keep: 0.3,
             self._go_on: 4,
             self._fence: 0.3,
             self._events: 1 if self._fences else 0,
@@ -63,7 +67,8 @@ class Owner:
         for each in (later, number) if self._random.random() < 0.5 else (number,):  # in any order
             name = f"hull-{each}" if self._revisions else "fleet"
             shard = self._random.choice((None, 0)) if self._revisions else None
-            settings = HullSettings(shards=1, shard=0) if shard == 0 else HullSettings()
+            kept = self._random.choice((0, FOREVER, FOREVER))
+            settings = HullSettings(shards=1, shard=0) if shard == 0 else HullSettings(history=kept)
             self.storage.commit([Create(HullRow(each, name, f"uid-{each}", 1.5, settings))])
             self._revisions[each] = 0
             if shard == 0:
@@ -103,6 +108,16 @@ class Owner:
     def _sweep(self) -> None:
         if not any(each.__name__ == "sweep" for each in self._work):
             self._work.append(self.storage.sweep())
+
+    def _file(self) -> None:
+        if not any(each.__name__ == "file_history" for each in self._work):
+            self._work.append(self.storage.file_history(0))
+
+    def _keep(self) -> None:
+        """Keep the past of a hull from now on, or remove it."""
+        kept = sorted(self.hulls())
+        number, age = self._random.choice(kept), self._random.choice((0, FOREVER))
+        self.storage.commit([self.storage.set_history(number, age, 0)])
 
     def _go_on(self) -> None:
         """The next steps of something that takes many."""
@@ -163,13 +178,13 @@ def loaded(contents: Any) -> list[int]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_is_read_ahead_is_what_is_there(url, seed):
+def test_what_is_read_ahead_is_what_is_there(url, seed, tmp_path):
     fenced = seed % 2 == 1
-    owner = Owner(url, seed)
+    owner = Owner(url, seed, tmp_path)
     if not fenced:
         owner._fence = owner._append
     owner._create()
-    reader = Reader(on(url))
+    reader = Reader(on(url, tmp_path))
     dice = random.Random(seed)
     for _ in range(150):
         owner.step()
@@ -190,13 +205,15 @@ def test_what_is_read_ahead_is_what_is_there(url, seed):
     for number, last in expected.items():
         append(reader.storage, last + 1, last + 2, number)
         kept = Kept(last + 2, Contents(record(1).rows.inserts))
-        for steps in (reader.storage.snapshot(number, kept), reader.storage.sweep()):
+        for steps in (reader.storage.snapshot(number, kept), reader.storage.sweep(), reader.storage.file_history(0)):
             for step in steps:
                 reader.storage.commit([step])
+    filed = {number: reader.storage.history(number) for number in expected}
     reader.storage.close()
-    again = on(url)
+    again = on(url, tmp_path)
     found = again.open(no_progress)
     assert found.notes == []
+    assert {number: again.history(number) for number in expected} == filed
     assert found.hulls == contents.hulls
     assert found.fences == contents.fences
     assert found.next_number == contents.next_number

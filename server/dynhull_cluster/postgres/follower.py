@@ -1,12 +1,14 @@
 """Follows a partition that another server owns: the ledger as of ever later moments, without a look at every row again.
 
 Rows that are added have greater numbers, for as long as the partition has the same owner. Rows that are dropped are
-looked for where they can be: batches and snapshots that a newer snapshot has superseded, the newest batches of a shard,
-which its root may undo, and whatever a deleted hull had. In the end the rows must agree with the totals, as in an
-examination. If they do not, something else has happened, and what was read before is void.
+looked for where they can be: batches and snapshots that a newer snapshot has superseded, or a segment has, the newest
+batches of a shard, which its root may undo, and whatever a deleted hull had. Rows of hulls and of segments may be other
+ones. In the end the rows must agree with the totals, as in an examination. If they do not, something else has happened,
+and what was read before is void.
 """
 
 from array import array
+from bisect import insort
 from collections import defaultdict
 from itertools import count
 from typing import Any
@@ -17,15 +19,24 @@ from dynhull_server.storage.port import DamagedError, Progress, StorageError
 from dynhull_server.storage.rows.encoding import weight
 from dynhull_server.storage.rows.examine import Findings, examine
 from dynhull_server.storage.rows.fence_examine import FenceExamination, FoundFences
-from dynhull_server.storage.rows.hull_rows import FORMATS
+from dynhull_server.storage.rows.hull_rows import FORMATS, values
 from dynhull_server.storage.rows.ledger import HullRows, Ledger, StoredSnapshot
-from dynhull_server.storage.rows.tables import FORMAT
+from dynhull_server.storage.rows.segment_rows import (
+    erasure_from,
+    erasure_values,
+    segment_checksum,
+    segment_from,
+    segment_values,
+    segment_weight,
+)
+from dynhull_server.storage.rows.tables import COLUMNS, FORMAT
 from dynhull_server.storage.rows.totals import Totals, totals_from
 
 from .database import Connection, as_storage_errors
 from .reader import PostgresReader
 
 OF_FENCES = "fences", "events", "staged", "runs", "event_ids", "inside_ids", "consumer_ids", "delay_ids", "start_ids"
+SEGMENT = "id, hull, checksum"
 DEAD_OF_FENCES = "events", "insides", "consumers", "delays", "starts"
 
 
@@ -55,6 +66,7 @@ class Follower:
         self._weights: dict[int, array[int]] = {}  # of the rows of batches, by hull
         self._hulls = Totals()  # of the rows, without those of fences
         self._snapshots = (0, 0)
+        self._segments: dict[int, tuple[int, int]] = {}  # of each row, its hull and its checksum
 
     @as_storage_errors()
     def begin(self, progress: Progress) -> None:
@@ -81,6 +93,7 @@ class Follower:
             sum(hull.sum for hull in ledger.hulls.values()),
         )
         self._snapshots = self._count_snapshots()
+        self._segments = self._look_at_segments()
 
     @as_storage_errors()
     def go_on(self, epoch: int | None = None) -> None:
@@ -109,20 +122,26 @@ class Follower:
         if (snapshots := self._count_snapshots()) != self._snapshots:
             self._follow_snapshots()
             self._snapshots = snapshots
+        self._follow_segments()
+        self._follow_drops(totals)
+        fences = self._examine_fences()  # also where there are none: those deleted meanwhile may have left rows
+        if not self._agrees(totals, fences):
+            self._follow_changes()
+            self._follow_drops(totals)
+        if not self._agrees(totals, fences):
+            raise self._void("its rows and their totals do not follow from those before")
+        self.ledger.totals = totals
+
+    def _follow_drops(self, totals: Totals) -> None:
         if self._hulls.batches > totals.batches:
             self._drop_superfluous()
         if self._hulls.batches > totals.batches:
             self._drop_ends()
-        fences = self._examine_fences()  # also where there are none: those deleted meanwhile may have left rows
+
+    def _agrees(self, totals: Totals, fences: FoundFences) -> bool:
+        """Whether the rows are those that the totals record."""
         there = self._hulls.plus(0, 0, fences.sum, fences.rows)
-        if (there.hulls, there.batches, there.sum, there.fence_rows) != (
-            totals.hulls,
-            totals.batches,
-            totals.sum,
-            totals.fence_rows,
-        ):
-            raise self._void("its rows and their totals do not follow from those before")
-        self.ledger.totals = totals
+        return all(getattr(there, name) == getattr(totals, name) for name in ("hulls", "batches", "sum", "fence_rows"))
 
     def close(self) -> None:
         """Close the connection."""
@@ -208,6 +227,55 @@ class Follower:
                 raise DamagedError(f"{self._place}: a snapshot of hull {number} is damaged")
             hull = ledger.hulls[number]
             hull.snapshots = sorted([*hull.snapshots, snapshot], key=lambda each: each.revision)
+
+    def _look_at_segments(self) -> dict[int, tuple[int, int]]:
+        """The hull and the checksum of each row of segments. Notes the numbers in use, and which rows are to go."""
+        ledger = self.ledger
+        there = {place: (number, stored) for place, number, stored in self._reader.every("segments", SEGMENT)}
+        ledger.segment_ids = count(max(next(ledger.segment_ids), max(there, default=0) + 1))
+        ledger.dead["segments"] = array("q", (place for place, (of, _) in there.items() if of not in ledger.hulls))
+        return there
+
+    def _follow_segments(self) -> None:
+        before, self._segments = self._segments, self._look_at_segments()
+        if self._segments == before:
+            return
+        gone = {place for place, each in before.items() if self._segments.get(place) != each}
+        new = array("q", (place for place, each in self._segments.items() if before.get(place) != each))
+        for number, hull in self.ledger.hulls.items():
+            for segment in [each for each in hull.segments if each.id in gone]:
+                hull.segments.remove(segment)
+                self._weigh(hull, -segment_weight(segment_values(segment, number)))
+            for stored in [each for each in hull.erasures if each.id in gone]:
+                hull.erasures.remove(stored)
+                self._weigh(hull, -segment_weight(erasure_values(stored, number)))
+        for row in self._reader.some("segments", ", ".join(COLUMNS["segments"]), new):
+            place, number, first, last, file, facts, checksum = row
+            if number not in self.ledger.hulls:
+                continue
+            hull = self.ledger.hulls[number]
+            if segment_checksum(*row[:-1]) != checksum:
+                raise DamagedError(f"{self._place}: the row of the past of revisions {first} to {last} is damaged")
+            if file:
+                insort(hull.segments, segment_from(place, first, last, file, facts), key=lambda each: each.first)
+            else:
+                hull.erasures.append(erasure_from(place, first, last, facts))
+            self._weigh(hull, segment_weight(row))
+
+    def _weigh(self, hull: HullRows, more: int) -> None:
+        hull.weigh(more)
+        self._hulls = self._hulls.plus(0, 0, more)
+
+    def _follow_changes(self) -> None:
+        """Take up rows of hulls that were there before, and are other ones now."""
+        columns, read = FORMATS[FORMAT]
+        for row in self._reader.every("hulls", columns):
+            found = read(*row)
+            hull = self.ledger.hulls.get(found.row.number)
+            if hull is not None and found.whole and found.row != hull.row:
+                *_, before = values(hull.row)
+                hull.change(found.row, found.checksum - before)
+                self._hulls = self._hulls.plus(0, 0, found.checksum - before)
 
     def _drop_superfluous(self) -> None:
         """Find the rows of batches that were dropped behind snapshots: of each hull, the first ones."""
