@@ -27,7 +27,9 @@ To = Annotated[
     typer.Option(
         metavar="URL|FILE|-",
         help="Receiver: http(s)://, mqtt(s)://HOST/TOPIC, nats://HOST/SUBJECT, a file, or - for standard output. "
-        "{kind}, {name} and {type} of events are filled in.",
+        "{kind}, {name} and {type} of events are filled in. The environment keeps a URL that is a secret, as Slack's "
+        "are, out of the list of processes.",
+        envvar="DYNHULL_RELAY_TO",
     ),
 ]
 State = Annotated[Path, typer.Option(help="Folder for dead letters.", file_okay=False, envvar="DYNHULL_RELAY_STATE")]
@@ -44,6 +46,26 @@ Secrets = Annotated[
 Unsigned = Annotated[bool, typer.Option("--unsigned", help="Send webhooks without a signature.")]
 AllowPrivate = Annotated[
     bool, typer.Option("--allow-private", help="Allow webhooks to private, loopback and link-local addresses.")
+]
+BodyTemplate = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        dir_okay=False,
+        help="Template of bodies in place of CloudEvents: "
+        """{"text": "{{ alarm }} is {{ type }} for {{ hull }}"}. Syntax of Jinja: values, if, filters.""",
+    ),
+]
+ContentType = Annotated[
+    str | None, typer.Option(help="Media type of what --body-template makes. Default: application/json.")
+]
+Headers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--header",
+        metavar="NAME: VALUE|@FILE",
+        help="Header of webhooks, whose value is a template, too; or a file with such lines, as for secrets.",
+    ),
 ]
 Timeout = Annotated[str, typer.Option(help="How long a delivery may take.")]
 
@@ -86,6 +108,9 @@ def send(
     secret: Secrets = None,
     unsigned: Unsigned = False,
     allow_private: AllowPrivate = False,
+    body_template: BodyTemplate = None,
+    content_type: ContentType = None,
+    header: Headers = None,
     timeout: Timeout = "30s",
 ) -> None:
     """Send dead letters again, the oldest first, with their ids, and remove those that arrive.
@@ -97,21 +122,26 @@ def send(
     import asyncio
 
     from .dead_letters import StateFolder
+    from .options import options_from
     from .relay import send_again
-    from .signatures import read_secret
-    from .targets import TargetOptions, target_of
+    from .sources import KINDS
+    from .targets import target_of
 
     async def run() -> tuple[int, str | None]:
         found = StateFolder(state).dead_letters()
         unknown = set(ids or ()) - {each.letter.id for each in found}
         if unknown:
             raise ValueError(f"{state} has no dead letter {', '.join(sorted(unknown))}")
-        options = TargetOptions(
-            keys=[read_secret(each) for each in secret or ()],
+        options = options_from(
+            KINDS,
+            secret=secret,
             unsigned=unsigned,
             batch=1,
-            timeout=more_than_0(timeout, "--timeout"),
+            timeout=timeout,
             allow_private=allow_private,
+            body_template=body_template,
+            content_type=content_type,
+            header=header,
         )
         target = target_of(to, options)
         return await send_again([each for each in found if not ids or each.letter.id in ids], target)
@@ -146,6 +176,9 @@ def relay(
     secret: Secrets = None,
     unsigned: Unsigned = False,
     allow_private: AllowPrivate = False,
+    body_template: BodyTemplate = None,
+    content_type: ContentType = None,
+    header: Headers = None,
     batch: Annotated[int, typer.Option(min=1, max=1000, help="Most events in one webhook.")] = 1,
     timeout: Timeout = "30s",
     attempts: Annotated[
@@ -171,9 +204,9 @@ def relay(
         dynhull relay depot alarm:spread --consumer plant --to 'mqtt://broker/plant/{kind}/{name}/{type}'
 
     The order is that of each fence and alarm. An event is acknowledged after it was delivered. Whatever is killed, it
-    arrives, perhaps twice but with the same id.
-    What fails is repeated until it succeeds; only refusals, such as HTTP 400 to 499, end as dead letters, see
-    `dynhull relay dead-letters`. Bodies are CloudEvents 1.0 in JSON; webhooks are signed as Standard Webhooks are.
+    arrives, perhaps twice but with the same id. What fails is repeated until it succeeds; only refusals, such as HTTP
+    400 to 499, end as dead letters, see `dynhull relay dead-letters`. Bodies are CloudEvents 1.0 in JSON, or what
+    --body-template makes; webhooks are signed as Standard Webhooks are.
 
     The relay ends when all fences and alarms are deleted, or after SIGTERM; exit code 1 if a receiver answered 410
     Gone.
@@ -185,15 +218,26 @@ def relay(
     from . import logs
     from .dead_letters import StateFolder
     from .lane import Patience
+    from .options import options_from
     from .relay import run
-    from .signatures import read_secret
-    from .sources import read_source
-    from .targets import TargetOptions, check_kinds, target_of
+    from .sources import KINDS, read_source
+    from .targets import check_kinds, target_of
     from .urls import without_secrets
 
     wanted = [read_source(each) for each in sources]
     check_kinds(to, wanted)
-    keys = [read_secret(each) for each in secret or ()]
+    kinds = [kind for kind in KINDS if any(each.kind == kind for each in wanted)]
+    options = options_from(
+        kinds,
+        secret=secret,
+        unsigned=unsigned,
+        batch=batch,
+        timeout=timeout,
+        allow_private=allow_private,
+        body_template=body_template,
+        content_type=content_type,
+        header=header,
+    )
     patience = Patience(
         attempts, more_than_0(first_pause, "--first-pause"), more_than_0(longest_pause, "--longest-pause")
     )
@@ -201,13 +245,6 @@ def relay(
     logs.configure(log_format.value)
 
     async def serve() -> bool:
-        options = TargetOptions(
-            keys=keys,
-            unsigned=unsigned,
-            batch=batch,
-            timeout=more_than_0(timeout, "--timeout"),
-            allow_private=allow_private,
-        )
         target = target_of(to, options)
         page = None if metrics_port is None else (metrics_host, metrics_port)
         try:

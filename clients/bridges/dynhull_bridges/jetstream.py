@@ -8,7 +8,8 @@ from nats.aio.client import Client
 from nats.errors import BadSubjectError, Error, MaxPayloadError
 from nats.js.errors import NoStreamResponseError
 
-from .letters import CONTENT_TYPE, Letter
+from .bodies.body import CLOUD_EVENTS, Body
+from .letters import Letter
 from .nats_connection import closed, connected
 from .refusals.nats import NATS, code_of
 from .sources import Kind
@@ -27,7 +28,7 @@ class JetStream:
 
     most = 1
 
-    def __init__(self, url: str, timeout: float) -> None:
+    def __init__(self, url: str, timeout: float, body: Body = CLOUD_EVENTS) -> None:
         parts = urlsplit(url, allow_fragments=False)
         if not parts.hostname:
             raise ValueError(f"--to {without_secrets(url)} has no host")
@@ -39,6 +40,7 @@ class JetStream:
         if {"*", ">"} & set(self._subject):
             raise ValueError(f"the subject {self._subject!r} has a wildcard, * or >: events go to one subject")
         self._timeout = timeout
+        self._body = body
         self._client: Client | None = None
         self._connecting = asyncio.Lock()
 
@@ -47,11 +49,12 @@ class JetStream:
         client = await self._connected()
         for each in letters:
             subject = self._filled(each)
-            headers = {"Nats-Msg-Id": each.id, "Content-Type": CONTENT_TYPE}
+            headers = {"Nats-Msg-Id": each.id, "Content-Type": self._body.content_type}
+            body = self._body.text(each).encode()
             try:
-                await client.jetstream(timeout=self._timeout).publish(subject, each.text.encode(), headers=headers)
+                await client.jetstream(timeout=self._timeout).publish(subject, body, headers=headers)
             except MaxPayloadError:
-                raise RefusedError(f"NATS: {len(each.text.encode())} bytes are too many for the server") from None
+                raise RefusedError(f"NATS: {len(body)} bytes are too many for the server") from None
             except BadSubjectError:  # the name of the source has empty words
                 raise RefusedError(f"NATS: {subject!r} is no subject") from None
             except NoStreamResponseError:

@@ -11,6 +11,7 @@ from aiomqtt import ProtocolVersion
 from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
+from .bodies.body import CLOUD_EVENTS, Body
 from .letters import Letter
 from .refusals.mqtt import MQTT
 from .sources import Kind
@@ -58,7 +59,7 @@ class Mqtt:
 
     most = 1
 
-    def __init__(self, url: str, timeout: float) -> None:
+    def __init__(self, url: str, timeout: float, body: Body = CLOUD_EVENTS) -> None:
         parts = urlsplit(url, allow_fragments=False)
         if not parts.hostname:
             raise ValueError(f"--to {without_secrets(url)} has no host")
@@ -72,6 +73,7 @@ class Mqtt:
         if {"+", "#"} & set(self._topic):
             raise ValueError(f"the topic {self._topic!r} has a wildcard, + or #: events go to one topic")
         self._timeout = timeout
+        self._body = body
         self._client: _Client | None = None
         self._connecting = asyncio.Lock()
 
@@ -80,7 +82,7 @@ class Mqtt:
         client = await self._connected()
         for each in letters:
             try:
-                reason = await client.send(self._filled(each), each.text)
+                reason = await client.send(self._filled(each), self._body.text(each))
             except aiomqtt.MqttError as error:
                 await self._disconnect(client)
                 raise NotDeliveredError(f"MQTT: {error}") from None

@@ -16,6 +16,7 @@ from dynhull_client import (
 )
 
 Kind = Literal["fence", "alarm"]
+KINDS: tuple[Kind, ...] = "fence", "alarm"
 Event = FenceEvent | AlarmEvent
 OF_ALARMS = "alarm:"
 NOT_FOUND = FenceNotFoundError, AlarmNotFoundError

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from .bodies.body import CLOUD_EVENTS, Body, Header
 from .sources import Source
 from .target import Target, check_places
 
@@ -22,6 +23,8 @@ class TargetOptions:
         batch: the most letters in a delivery.
         timeout: the seconds for a delivery.
         allow_private: whether webhooks may go to private networks.
+        body: makes the bodies.
+        headers: those that webhooks get besides.
     """
 
     keys: Sequence[bytes]
@@ -29,6 +32,8 @@ class TargetOptions:
     batch: int
     timeout: float
     allow_private: bool
+    body: Body = CLOUD_EVENTS
+    headers: Sequence[Header] = ()
 
 
 Open = Callable[[str, TargetOptions], Target]
@@ -50,6 +55,10 @@ def target_of(to: str, options: TargetOptions) -> Target:
         raise ValueError(f"--to {to}: {{kind}}, {{name}} and {{type}} are filled in in URLs; one file has all events")
     if scheme not in WEBHOOKS and options.batch > 1:
         raise ValueError("--batch is for webhooks (http and https)")
+    if scheme not in WEBHOOKS and options.headers:
+        raise ValueError("--header is for webhooks (http and https)")
+    if options.body is not CLOUD_EVENTS and (scheme in LINES or options.batch > 1):
+        raise ValueError("--body-template is for single events to URLs: files and batches have CloudEvents")
     if scheme not in TARGETS:
         *others, last = (each for each in TARGETS if each not in LINES)
         raise ValueError(f"--to {scheme}: must be a URL of {', '.join(others)} or {last}, a file or -")
@@ -67,19 +76,27 @@ def _webhook(to: str, options: TargetOptions) -> Target:
 
     if not options.keys and not options.unsigned:
         raise ValueError("webhooks are signed: give --secret or DYNHULL_WEBHOOK_SECRET, or --unsigned")
-    return Webhook(to, options.keys, batch=options.batch, timeout=options.timeout, allow_private=options.allow_private)
+    return Webhook(
+        to,
+        options.keys,
+        batch=options.batch,
+        timeout=options.timeout,
+        allow_private=options.allow_private,
+        body=options.body,
+        headers=options.headers,
+    )
 
 
 def _mqtt(to: str, options: TargetOptions) -> Target:
     from .mqtt import Mqtt
 
-    return Mqtt(to, options.timeout)
+    return Mqtt(to, options.timeout, options.body)
 
 
 def _jetstream(to: str, options: TargetOptions) -> Target:
     from .jetstream import JetStream
 
-    return JetStream(to, options.timeout)
+    return JetStream(to, options.timeout, options.body)
 
 
 def _lines(to: str, _: TargetOptions) -> Target:

@@ -1,13 +1,24 @@
 """URLs of brokers and receivers: what follows the question mark, subjects of NATS, and how URLs are shown."""
 
+import hashlib
+import re
 from collections.abc import Collection
 from urllib.parse import parse_qs, urlsplit
 
+TOKEN = re.compile(r"(?=[^/]*[0-9])(?=[^/]*[A-Za-z])[A-Za-z0-9_-]{20,}")  # in the path of a webhook
+DIGITS_OF_A_TOKEN = 6
+
 
 def without_secrets(url: str) -> str:
-    """A URL without user, password and query."""
+    """A URL without user, password and query, and of http without what looks like a token in the path."""
     parts = urlsplit(url)
-    return parts._replace(netloc=parts.netloc.rpartition("@")[2], query="").geturl()
+    path = TOKEN.sub(_digest, parts.path) if parts.scheme in ("http", "https") else parts.path
+    return parts._replace(netloc=parts.netloc.rpartition("@")[2], path=path, query="").geturl()
+
+
+def _digest(token: re.Match[str]) -> str:
+    """What distinguishes two of them."""
+    return "\N{HORIZONTAL ELLIPSIS}" + hashlib.sha256(token[0].encode()).hexdigest()[:DIGITS_OF_A_TOKEN]
 
 
 def options_of(url: str, known: Collection[str] = ()) -> dict[str, list[str]]:

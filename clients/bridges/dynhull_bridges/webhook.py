@@ -14,7 +14,8 @@ import yarl
 import dynhull_client
 
 from .addresses import PublicOnly, is_public
-from .letters import BATCH_CONTENT_TYPE, CONTENT_TYPE, Letter
+from .bodies.body import CLOUD_EVENTS, Body, Header
+from .letters import BATCH_CONTENT_TYPE, Letter
 from .refusals.http import HTTP
 from .signatures import signature
 from .target import GoneError, NotDeliveredError, filled, not_delivered
@@ -32,12 +33,24 @@ class Webhook:
         batch: the most events in one request; 1 for single events rather than batches.
         timeout: the seconds that a request may take.
         allow_private: whether private addresses are allowed.
+        body: makes the bodies of single events.
+        headers: those that are sent besides.
 
     Raises:
         ValueError: the URL has no host, or names a private address that is not allowed.
     """
 
-    def __init__(self, url: str, keys: Sequence[bytes], *, batch: int, timeout: float, allow_private: bool) -> None:
+    def __init__(
+        self,
+        url: str,
+        keys: Sequence[bytes],
+        *,
+        batch: int,
+        timeout: float,
+        allow_private: bool,
+        body: Body = CLOUD_EVENTS,
+        headers: Sequence[Header] = (),
+    ) -> None:
         host = yarl.URL(url).host
         if not host or "{" in host:
             raise ValueError(f"--to {without_secrets(url)} has no host of its own")
@@ -48,6 +61,8 @@ class Webhook:
         self.most = batch
         self._url = url
         self._keys = keys
+        self._body = body
+        self._headers = headers
         resolver = None if allow_private else PublicOnly()
         self._session = aiohttp.ClientSession(
             connector=aiohttp.TCPConnector(resolver=resolver),
@@ -60,12 +75,13 @@ class Webhook:
         """Post the letters in one request."""
         first, last = letters[0], letters[-1]
         if self.most == 1:
-            identity, content_type, body = first.id, CONTENT_TYPE, first.text
+            identity, content_type, body = first.id, self._body.content_type, self._body.text(first)
         else:
             identity = first.id if first is last else f"{first.id}-{last.sequence}"
             content_type, body = BATCH_CONTENT_TYPE, f"[{','.join(each.text for each in letters)}]"
         now = int(time.time())
-        headers = {"Content-Type": content_type, "webhook-id": identity, "webhook-timestamp": str(now)}
+        headers = {each.name: each.value(first) for each in self._headers}
+        headers |= {"Content-Type": content_type, "webhook-id": identity, "webhook-timestamp": str(now)}
         if self._keys:
             headers["webhook-signature"] = signature(self._keys, identity, now, body)
         try:
