@@ -36,6 +36,9 @@ class Area(Protocol):
     def meets(self, p: Point, q: Point, closed: bool) -> bool:
         """Whether the segment from p to q has a point of the area. Exact."""
 
+    def edges(self) -> list[tuple[Point, Point]]:
+        """The edges of the boundary; none of a disk."""
+
 
 @dataclass(frozen=True, slots=True)
 class Polygons:
@@ -53,7 +56,7 @@ class Polygons:
             return True
         most = Fraction(margin) ** 2
         return any(
-            squared_distance(p, a, b) <= most for a, b in self._edges() if not _certainly_farther(p, a, b, margin)
+            squared_distance(p, a, b) <= most for a, b in self.edges() if not _certainly_farther(p, a, b, margin)
         )
 
     def is_clear(self, p: Point, margin: float, error: float) -> bool:
@@ -67,17 +70,18 @@ class Polygons:
         """The distance of p, rounded once. O(k)."""
         if not self.polygons:
             return inf
-        return 0.0 if self.holds(p, closed=True) else root(min(squared_distance(p, a, b) for a, b in self._edges()))
+        return 0.0 if self.holds(p, closed=True) else root(min(squared_distance(p, a, b) for a, b in self.edges()))
 
     def meets(self, p: Point, q: Point, closed: bool) -> bool:
         """Whether the segment from p to q has a point of the area. O(k²) where it meets many edges."""
         if self.holds(p, closed) or self.holds(q, closed):
             return True
         if closed:
-            return any(_segments_meet(p, q, a, b) for a, b in self._edges())
+            return any(_segments_meet(p, q, a, b) for a, b in self.edges())
         return any(_passes_inside(polygon, p, q) for polygon in self.polygons)
 
-    def _edges(self) -> list[tuple[Point, Point]]:
+    def edges(self) -> list[tuple[Point, Point]]:
+        """The edges of all rings. O(k)."""
         return [edge for polygon in self.polygons for ring in polygon for edge in _edges(ring)]
 
 
@@ -112,6 +116,10 @@ class DiskArea:
         square, most = squared_distance(self.center, p, q), Fraction(self.radius) ** 2
         return square <= most if closed else square < most
 
+    def edges(self) -> list[tuple[Point, Point]]:
+        """None."""
+        return []
+
 
 @dataclass(frozen=True, slots=True)
 class Segment:
@@ -139,6 +147,10 @@ class Segment:
     def meets(self, p: Point, q: Point, closed: bool) -> bool:  # noqa: ARG002
         """Whether the segment from p to q has a point of this one. O(1)."""
         return _segments_meet(p, q, self.a, self.b)
+
+    def edges(self) -> list[tuple[Point, Point]]:
+        """The segment."""
+        return [(self.a, self.b)]
 
 
 NOTHING = Polygons(())

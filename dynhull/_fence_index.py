@@ -12,6 +12,7 @@ from ._entities import Entities
 from ._fences import Fences
 from ._implementation import kernel
 from ._keyed import KeyedHull
+from ._metres import MOST_METRES, Metres
 from ._predicates import orient2d
 from ._rings import as_polygons
 from ._value import Value
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from . import _kernel
+    from ._globe import Gnomonic
     from .arrays import Points
     from .keys import KeyType
 
@@ -42,7 +44,7 @@ class Crossings(Value):
         points: (n, 2) places now; NaN if the key is gone.
         previous: (n, 2) places before; NaN if the key is new.
         distances: (n,) distances of the places now to the area now, each the exact value rounded once: 0.0 inside and
-            on the boundary, inf from an empty area, NaN if the key is gone.
+            on the boundary, inf from an empty area, NaN if the key is gone. With a `frame`, metres.
     """
 
     MOVED = 1
@@ -88,6 +90,10 @@ class FenceIndex:
 
     Args:
         subjects: the hull whose entities are the subjects. A hull has one index at a time. A copy of it has none.
+        frame: the projection (`dynhull.globe.Gnomonic`) of which the plane is. Margins and distances are then metres on
+            WGS 84, within a micrometre up to 250 km, and the same on every machine; a distance of more is inf, and a
+            margin is at most that. Places are within reach of the projection, areas within 88 degrees of its centre. No
+            disks, and no `without_self`.
 
     Raises:
         ValueError: the hull has an index already.
@@ -121,22 +127,23 @@ class FenceIndex:
     ([7], [1], ['UA17'], [4])
     """
 
-    __slots__ = ("_carried", "_fences", "_subjects")
+    __slots__ = ("_carried", "_fences", "_on_globe", "_subjects")
 
-    def __init__(self, subjects: KeyedHull) -> None:
+    def __init__(self, subjects: KeyedHull, frame: Gnomonic | None = None) -> None:
         if not isinstance(subjects, KeyedHull):
             raise TypeError(
                 f"subjects is a {type(subjects).__name__}: must be a KeyedHull, whose places are in the plane"
             )
         tree = subjects._tree
         self._subjects = subjects
+        self._on_globe = frame is not None
         self._carried: dict[str | int, FenceIndex] = {}  # keys from other indexes, since crossings were last taken
         self._fences: Fences | _kernel.Fences
         if isinstance(tree, Entities):
-            self._fences = Fences(tree)
+            self._fences = Fences(tree, None if frame is None else Metres(frame))
         else:
             assert kernel is not None
-            self._fences = kernel.Fences(tree)
+            self._fences = kernel.Fences(tree, None if frame is None else (frame._sin[0], frame._cos[0]))
 
     def detach(self) -> None:
         """Let the hull forget the index, which sees no more of its changes."""
@@ -175,7 +182,7 @@ class FenceIndex:
             _number(fence),
             as_polygons(polygons),
             bool(closed),
-            as_length(margin, "margin"),
+            self._margin(margin),
             bool(cross),
             self._keys(inside),
         )
@@ -195,8 +202,11 @@ class FenceIndex:
         """Set the area to a disk: all points whose distance from (x, y) is at most, if open below, the radius.
 
         Raises:
-            ValueError: a coordinate is not finite, or the radius or the margin is negative. Nothing has changed.
+            ValueError: a coordinate is not finite, or the radius or the margin is negative; or the index has a `frame`.
+                Nothing has changed.
         """
+        if self._on_globe:
+            raise ValueError("a disk of the plane is none on the globe: set the polygon that stands for it")
         self._fences.set_circle(
             _number(fence),
             as_coordinate(x, "x"),
@@ -237,7 +247,9 @@ class FenceIndex:
             ValueError: the vertices are not those of a convex polygon, or not finite; the margin is bad; or
                 `without_self` without a margin or with an open area. Nothing has changed.
         """
-        number, corners, distance = _number(fence), as_points(vertices, "vertices"), as_length(margin, "margin")
+        number, corners, distance = _number(fence), as_points(vertices, "vertices"), self._margin(margin)
+        if without_self and self._on_globe:
+            raise ValueError("without_self is for the plane: the index has a frame")
         if without_self and not distance > 0:
             raise ValueError(
                 "margin is 0.0: without_self needs a positive margin, as no vertex is inside of the others"
@@ -276,7 +288,8 @@ class FenceIndex:
             xy: (k, 2) points.
 
         Returns:
-            (k,) each the exact value rounded once: 0.0 inside and on the boundary, inf from an empty area.
+            (k,) each the exact value rounded once: 0.0 inside and on the boundary, inf from an empty area. With a
+            `frame`, metres as above.
 
         Raises:
             KeyError: there is no such fence.
@@ -398,6 +411,12 @@ class FenceIndex:
             if isinstance(column, np.ndarray):
                 column.setflags(write=False)  # nobody else has it
         return _only_shared(Crossings(*taken), carried) if carried else Crossings(*taken)
+
+    def _margin(self, margin: float) -> float:
+        length = as_length(margin, "margin")
+        if self._on_globe and length > MOST_METRES:
+            raise ValueError(f"margin is {length!r}: at most {MOST_METRES:g} metres on the globe")
+        return length
 
     def _keys(self, inside: Any) -> Keys | None:
         return None if inside is None else as_keys(inside, self._subjects.key_type, "inside")

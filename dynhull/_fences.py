@@ -7,7 +7,7 @@ those that have changed since. `take` decides again for these, and for all keys 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import nan
+from math import inf, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._entities import Entities, Key
+    from ._metres import Metres
     from ._predicates import Point
     from .arrays import Points
     from .keys import Keys
@@ -59,8 +60,9 @@ class _Fence:
 class Fences:
     """Fences of one set of entities. Brute force: `take` decides for each changed key and each fence."""
 
-    def __init__(self, entities: Entities) -> None:
+    def __init__(self, entities: Entities, metres: Metres | None = None) -> None:
         self._entities = entities
+        self._metres = metres
         self._journal = Journal()
         self._fences: dict[int, _Fence] = {}
         self._carried: dict[Key, Point] = {}  # subjects from another index, with their places there
@@ -132,7 +134,7 @@ class Fences:
     def distances(self, fence: int, places: Points) -> npt.NDArray[np.float64] | None:
         """The distances of places to the area; None if that is the hull of the entities."""
         each = self._fences[fence]
-        return None if each.own else np.array([each.area.distance(p) for p in as_tuples(places)], np.float64)
+        return None if each.own else np.array([self._distance(each.area, p) for p in as_tuples(places)], np.float64)
 
     def clear(self, fence: int, places: Points, errors: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_] | None:
         """Which places are farther than their errors from the boundary; None if that is of the hull of the entities."""
@@ -206,7 +208,7 @@ class Fences:
                     continue
                 area = self._area_for(fence, now)
                 stays = was and fence.margin > 0
-                inside = area.within(now, fence.margin) if stays else area.holds(now, fence.closed)
+                inside = self._within(area, now, fence.margin) if stays else area.holds(now, fence.closed)
                 start = fence.earlier.get(key, previous)
                 if inside != was:
                     change = ENTERED if inside else LEFT
@@ -219,7 +221,7 @@ class Fences:
                 fence.inside ^= {key} if change in (ENTERED, LEFT) else set()
                 cause = APPEARED if previous is None else MOVED * (carried or previous != now)
                 cause |= AREA if changed or cause == 0 else 0
-                rows.append((number, change, cause, key, now, previous or nowhere, area.distance(now)))
+                rows.append((number, change, cause, key, now, previous or nowhere, self._distance(area, now)))
             fence.decided = fence.settings()
             fence.earlier = {}
         self._journal.clear()
@@ -229,6 +231,17 @@ class Fences:
 
     def _holds(self, fence: _Fence, p: Point) -> bool:
         return self._area_for(fence, p).holds(p, fence.closed)
+
+    def _within(self, area: Area, p: Point, margin: float) -> bool:
+        return area.within(p, margin) if self._metres is None else self._distance(area, p) <= margin
+
+    def _distance(self, area: Area, p: Point) -> float:
+        if self._metres is None:
+            return area.distance(p)
+        if area.holds(p, closed=True):
+            return 0.0
+        ends = np.array(area.edges(), np.float64).reshape(-1, 2, 2)
+        return float(self._metres.to_edges(np.broadcast_to(p, (len(ends), 2)), ends[:, 0], ends[:, 1]).min(initial=inf))
 
     def _area_for(self, fence: _Fence, p: Point) -> Area:
         """The area that an entity at p is compared with."""

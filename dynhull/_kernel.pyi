@@ -258,7 +258,7 @@ class Entities:
 class Fences:
     """Fences of one set of entities: see dynhull's class in Python."""
 
-    def __init__(self, entities: Entities) -> None: ...
+    def __init__(self, entities: Entities, latitude: tuple[float, float] | None) -> None: ...
 
     def detach(self) -> None:
         """End the reports of the entities."""

@@ -18,11 +18,14 @@ from ._globe import REACH, Gnomonic, as_center, as_lonlat
 from ._globe_extent import bounds, label_point
 from ._globe_part import project_far, project_hull
 from ._globe_sketch import sketch
+from ._metres import MOST_METRES, Metres
 
 __all__ = [
+    "MOST_METRES",
     "REACH",
     "Boundary",
     "Gnomonic",
+    "Metres",
     "area",
     "as_center",
     "as_lonlat",

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <span>
 #include <vector>
 
-#include "boxes.hpp"
+#include "../globe/metres.hpp"
 
 namespace dynhull {
 
@@ -56,11 +57,11 @@ class Polygon {
   bool any_edge_meeting(Meets meets, Visit visit) const {
     return any_edge(meets, [&](std::uint32_t i) { return visit(edge(i)); });
   }
-  // Visits edges, and may leave out those that are farther from p than `most`, which a visit may lower.
-  template <class Visit>
-  void visit_near(Point p, const double& most, Visit visit) const {
+  // Visits edges, and may leave out those that are farther than `most`: see `BoxTree`.
+  template <class Least, class Visit>
+  void visit_near(Least least, const double& most, Visit visit) const {
     if (few()) return for_each_edge(visit);
-    tree_.visit_near(p, most, [&](std::uint32_t i) { visit(edge(i)); });
+    tree_.visit_near(least, most, [&](std::uint32_t i) { visit(edge(i)); });
   }
 
   // +1 inside, 0 on a ring, -1 outside: by the number of edges to the right of p.
@@ -236,6 +237,7 @@ struct Area {
   Edge segment = {};
   Point center = {};
   double radius = 0;
+  std::shared_ptr<const Metres> metres = {};  // in which distances are; none: units of the plane
   BoxTree tree = {};  // of the polygons, if they are not few; last, because areas of one are read without it
 
   static Area of_polygons(std::vector<Polygon> polygons, bool closed, double margin) {
@@ -313,11 +315,22 @@ struct Area {
   // The same for a p that is not inside.
   double distance_to_boundary(Point p) const {
     if (kind == Kind::DISK) return where(p) >= 0 ? 0 : distance_to_circle(p, center, radius);
-    return distance_to_nearest(p, [&](const double& most, auto visit) {
-      if (kind == Kind::SEGMENT) visit(segment);
-      visit_near(p, most, [&](const Polygon& polygon) { polygon.visit_near(p, most, visit); });
-    });
+    const auto by = [&](auto least) {
+      return [this, least](const double& most, auto visit) {
+        if (kind == Kind::SEGMENT) visit(segment);
+        visit_near(least, most, [&](const Polygon& polygon) { polygon.visit_near(least, most, visit); });
+      };
+    };
+    if (metres) return metres_to_nearest(*metres, p, by([p](const Box& box) { return Metres::least(p, box); }));
+    return distance_to_nearest(p, by([p](const Box& box) { return least_distance(p, box); }));
   }
+  // Whether the distance from p to an edge is at most the margin.
+  bool is_near(Point p, Edge edge) const {
+    if (!metres) return compare_distance(p, nearest_part(p, edge), margin) <= 0;
+    return Metres::least(p, Box::of(edge)) <= margin && metres->to_edge(p, edge) <= margin;
+  }
+  // At least how far from an edge, in the plane, points are that are near it.
+  double reach(Edge edge) const { return metres && margin > 0 ? Metres::reach(edge, margin) : margin; }
 
   // Whether p is farther than `error` from the boundary: inside of one of the polygons by more than it, or outside by
   // more than the margin and it. True without an error.
@@ -371,12 +384,12 @@ struct Area {
     if (few()) return std::any_of(polygons.begin(), polygons.end(), visit);
     return tree.any(meets, [&](std::uint32_t i) { return visit(polygons[i]); });
   }
-  template <class Visit>
-  void visit_near(Point p, const double& most, Visit visit) const {
+  template <class Least, class Visit>
+  void visit_near(Least least, const double& most, Visit visit) const {
     if (few())
       for (const Polygon& polygon : polygons) visit(polygon);
     else
-      tree.visit_near(p, most, [&](std::uint32_t i) { visit(polygons[i]); });
+      tree.visit_near(least, most, [&](std::uint32_t i) { visit(polygons[i]); });
   }
 
   static bool segments_meet(Edge s, Edge t) {

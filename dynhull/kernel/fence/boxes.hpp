@@ -81,10 +81,11 @@ class BoxTree {
     return any({0, 0, items_.size()}, meets, visit);
   }
 
-  // Visits items, and may leave out those that are farther from p than `most`, which a visit may lower.
-  template <class Visit>
-  void visit_near(Point p, const double& most, Visit visit) const {
-    visit_near({0, 0, items_.size()}, least_distance(p, boxes_[0]), p, most, visit);
+  // Visits items, and may leave out those that are farther than `most`, which a visit may lower. `least` says of a box
+  // how near what is in it may be.
+  template <class Least, class Visit>
+  void visit_near(Least least, const double& most, Visit visit) const {
+    visit_near({0, 0, items_.size()}, least(boxes_[0]), least, most, visit);
   }
 
  private:
@@ -131,21 +132,21 @@ class BoxTree {
                        items_.begin() + static_cast<std::ptrdiff_t>(part.last), visit);
   }
 
-  template <class Visit>
-  void visit_near(Part part, double least, Point p, const double& most, Visit& visit) const {
-    if (least > most) return;
+  template <class Least, class Visit>
+  void visit_near(Part part, double nearest, Least& least, const double& most, Visit& visit) const {
+    if (nearest > most) return;
     if (part.is_leaf()) {
       for (std::size_t i = part.first; i < part.last; ++i) visit(items_[i]);
       return;
     }
     Part near = part.first_half(), far = part.second_half();
-    double to_near = least_distance(p, boxes_[near.node]), to_far = least_distance(p, boxes_[far.node]);
+    double to_near = least(boxes_[near.node]), to_far = least(boxes_[far.node]);
     if (to_far < to_near) {
       std::swap(near, far);
       std::swap(to_near, to_far);
     }
-    visit_near(near, to_near, p, most, visit);
-    visit_near(far, to_far, p, most, visit);
+    visit_near(near, to_near, least, most, visit);
+    visit_near(far, to_far, least, most, visit);
   }
 
   std::vector<std::uint32_t> items_;

@@ -44,7 +44,8 @@ class Decisions {
       const bool now =
           from_before ? holds(run, change->before, was, p, was) : holds(run, zone.anchor(), run[0].inside, p, was);
       if (now == was) continue;
-      find(found, handle, slot, now ? +1 : -1, now || run[0].disk ? std::nullopt : zone.distance(run, p));
+      const bool elsewhere = now || run[0].disk || zoning_.metres;
+      find(found, handle, slot, now ? +1 : -1, elsewhere ? std::nullopt : zone.distance(run, p));
     }
     if (change && crossable > 0) found.push_back({NONE, slot, 0, {}});
   }
@@ -208,9 +209,7 @@ class Decisions {
     if (!was || area.margin == 0) return false;
     if (where == 0) return true;
     if (area.kind == Area::Kind::DISK) return compare_distance(p, area.center, area.radius, area.margin) <= 0;
-    return std::any_of(run.begin(), run.end(), [&](const Piece& piece) {
-      return compare_distance(p, nearest_part(p, piece.edge), area.margin) <= 0;
-    });
+    return std::any_of(run.begin(), run.end(), [&](const Piece& piece) { return area.is_near(p, piece.edge); });
   }
 
   // Reports the fences that a subject has passed through: it was outside, is outside, and the way meets the area.

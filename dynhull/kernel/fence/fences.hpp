@@ -28,8 +28,11 @@ struct Arrival {
 
 class Fences {
  public:
-  explicit Fences(const Slots& slots)
-      : zoning_(slots), reports_(zoning_), decisions_(zoning_, reports_), own_hulls_(zoning_, reports_, decisions_) {}
+  Fences(const Slots& slots, std::shared_ptr<const Metres> metres)
+      : zoning_(slots, std::move(metres)),
+        reports_(zoning_),
+        decisions_(zoning_, reports_),
+        own_hulls_(zoning_, reports_, decisions_) {}
   Fences(const Fences&) = delete;
 
   // What the entities report to.
@@ -47,6 +50,7 @@ class Fences {
   void set(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,
            const std::vector<std::uint32_t>* inside) {
     reports_.ready();
+    area.metres = zoning_.metres;
     const auto entry = numbers_.find(number);
     if (entry == numbers_.end()) return add_number(tree, number, std::move(area), cross, own, inside);
     const std::uint32_t handle = entry->second;

@@ -41,7 +41,7 @@ inline bool may_touch(const Strip& strip, const Box& box) {
 }
 
 inline Strip strip_of(const Area& area, Edge edge) {
-  return {edge, area.margin, area.kind == Area::Kind::DISK ? area.radius : -1};
+  return {edge, area.reach(edge), area.kind == Area::Kind::DISK ? area.radius : -1};
 }
 
 // The edges of an area in order; a disk has its center.

@@ -18,7 +18,9 @@ struct Zoning {
   static constexpr std::size_t CROWD = 96, MANY_PIECES = 32;  // beyond which a zone is divided
   static constexpr std::size_t LOOKAHEAD = 16;                // subjects that are being prefetched
 
-  explicit Zoning(const Slots& slots) : slots(&slots) { subjects.reserve(slots.end()); }
+  Zoning(const Slots& slots, std::shared_ptr<const Metres> metres) : slots(&slots), metres(std::move(metres)) {
+    subjects.reserve(slots.end());
+  }
 
   template <class Item>
   static void grow(std::vector<Item>& items, std::size_t extra) {
@@ -254,6 +256,7 @@ struct Zoning {
   }
 
   const Slots* slots;
+  std::shared_ptr<const Metres> metres;  // in which distances are; none: units of the plane
   Subjects subjects;
   MemberLists members;
   Zones zones;

@@ -16,9 +16,11 @@ class FenceIndex {
   }
 
  public:
-  explicit FenceIndex(KeyedHull& hull) : hull_(&hull) {
+  // `latitude`: sine and cosine of that of the centre, where distances are in metres.
+  FenceIndex(KeyedHull& hull, std::optional<std::pair<double, double>> latitude) : hull_(&hull) {
+    const auto metres = latitude ? std::make_shared<const Metres>(latitude->first, latitude->second) : nullptr;
     hull_->alone(ALL_ROWS, [&](Entities& entities, FramedTree&) {
-      auto fences = std::make_unique<Fences>(entities.slots());
+      auto fences = std::make_unique<Fences>(entities.slots(), metres);
       if (entities.attach(*fences)) fences_ = std::move(fences);
     });
     if (!fences_) throw nb::value_error("subjects has an index of fences already: detach it first");

@@ -177,7 +177,8 @@ void add_entities(nb::module_& module) {
 
 void add_fences(nb::module_& module) {
   nb::class_<FenceIndex>(module, "Fences", "Fences of one set of entities: see dynhull's class in Python.")
-      .def(nb::init<KeyedHull&>(), "entities"_a, nb::keep_alive<1, 2>())
+      .def(nb::init<KeyedHull&, std::optional<std::pair<double, double>>>(), "entities"_a, "latitude"_a.none(),
+           nb::keep_alive<1, 2>())
       .def("detach", &FenceIndex::detach, "End the reports of the entities.")
       .def("__len__", &FenceIndex::size)
       .def("has", &FenceIndex::has, "fence"_a, "Whether there is a fence of this number.")
