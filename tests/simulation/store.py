@@ -272,6 +272,10 @@ class FaultyStorage:
         """What some batches do to some keys."""
         return self._of_past(lambda: self._inner.key_changes(number, keys, after, until))
 
+    def ways(self, number: int, after: int, until: int, read: Callable[[Iterator[Any]], Any]) -> tuple[int, Any]:
+        """What a function makes of the moves of keys."""
+        return self._of_past(lambda: self._inner.ways(number, after, until, read))
+
     def _of_past(self, read: Callable[[], Found]) -> Found:
         self.give_way()
         self._fail("past")

@@ -1,13 +1,16 @@
 """Fences after the fact: hulls are rebuilt as of a moment, and the batches after it are compared as when they came."""
 
 from collections import deque
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable, Iterator, Set
 from functools import partial
+from typing import TypeVar
 
+from ..state.contents.live import AnyKeyedHull
 from ..state.errors import HullNotFoundError, HullUnsuitableError, NotStoredError, RevisionForgottenError
 from ..state.fences.model.config import FenceConfig
-from ..state.fences.model.records import FenceEvent
+from ..state.fences.model.records import FenceEvent, Key
 from ..state.fences.past import PastFence, changes_of
+from ..state.fences.sieve import Sieve, Sifted
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.records import CommitStamp, HullRow, Record
@@ -18,6 +21,8 @@ from .fences import Fences
 from .hulls import Hulls
 from .past import PastHulls
 from .watch_fence import EVENTS_TOGETHER
+
+T = TypeVar("T")
 
 # Rows of batches that one step applies, about: some milliseconds.
 STEP_ROWS = 4096
@@ -49,11 +54,12 @@ class _Batches:
         self._until = until
         self._read: deque[Record] = deque()
         self._after = hull.state.counts.revision
+        self._unsifted = 0  # the last revision of batches that were not sifted
 
     def commit(self) -> CommitStamp | None:
         """The commit of the next batch; None after the last. Reads the disk."""
         if not self._read and self._after < self._until:
-            self._read.extend(self._next())
+            self._read.extend(self._whole(lambda number: self._past.batches(number, self._after, self._until)))
             self._after = self._read[-1].revision
         if not self._read:
             return None
@@ -61,6 +67,20 @@ class _Batches:
         if record.committed is None:
             raise _without_time(self.hull.name, record.revision)
         return record.committed
+
+    def sifted(self, sieve: Sieve, waiting: Set[Key]) -> tuple[int, Sifted] | None:
+        """What may mean something of batches up to a revision, all of which are taken; None where each has to be."""
+        if self._read or self._after >= self._until or self._after < self._unsifted:
+            return None
+        keyed = self.hull.state.hull
+        assert isinstance(keyed, AnyKeyedHull)  # a fence compares its keys
+        sift = partial(sieve.sift, keyed, waiting)
+        last, found = self._whole(lambda number: self._past.ways(number, self._after, self._until, sift))
+        if found is None:
+            self._unsifted = last
+            return None
+        self._after = last
+        return last, found
 
     def take(self) -> Record:
         """The next batch, once `commit` has found it."""
@@ -72,13 +92,14 @@ class _Batches:
             self.hull.state.repeat(self.take())
         self.hull.counts = self.hull.state.counts
 
-    def _next(self) -> list[Record]:
+    def _whole(self, read: Callable[[int], T]) -> T:
+        """What is read of the past of the hull, which nobody has changed before."""
         number, after = self.hull.row.number, self._after
         try:
-            records = self._past.batches(number, after, self._until)
+            found = read(number)
             if self._past.erasures(number) != self.hull.erasures:
                 raise NotStoredError("keys were erased from the past meanwhile: begin again")
-            return records
+            return found
         except DamagedError:
             oldest = self._past.oldest_moment(number)
             if after >= oldest.revision:
@@ -106,6 +127,8 @@ class _Run:
         self._batches = batches
         self._until = until
         self._leads = leads
+        self._sieve = fence.sieve() if len(batches) == 1 else None
+        self._following: Iterator[int] = iter(())
         self.over = False
 
     def step(self) -> list[FenceEvent]:
@@ -114,6 +137,11 @@ class _Run:
         hulls = [each.hull for each in self._batches]
         while rows < STEP_ROWS and len(made) < EVENTS_TOGETHER:
             self._pasts.require_room(hulls)
+            followed = self._follow()
+            if followed:
+                rows += followed
+                made += fence.take()
+                continue
             coming = [(first.number, each) for each in self._batches if (first := each.commit()) is not None]
             if not coming or (self._leads and self._batches[0].commit() is None):
                 if self._until is not None:
@@ -130,6 +158,19 @@ class _Run:
             rows += sum(1 + len(record.rows) for records in commit.values() for record in records)
             made += fence.take()
         return made
+
+    def _follow(self) -> int:
+        """Follow what was sifted, or sift what comes next. Returns the rows applied; 0 where each batch has to be."""
+        followed = next(self._following, 0)
+        if followed or self._sieve is None:
+            return followed
+        (batches,) = self._batches
+        found = batches.sifted(self._sieve, self._fence.waiting)
+        if found is None:
+            return 0
+        last, sifted = found
+        self._following = self._fence.follow(batches.hull, sifted, last)
+        return next(self._following)
 
 
 def _take(batches: _Batches, number: int, records: list[Record]) -> int:

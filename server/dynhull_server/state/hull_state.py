@@ -137,12 +137,13 @@ class HullState:
         self.torn = False
 
     def repeat(self, record: Record) -> None:
-        """Apply the next revision again, as when it was made. Producers do not matter."""
+        """Apply the next revision again, as when it was made, or what several ones come to. Producers do not matter."""
         changes = self.hull.changes
         self.torn = True
         self.contents.replay((record,))
         self._follow_center()
-        self._applied(len(self.hull), _cause_of(record), hull_changed=self.hull.changes != changes)
+        cause, hull_changed = _cause_of(record), self.hull.changes != changes
+        self._applied(len(self.hull), cause, hull_changed=hull_changed, revision=record.revision)
         self.committed = record.committed
         self.torn = False
 
@@ -284,10 +285,10 @@ class HullState:
         assert isinstance(self.hull, GeographicHull)  # it has a frame
         return globe.follow(self.hull.center)
 
-    def _applied(self, points: int, cause: Cause, *, hull_changed: bool) -> None:
-        """Update the counts and what was sent after a change."""
+    def _applied(self, points: int, cause: Cause, *, hull_changed: bool, revision: int | None = None) -> None:
+        """Update the counts and what was sent after a change, by default that of the next revision."""
         before, center = self.counts, self.center
-        revision, outlined = before.revision + 1, before.outlined
+        revision, outlined = before.revision + 1 if revision is None else revision, before.outlined
         if hull_changed:
             outlined = self._changed_at = revision
             self._sent.changed(revision)

@@ -1,6 +1,6 @@
 """A storage in memory: for servers without a data folder, and as the simplest implementation of the port."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Lock
 
@@ -23,8 +23,9 @@ from ..state.fences.model.records import (
 )
 from ..state.records import Append, CommitStamp, Contents, Create, Delete, HullRow, Kept, Keys, Record
 from ..state.tracks import KeyChanges
-from .of_keys import changes_of_keys, contents_of_keys
-from .past import Erasure, Hole, Moment, StoredHistory, created
+from ..state.ways import KeyWays
+from .of_keys import changes_of_keys, contents_of_keys, ways_of
+from .past import Erasure, Found, Hole, Moment, StoredHistory, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 from .segments.columns import columns_of
 
@@ -186,6 +187,15 @@ class MemoryStorage:
         records = self.batches(number, after, until)
         columns = columns_of(records, self._hulls[number].row.settings.identity)
         return records[-1].revision, changes_of_keys(columns, keys)
+
+    def ways(
+        self, number: int, after: int, until: int, read: Callable[[Iterator[KeyWays]], Found]
+    ) -> tuple[int, Found | None]:
+        """What a function makes of the moves of keys of some batches."""
+        records = self.batches(number, after, until)
+        columns = columns_of(records, self._hulls[number].row.settings.identity)
+        ways = ways_of(columns)
+        return records[-1].revision, None if ways is None else read(iter([ways]))
 
     def history(self, number: int) -> StoredHistory:
         """What is there of a hull."""

@@ -5,10 +5,11 @@ import json
 import numpy as np
 import numpy.typing as npt
 
-from dynhull.keys import PackedKeys, key_list
+from dynhull.keys import PackedKeys, key_list, take_keys
 
-from ..state.records import Contents, Keys, Times
+from ..state.records import FOREVER, NO_TIME, Contents, Keys, Times
 from ..state.tracks import EXPIRE, NO_KEY, PUT, REMOVE, KeyChanges
+from ..state.ways import KeyWays, Stamps
 from .segments import columns as segment
 from .segments.columns import SegmentColumns
 from .segments.gathered import key_codes
@@ -46,6 +47,30 @@ def changes_of_keys(columns: SegmentColumns, keys: Keys) -> KeyChanges:
         columns.clock[chosen],
         {revision: each["condition"] for revision, each in words.items() if "condition" in each},
     )
+
+
+def ways_of(columns: SegmentColumns) -> KeyWays | None:
+    """What batches do to all keys, one key after the other; None if they do more than to put and remove keys."""
+    ops, keyed = columns.op, columns.keyed
+    plain = (
+        bool((columns.kind == segment.ROWS).all())
+        and bool(((ops == segment.PUT) | (ops == segment.REMOVE) == keyed).all())
+        and columns.detail.count(None) == len(columns)
+        and bool((columns.committed != NO_TIME).all())
+        and bool((columns.clock == NO_TIME).all())
+        and bool((columns.event_time == NO_TIME).all())
+        and bool((columns.expire_time == FOREVER).all())
+    )
+    if not plain:
+        return None
+    codes = key_codes(columns.keys)
+    order = np.argsort(codes, kind="stable")
+    starts = np.flatnonzero(np.diff(codes[order], prepend=-1))
+    rows = np.flatnonzero(keyed)[order]
+    x, y = columns.points[rows].T
+    of_all = Stamps(columns.revision, columns.commit, columns.committed)
+    stamps = of_all[rows]
+    return KeyWays(take_keys(columns.keys, order[starts]), starts, x, y, lambda: stamps, lambda: of_all)
 
 
 def _places(keys: Keys, wanted: Keys) -> npt.NDArray[np.int32]:

@@ -1,13 +1,17 @@
 """The port to the past: what a reader of earlier revisions asks of whatever keeps them."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from ..state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
 from ..state.tracks import KeyChanges
+from ..state.ways import KeyWays
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +130,15 @@ class Past(Protocol):
 
     def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What some of the batches after a revision do to some keys, and the last revision of these batches."""
+
+    def ways(
+        self, number: int, after: int, until: int, read: Callable[[Iterator[KeyWays]], Found]
+    ) -> tuple[int, Found | None]:
+        """What a function makes of all moves of keys of some batches after a revision, and their last revision.
+
+        It may be called again, from the beginning. None in place of what it returns if these batches do anything but
+        put and remove keys, or have no times; it is not called then.
+        """
 
     def erasures(self, number: int) -> tuple[Erasure, ...]:
         """The erasures that concern what is there of a hull, the oldest first.

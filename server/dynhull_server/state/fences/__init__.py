@@ -10,6 +10,7 @@ events/     events as columns, from crossings to numbered blocks; the recent one
 trip/       the part of a trip: comparisons, requests to create, replace and delete, consumers, deadlines, delayed
             events, and the leg at one fence
 past        a fence after the fact: the events that it would have made of revisions that are applied again
+sieve       which of these may make events, where the area never changes: the others are not applied one by one
 recovery/   fences as the storage has them, after a start and a failed commit; sides computed again for the scrub
 
 Beside types, each folder uses only those above it; `past` uses those of live fences.

@@ -1,6 +1,7 @@
 """A fence after the fact: the events that it would have made, by what makes those of fences that are there."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import zip_longest
 
 from ..contents.keyed import Keyed
@@ -11,6 +12,7 @@ from ..limits import FenceLimits
 from ..records import Expiry, Record
 from ..requests import Birth
 from .events.recent import RecentEvents
+from .index.cells import cells_of
 from .index.checked import CheckedArea
 from .index.keys_changed import KeysChanged, of_record
 from .index.line import Line
@@ -19,6 +21,7 @@ from .model.fence import Fence
 from .model.records import FenceEvent, Key
 from .model.requests import CreateFence, PassTime
 from .model.tallies import Tallies
+from .sieve import Sieve, Sifted
 from .trip.comparison import Ground
 from .trip.part import FencePart
 
@@ -85,6 +88,47 @@ class PastFence:
         part = self._part()
         part.repeated(changed, time, expiry=len(change) == 1 and isinstance(change[0][1][-1].rows, Expiry))
         self._made += self._events(part)
+
+    @property
+    def waiting(self) -> set[Key]:
+        """The keys of the subjects of which it waits for reports, or for time."""
+        dwelling, delays = self._fence.dwelling, self._fence.delays
+        found = [] if dwelling is None else dwelling.subjects()
+        return {key for _, key in found} | {subject[1] for subject, _ in ([] if delays is None else delays.all())}
+
+    def sieve(self) -> Sieve | None:
+        """Lets those moves through that may mean something for it; None if others do, too."""
+        config, subjects = self._fence.row.config, next(iter(self._fence.subjects.values()), None)
+        if subjects is None:
+            return None
+        settings = subjects.hull.row.settings
+        if settings.geographic or settings.window is not None or settings.by_event_time:
+            return None  # their batches do more than they say
+        cells = cells_of(config)
+        return None if cells is None else Sieve(cells, config.crosses, bool(config.delays or config.dwell))
+
+    def follow(self, hull: Hull, sifted: Sifted, last: int) -> Iterator[int]:
+        """Apply what was let through of revisions, with its events, then the others. Yields the rows of each."""
+        for moved in sifted.moved():
+            commit = moved.record.committed
+            assert commit is not None  # a sieve reads it
+            self.pass_time(commit.time)
+            if len(moved.before):
+                self._pass_over(hull, replace(moved.record, revision=moved.record.revision - 1, rows=moved.before))
+            if len(moved.record.rows):
+                self.repeat([(hull, [moved.record])], commit.time)
+            else:
+                self._pass_over(hull, moved.record)
+            yield 1 + len(moved.before) + len(moved.record.rows)
+        self._pass_over(hull, Record(last, sifted.lasts, cause="batch"))
+        yield 1 + len(sifted.lasts)
+
+    def _pass_over(self, hull: Hull, record: Record) -> None:
+        """Apply what makes no event."""
+        hull.state.repeat(record)
+        hull.counts = hull.state.counts
+        crossings = self._fence.subjects[hull.name].take()
+        assert not crossings.changes.any(), "no key changes sides"
 
     def _part(self, *requests: CreateFence | PassTime) -> FencePart:
         """What a trip with these requests does to the fence."""

@@ -1,7 +1,7 @@
 """Reading hulls as they were before what the journal has: from segments."""
 
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
@@ -9,13 +9,14 @@ from threading import Lock, Thread
 
 from ...state.records import CommitStamp, Kept, Keys, Record
 from ...state.tracks import KeyChanges
+from ...state.ways import KeyWays
 from ..of_keys import changes_of_keys
-from ..past import Hole, Moment, created
+from ..past import Found, Hole, Moment, created
 from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.columns import Batches, contents_of
 from ..segments.gathered import gathered
-from ..segments.parquet import from_parquet, keys_from_parquet
+from ..segments.parquet import from_parquet, keys_from_parquet, ways_from_parquet
 from .chunks import state_from
 from .ledger import HullRows
 from .past_rows import STEP_POINTS
@@ -100,6 +101,16 @@ class Filed:
         with self._noted(segment, BATCHES), self._archive.parts(name, facts.wrote) as file:
             columns, _, _ = keys_from_parquet(file, name, keys)
         return last, changes_of_keys(columns.between(after, last), keys)
+
+    def ways(
+        self, hull: HullRows, after: int, until: int, read: Callable[[Iterator[KeyWays]], Found]
+    ) -> tuple[int, Found | None]:
+        """What a function makes of the moves of keys of one segment, from a revision on."""
+        segment = _segment(hull, after + 1)
+        name, last = segment.file + BATCHES, min(until, segment.last)
+        with self._noted(segment, BATCHES):
+            ways = ways_from_parquet(self._archive.read(name, segment.facts.wrote), name, after, last)
+            return last, None if ways is None else read(ways)
 
     def forget(self, file: str) -> None:
         """Forget what a file had, which is there no more."""

@@ -17,7 +17,8 @@ from ...state.errors import words
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
 from ...state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
 from ...state.tracks import KeyChanges
-from ..of_keys import changes_of_keys, contents_of_keys
+from ...state.ways import KeyWays
+from ..of_keys import changes_of_keys, contents_of_keys, ways_of
 from ..past import Erasure, Hole, Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from ..segments.archive import NEEDS, Archive, is_installed
@@ -233,6 +234,23 @@ class RowStorage(ABC):
         return self._of_past(
             number,
             lambda filed, hull: filed.key_changes(hull, keys, after, until) if after < hull.oldest else None,
+            in_journal,
+        )
+
+    def ways(
+        self, number: int, after: int, until: int, read: Callable[[Iterator[KeyWays]], Found]
+    ) -> tuple[int, Found | None]:
+        """What a function makes of the moves of keys of some batches."""
+
+        def in_journal(reader: Reader, hull: HullRows) -> tuple[int, Found | None]:
+            require_kept(hull, after)
+            columns = columns_between(reader, hull, after, min(until, hull.last), GATHERED_ROWS)
+            ways = ways_of(columns)
+            return int(columns.revision[-1]), None if ways is None else read(iter([ways]))
+
+        return self._of_past(
+            number,
+            lambda filed, hull: filed.ways(hull, after, until, read) if after < hull.oldest else None,
             in_journal,
         )
 

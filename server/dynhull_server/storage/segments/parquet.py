@@ -8,7 +8,7 @@ way of one key is one read, and so that numbers differ little from those before 
 from __future__ import annotations
 
 from bisect import bisect_left
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,12 +17,13 @@ from dynhull.keys import PackedKeys, key_list
 
 from ...state.contents.key_rows import select_keys
 from ...state.records import FOREVER, NO_TIME, Identity
+from ...state.ways import KeyWays, Stamps
 from ..port import DamagedError
 from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
 from .gathered import key_codes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
     from io import IOBase
 
     import numpy.typing as npt
@@ -68,6 +69,8 @@ WORDS: tuple[str, ...] = ("cause", "kind", "op", "key")
 CODED = ("key", "cause", "kind", "op", "detail")  # what is read as places in a list of words
 # Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
 SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
+MOVES = ("put", "remove")
+TOGETHER = 4  # groups that are read at once where one after the other is needed
 SHARED = 4  # rows of a commit, on average, from which on its time is an index into those of all
 
 
@@ -158,7 +161,6 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
                 pa.BufferReader(data),
                 metadata=file.metadata,
                 read_dictionary=CODED[1:],
-                page_checksum_verification=True,
             )
         return _all(file), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
@@ -183,11 +185,93 @@ def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentCol
         raise DamagedError(f"{name} is damaged: {error}") from error
 
 
+def ways_from_parquet(data: bytes, name: str, after: int, until: int) -> Iterator[KeyWays] | None:
+    """What the batches after a revision up to another one do to all keys, a group of rows at a time.
+
+    None if the batches of the file do more than to put and remove keys, or have no times.
+
+    Raises:
+        DamagedError: it is no file of ours, or of a newer version; also when a group is read.
+    """
+    import pyarrow as pa
+
+    try:
+        file = _opened(pa.BufferReader(data), name)
+        groups = [file.metadata.row_group(group) for group in range(file.num_row_groups)]
+        place = {file.metadata.schema.column(column).path: column for column in range(file.metadata.num_columns)}
+        if not all(_is_plain(group, place) for group in groups):
+            return None
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{name} is damaged: {error}") from error
+    return _ways(file, name, after, until)
+
+
+def _is_plain(group: pq.RowGroupMetaData, place: dict[str, int]) -> bool:
+    """Whether rows do nothing but put and remove keys, as their statistics say."""
+
+    def of(name: str) -> Any:
+        found = group.column(place[name]).statistics
+        return found if found is not None and found.has_null_count else None
+
+    found = {name: of(name) for name in ("event_time", "expire_time", "clock", "detail", "committed", "kind", "op")}
+    if any(each is None for each in found.values()):
+        return False
+    kind, op = found["kind"], found["op"]
+    return (
+        all(found[name].null_count == group.num_rows for name in ("event_time", "expire_time", "clock", "detail"))
+        and found["committed"].null_count == 0
+        and (kind.min, kind.max, kind.null_count) == ("rows", "rows", 0)
+        and (op.null_count == group.num_rows or (op.min in MOVES and op.max in MOVES))
+    )
+
+
+def _ways(file: pq.ParquetFile, name: str, after: int, until: int) -> Iterator[KeyWays]:
+    import pyarrow as pa
+
+    identity: Any = file.schema_arrow.metadata[b"dynhull.identity"].decode()
+    of_revision = file.schema_arrow.names.index("revision")
+    try:
+        for first in range(0, file.num_row_groups, TOGETHER):
+            groups = range(first, min(first + TOGETHER, file.num_row_groups))
+            table = file.read_row_groups(groups, columns=["key", "x", "y"])
+            codes, words = _coded(table.column("key"))
+            x, y = (_coordinates(table, each) for each in "xy")
+            found = [file.metadata.row_group(group).column(of_revision).statistics for group in groups]
+            within: slice | Rows = slice(None)
+            if not all(after < each.min and each.max <= until for each in found):
+                revisions = _stamps(file, groups, within).revisions
+                within = np.flatnonzero((after < revisions) & (revisions <= until))
+            rows = within
+            if codes.min(initial=0) == NONE or isinstance(within, np.ndarray):
+                rows = np.arange(len(table))[within]
+                rows = rows[codes[rows] != NONE]
+                codes, x, y = codes[rows], x[rows], y[rows]
+            starts = _starts(codes, words)
+            keys = _packed([words], codes[starts], identity)
+            yield KeyWays(keys, starts, x, y, *(partial(_stamps, file, groups, each) for each in (rows, within)))
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def _starts(codes: npt.NDArray[np.int32], words: pa.Array) -> Rows:
+    """Where another key begins: of integers there is a word for each row, equal or not."""
+    import pyarrow as pa
+
+    values = words.take(pa.array(codes)).to_numpy() if pa.types.is_uint64(words.type) else codes
+    return np.flatnonzero(np.append(True, values[1:] != values[:-1])[: len(values)])
+
+
+def _stamps(file: pq.ParquetFile, groups: Sequence[int], rows: slice | Rows) -> Stamps:
+    """The revisions of some rows of groups, and their commits."""
+    table = file.read_row_groups(groups, columns=["revision", "commit", "committed"])
+    return Stamps(*(_integers(table, each, NO_TIME)[rows] for each in ("revision", "commit", "committed")))
+
+
 def _opened(source: pa.NativeFile, name: str) -> pq.ParquetFile:
     """A file whose words are read as places in a list of them. DamagedError if it is none of ours, or too new."""
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(source, read_dictionary=CODED, page_checksum_verification=True)
+    file = pq.ParquetFile(source, read_dictionary=CODED)
     found = file.schema_arrow.metadata or {}
     if FORMAT not in found:
         raise DamagedError(f"{name} is a Parquet file of another program")

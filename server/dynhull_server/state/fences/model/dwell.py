@@ -77,6 +77,10 @@ class Dwelling:
             ):
                 self._end(event.former)
 
+    def subjects(self) -> Iterable[Subject]:
+        """Those that wait."""
+        return self._numbers.keys()
+
     def due(self, until: int, most: int) -> list[tuple[Subject, int]]:
         """At most that many subjects that have counted since `until` or longer, with their times."""
         found = []
