@@ -88,9 +88,9 @@ class Queues:
         return list(dict.fromkeys(self._queues[name] for name in names))
 
     def _line_queue(self, name: str) -> Queue | None:
-        """The queue of a fence whose prefix a new name has; None if there is none."""
+        """The queue of a fence whose prefix the name of a new hull has; None if there is none."""
         for key, prefix in self._prefixes.items():
-            if name.startswith(prefix):
+            if name.startswith(prefix) and not name.startswith(PREFIX):
                 queue = self._queues[key]
                 queue.guests = (queue.guests or set()) | {name}
                 return queue
