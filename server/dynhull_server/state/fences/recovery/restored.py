@@ -78,7 +78,7 @@ def bring_back(kept: Sequence[KeptFence], registry: Registry) -> list[Fence]:
         fence.restored(each)
         config = each.row.config
         fence.area = None if config.area_hull is None else registry.get(config.area_hull)
-        if config.kind == "other" and fence.area is not None:
+        if config.kind == "other" and fence.area is not None and fence.watched is None:
             fence.pair = Pair(fence.area, registry.get(config.subjects), config.near)
             fence.pair.look()
         if fence.watched is not None:
