@@ -1,6 +1,7 @@
 """Conversion of alarms and their events to messages."""
 
 from collections.abc import Mapping
+from math import isfinite
 
 from dynhull_proto.v1 import alarm_pb2, alarm_service_pb2
 
@@ -116,7 +117,7 @@ def encode_alarm_event(event: FenceEvent, rule: AlarmRule) -> alarm_pb2.AlarmEve
         for members in event.inside:
             message.keys.CopyFrom(encode_keys(members.keys, PACKED))
         message.bound = (rule.raises if event.type is EventType.BEGIN else rule.clears).limit
-        if not event.causes & Cause.REMOVED and event.distance is not None:
+        if not event.causes & Cause.REMOVED and event.distance is not None and isfinite(event.distance):
             message.value = event.distance
     else:
         message.raised.extend(each.hull for each in event.inside)

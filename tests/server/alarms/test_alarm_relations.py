@@ -202,14 +202,19 @@ def test_they_outlive_a_kill(tmp_path: Path) -> None:
             square(client, hull, 9 * (hull == "w/b"))
         for name, when in [("near", "near w/b 2"), ("in", "vertex in w/b"), ("key", "vertex e")]:
             client.create_alarm(name, prefix="w/", when=when)
+        client.create_hull("w/empty", keyed="str")
+        client.create_alarm("one", hull="w/a", when="near w/b 2")
+        client.create_alarm("apart", hull="w/a", when="not near w/empty 5")
         square(client, "w/b", 1)
         process.process.kill()
     with server_process("--data", str(tmp_path)) as process, HullClient(process.address) as client:
-        assert [client.get_alarm(name).raised for name in ("near", "in", "key")] == [1, 1, 0]
+        assert [client.get_alarm(name).raised for name in ("near", "in", "key", "one", "apart")] == [1, 1, 0, 1, 1]
         assert client.verify("w/a").fence_differences == ()
         client.put("w/a", ["e"], [(-1, -1)])
         square(client, "w/b", 7)
-        assert [each.type for each in seen(client, "near")] == ["raised", "cleared"]
+        for name in ("near", "one"):
+            assert [each.type for each in seen(client, name)] == ["raised", "cleared"]
+        assert [each.value for each in seen(client, "apart")] == [None]
         assert [each.type for each in seen(client, "in")] == ["raised", "cleared"]
         (event,) = seen(client, "key")
         assert (event.hull, event.keys) == ("w/a", ("e",))

@@ -75,7 +75,7 @@ def _raise(leg: FenceLeg, watched: Watched, now: int, more: int = 0) -> None:
     watched_hulls(leg.fence).put_raised(watched, raised=True)
     _put(leg, watched, waiting._replace(enters=False))
     previous = None if waiting.standing is None else waiting.standing.previous
-    value = watched.silent(now) if rule.silence else _finite(watched.value())
+    value = watched.silent(now) if rule.silence else watched.value()
     leg.alarmed(
         EventType.BEGIN,
         waiting.causes | more,
@@ -91,7 +91,7 @@ def _clear(leg: FenceLeg, watched: Watched, cause: Cause, before: Seen | None, n
     rule = _rule(leg)
     watched_hulls(leg.fence).put_raised(watched, raised=False)
     _put(leg, watched, _rest(watched))
-    value = None if gone else 0.0 if rule.silence else _finite(watched.value())
+    value = math.inf if gone else 0.0 if rule.silence else watched.value()
     previous = None if before is None else _finite(watched.value(before))
     began = _revision(watched, cause), leg.time(now)
     leg.alarmed(EventType.CEASE, cause, watched, (value, rule.clears.limit, previous), began, now)
@@ -105,7 +105,7 @@ def _revision(watched: Watched, cause: Cause) -> int:
 
 
 def _finite(value: float) -> float | None:
-    """A value; None for the distance from an empty hull."""
+    """A value before; None for the distance from an empty hull."""
     return value if math.isfinite(value) else None
 
 

@@ -169,7 +169,7 @@ class FenceLeg:
         kind: EventType,
         causes: int,
         watched: Watched,
-        values: tuple[float | None, float, float | None],
+        values: tuple[float, float, float | None],
         began: tuple[int, int],
         now: int,
         keys: Keys | None = None,
@@ -180,7 +180,8 @@ class FenceLeg:
             kind: BEGIN if it is raised, CEASE if it is cleared.
             causes: why.
             watched: the hull.
-            values: the measure, the bound and the measure before: the distance and the previous position of the event.
+            values: the measure, infinite for none, the bound and the measure before: the distance and the previous
+                position of the event.
             began: the revision with which the condition began to hold, and its time: the revision of the area and the
                 event time.
             now: the time.
