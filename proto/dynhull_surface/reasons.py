@@ -100,7 +100,7 @@ REASONS: Mapping[str, Reason] = {
         "The alarm was restored from a backup, or deleted and created again; its sequences are others.",
     ),
     "CONSUMER_NOT_FOUND": Reason(
-        Code.NOT_FOUND, "ConsumerNotFoundError", "The fence or alarm has no consumer of that name."
+        Code.NOT_FOUND, "ConsumerNotFoundError", "The fence, the alarm or the feed has no consumer of that name."
     ),
     "DISK_FULL": Reason(
         Code.RESOURCE_EXHAUSTED, "LimitExceededError", "The server's disk is full; nothing was applied.", http=507

@@ -69,11 +69,11 @@ class Composed:
             BETWEEN: partial(self._between, partial(_names_of_past_fence, max_corners)),
         }
         fences = fence_service_pb2
-        together = partial(self._common_link, pb.ApplyTogetherRequest, _names_of_batches, _require_write)
+        all_of = partial(self._common_link, pb.ApplyTogetherRequest, _names_of_batches, _require_write)
         create = partial(self._common_link, fences.CreateFenceRequest, fence_names, _require_of_fence)
         replace = partial(self._common_link, fences.ReplaceFenceRequest, fence_names, _require_of_fence)
         self.routes: dict[str, Route] = {
-            f"{HULLS}/ApplyTogether": together,
+            f"{HULLS}/ApplyTogether": all_of,
             f"{HULLS}/Locate": partial(self._common_link, pb.LocateRequest, names_with_keys, _require_read),
             f"{HULLS}/Distance": partial(self._common_link, pb.DistanceRequest, names_with_keys, _require_read),
             f"{FENCE_CALLS}/CreateFence": create,
@@ -109,9 +109,7 @@ class Composed:
         with call.cutoff():
             message = await call.receive()
         call.finish()
-        pages = await self._relay.found(
-            lambda: _together(link.ask(method, call, message) for link in self._relay.links)
-        )
+        pages = await self._relay.found(lambda: together(link.ask(method, call, message) for link in self._relay.links))
         if len(pages) == 1:
             return pages[0]
         _, _, size = decode.decode_page(request.FromString(message))  # each worker has accepted it
@@ -143,7 +141,7 @@ class Composed:
             (link, pb.GetHullRequest(name=request.name, min_revision=request.min_revision)),
             (other_link, pb.GetHullRequest(name=request.other_name, min_revision=request.other_min_revision)),
         )
-        read = await _together(
+        read = await together(
             each.ask(f"{HULLS}/GetHull", call, question.SerializeToString()) for each, question in wanted
         )
         hull, other = map(pb.GetHullResponse.FromString, read)
@@ -249,7 +247,7 @@ def _counts(hull: hull_pb2.Hull) -> Counts:
     return Counts(hull.revision, hull.point_count, hull.distinct_point_count, center=center)
 
 
-async def _together(asked: Iterable[Awaitable[bytes]]) -> list[bytes]:
+async def together(asked: Iterable[Awaitable[bytes]]) -> list[bytes]:
     """The answers of several workers. The first refusal in their order is raised, after all have answered."""
     found = await asyncio.gather(*asked, return_exceptions=True)
     for each in found:

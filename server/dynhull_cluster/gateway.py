@@ -31,6 +31,7 @@ from dynhull_server.settings import Settings
 
 from . import worker_link
 from .composed import Composed
+from .merged_consumers import MergedConsumers
 from .merged_feeds import FEED, MergedFeeds
 from .relay import Relay, Route, within
 from .shared_fences import WATCH_FENCE, SharedFences
@@ -91,6 +92,7 @@ class Gateway:
         self._many = SharedMany(self._relay, metrics, ManyQuotas(settings))
         self._fences = SharedFences(self._relay, metrics)
         self._feeds = MergedFeeds(self._relay, metrics)
+        self._consumers = MergedConsumers(self._relay)
         self._server = grpc_server(settings, shared_port=True)
         self._serving = False
         self._all_well = asyncio.Event()
@@ -174,6 +176,8 @@ class Gateway:
         path = f"/{service.full_name}/{method.name}"
         if path in self._composed.works:
             return self._composed.works[path]
+        if path in self._consumers.works:
+            return self._consumers.works[path]
         if path == WATCH:
             return self._watches.watch
         if path == WATCH_MANY:

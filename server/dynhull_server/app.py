@@ -106,6 +106,7 @@ class Server:
             max_producers_per_caller=settings.max_producers_per_caller,
             resume_bytes=settings.resume_bytes,
             max_past_rows=settings.max_past_rows,
+            max_feed_consumers=settings.max_feed_consumers,
             fences=FenceLimits(
                 max_fences=settings.max_fences,
                 max_alarms=settings.max_alarms,

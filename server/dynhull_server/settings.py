@@ -191,6 +191,7 @@ class Settings(BaseModel):
 
     max_feeds: int = Field(1_000, ge=1, description="Largest number of simultaneous feeds of batches.")
     max_feeds_per_caller: int = Field(100, ge=1, description="The same per token, or without tokens per address.")
+    max_feed_consumers: int = Field(1_000, ge=1, description="Largest number of durable consumers of feeds.")
 
     max_fences: int = Field(100_000, ge=1, description="Largest number of fences.")
     max_alarms: int = Field(100_000, ge=1, description="Largest number of alarms.")

@@ -58,6 +58,7 @@ EXPORTED = [
     "Event",
     "Feed",
     "FeedBatch",
+    "FeedConsumer",
     "FeedHeld",
     "Fence",
     "FenceConsumer",

@@ -16,6 +16,7 @@ from refusal import refusal
 from dynhull.margin import max_margin
 from dynhull_client import (
     Batch,
+    ConsumerNotFoundError,
     FeedBatch,
     HullClient,
     HullNotFoundError,
@@ -23,6 +24,7 @@ from dynhull_client import (
     InvalidRequestError,
     PermissionDeniedError,
     Prefix,
+    RevisionForgottenError,
     UnauthenticatedError,
 )
 from dynhull_cluster.placement import worker_of
@@ -167,6 +169,41 @@ def test_reads_of_all_workers_are_answered_in_order(client: HullClient) -> None:
     assert gap.result().distance == 6.0
     assert isinstance(missing.exception(), HullNotFoundError)
     assert last.result().sides.tolist() == [1]
+
+
+def test_a_consumer_of_a_prefix_has_its_place_at_all_workers(client: HullClient) -> None:
+    names = [f"{part}/consumed" for part in ("north", "fleet")]
+    for name in names:
+        client.create_hull(name, keyed="str")
+        client.ack_feed(name, consumer="index", after=0)
+        for number in range(2):
+            client.put(name, ["k"], [(number, 0)])
+
+    def next_of_each() -> set[tuple[str, int]]:
+        found: list[FeedBatch] = []
+        with client.feed(prefix="", consumer="index") as feed:
+            while len(found) < len(names) or found[-1].after is None:
+                found += [each for each in [next(feed)] if each.hull in names]
+        client.ack_feed(prefix="", consumer="index", after=found[-1].after)
+        return {(each.hull, each.revision) for each in found}
+
+    seen = next_of_each()
+    while len(seen) < 2 * len(names):
+        seen |= next_of_each()
+    for name in names:
+        client.put(name, ["k"], [(5, 0)])
+    assert next_of_each() == {(name, 3) for name in names}
+    listed = [(each.hull, each.prefix, each.name) for each in client.list_feed_consumers()]
+    assert listed == [(None, "", "index"), *((name, None, "index") for name in sorted(names))]
+    with pytest.raises(RevisionForgottenError):
+        client.ack_feed(prefix="", consumer="index", after=b"0" * 20)
+    client.delete_feed_consumer(prefix="", consumer="index")
+    with pytest.raises(ConsumerNotFoundError):
+        client.delete_feed_consumer(prefix="", consumer="index")
+    for name in names:
+        client.delete_feed_consumer(name, consumer="index")
+        client.delete_hull(name)
+    assert list(client.list_feed_consumers()) == []
 
 
 def test_the_feed_of_a_prefix_is_merged_from_all_workers(client: HullClient) -> None:

@@ -96,10 +96,27 @@ def fill(client: HullClient) -> None:
     for first in FIRSTS:
         client.create_hull(f"{first}/hull", keyed="str")
         client.create_fence(f"{first}/fence", SQUARE, Prefix(f"{first}/"))
+        client.ack_feed(f"{first}/hull", consumer="index", after=0)
     for number in range(1, 6):
         places = [[number % 2 * 9 + 1, 1], [2, 2]]
         batches = {f"{first}/hull": Batch(keys=["k", f"k{number}"], points=places) for first in FIRSTS}
         client.transfer(batches, producer="p", sequence=number)
+        if number == 3:
+            with client.feed(prefix="a/", after=0) as feed:
+                read = [next(feed) for _ in range(number)]
+            client.ack_feed(prefix="a/", consumer="sink", after=read[-1].after or b"")
+    client.ack_feed("a/hull", consumer="index", after=4)
+
+
+def goes_on(client: HullClient) -> None:
+    """The consumers of feeds are where they were."""
+    assert [each.after for each in client.list_feed_consumers("a/")][1:] == [4]
+    with client.feed("a/hull", consumer="index") as feed:
+        assert next(feed).revision == 5
+    with client.feed("b/hull", consumer="index") as feed:
+        assert next(feed).revision == 1
+    with client.feed(prefix="a/", consumer="sink") as feed:
+        assert [next(feed).revision for _ in range(3)] == [0, 4, 5]
 
 
 def events(client: HullClient, fence: str, last: int) -> list[FenceEvent]:
@@ -159,6 +176,7 @@ def test_a_database_is_divided_while_all_kinds_of_callers_go_on(url: str) -> Non
         assert (done.exit_code, partitions(url)) == (0, PARTITIONS), done.output
         more(callers)
         finish(callers)
+        goes_on(client)
         with pytest.raises(HullUnsuitableError):
             client.transfer({f"{each}/hull": Batch(remove=["k"]) for each in FIRSTS})
         assert seen(client) == before

@@ -14,6 +14,7 @@ from folders import appended, event, events, fence_row, fill_fence, read_fence, 
 from dynhull.keys import PackedKeys
 from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
+from dynhull_server.state.feed_consumers import ConsumerId, DropFeedConsumer, FedBy, FeedConsumer, PutFeedConsumer
 from dynhull_server.state.fences.events.block import AppendEvents, block_of
 from dynhull_server.state.fences.model.records import (
     NO_WAITS,
@@ -682,6 +683,22 @@ def test_settings_and_consumers_of_a_fence_change(opened):
     for _ in range(2):
         kept = read_fence(opened.storage, 9)
         assert (kept.row, kept.consumers) == (changed, {"post": Consumer("post")})
+        opened.reopen()
+
+
+def test_consumers_of_feeds_come_back(opened):
+    fenced(opened, 1)
+    of_hull, of_prefix = ConsumerId(FedBy("fleet"), "index"), ConsumerId(FedBy("", True), "index")
+    first, second = FeedConsumer(of_hull, "uid", 2**62), FeedConsumer(of_prefix, "7", 3, 2**50)
+    opened.commit(PutFeedConsumer(FeedConsumer(of_hull, "before", 1)), PutFeedConsumer(second))
+    opened.commit(PutFeedConsumer(FeedConsumer(of_hull, "between", 2)), PutFeedConsumer(first))
+    opened.carry_out(opened.storage.sweep())
+    for _ in range(2):
+        assert sorted(opened.storage.feed_consumers(), key=lambda each: each.id) == [second, first]
+        opened.reopen()
+    opened.commit(DropFeedConsumer(of_hull), DropFeedConsumer(of_hull), Delete(1), DropFence(9))
+    for _ in range(2):
+        assert opened.storage.feed_consumers() == [second]
         opened.reopen()
 
 

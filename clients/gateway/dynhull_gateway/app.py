@@ -13,7 +13,7 @@ from starlette.routing import Route
 import dynhull_client
 from dynhull_client import AsyncHullClient
 
-from . import alarms, fences, handlers, health, hulls, people, points, questions, tracks, uploads
+from . import alarms, feed_consumers, fences, handlers, health, hulls, people, points, questions, tracks, uploads
 from .bodies import JSON, LimitedBodies
 from .ends import AnsweredAtTheEnd
 from .events import replays, subscriptions
@@ -73,7 +73,9 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.state.snapshots = Snapshots()
     app.state.health = health.State()
     app.state.figures = Figures()
-    modules = hulls, points, uploads, fences, alarms, questions, tracks, events, replays, subscriptions, maps, health
+    of_past = tracks, feed_consumers
+    of_events = events, replays, subscriptions
+    modules = hulls, points, uploads, fences, alarms, questions, *of_past, *of_events, maps, health
     routers = [module.router for module in modules]
     for router in routers:
         app.include_router(router)

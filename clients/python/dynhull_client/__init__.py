@@ -35,7 +35,7 @@ from ._async_writer import AsyncWriter
 from ._batch import Batch
 from ._client import HullClient
 from ._errors import *  # noqa: F403  # all of them: `_errors.__all__`
-from ._feed_messages import FeedBatch, FeedHeld
+from ._feed_messages import FeedBatch, FeedConsumer, FeedHeld
 from ._fence_messages import Fence, FenceConsumer, FenceEvent, Inside, SubjectsInside
 from ._history_messages import Erasure, History
 from ._hull_copies import HullCopies
@@ -114,6 +114,7 @@ __all__ = [
     "Event",
     "Feed",
     "FeedBatch",
+    "FeedConsumer",
     "FeedHeld",
     "Fence",
     "FenceConsumer",

@@ -7,6 +7,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from . import _alarms as alarms
 from . import _calls as calls
 from . import _feed as feeds
+from . import _feed_consumers as readers
 from . import _fences as fences
 from . import _fences_between as between
 from . import _history as past
@@ -145,6 +146,8 @@ class AsyncHullClient(Client[AsyncConnection]):
     fence_inside = _answering(fences.fence_inside)
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
+    ack_feed = _answering(readers.ack_feed)
+    delete_feed_consumer = _answering(readers.delete_feed_consumer)
     create_alarm = _answering(alarms.create_alarm)
     delete_alarm = _answering(alarms.delete_alarm)
     get_alarm = _answering(alarms.get_alarm)
@@ -156,6 +159,7 @@ class AsyncHullClient(Client[AsyncConnection]):
     list_held = _listing(quarantine.list_held)
     list_fences = _listing(fences.list_fences)
     list_alarms = _listing(alarms.list_alarms)
+    list_feed_consumers = _listing(readers.list_feed_consumers)
     ingest = opening(AsyncIngest, calls.ingest)
     pipeline = opening(AsyncPipeline, calls.pipeline)
     watch = opening(AsyncWatch, calls.watch)

@@ -7,6 +7,7 @@ from typing import Concatenate, ParamSpec, Self, TypeVar
 from . import _alarms as alarms
 from . import _calls as calls
 from . import _feed as feeds
+from . import _feed_consumers as readers
 from . import _fences as fences
 from . import _fences_between as between
 from . import _history as past
@@ -149,6 +150,8 @@ class HullClient(Client[BlockingConnection]):
     fence_inside = _answering(fences.fence_inside)
     ack_fence = _answering(fences.ack_fence)
     delete_consumer = _answering(fences.delete_consumer)
+    ack_feed = _answering(readers.ack_feed)
+    delete_feed_consumer = _answering(readers.delete_feed_consumer)
     create_alarm = _answering(alarms.create_alarm)
     delete_alarm = _answering(alarms.delete_alarm)
     get_alarm = _answering(alarms.get_alarm)
@@ -160,6 +163,7 @@ class HullClient(Client[BlockingConnection]):
     list_held = _listing(quarantine.list_held)
     list_fences = _listing(fences.list_fences)
     list_alarms = _listing(alarms.list_alarms)
+    list_feed_consumers = _listing(readers.list_feed_consumers)
     ingest = opening(Ingest, calls.ingest)
     pipeline = opening(Pipeline, calls.pipeline)
     watch = opening(Watch, calls.watch)

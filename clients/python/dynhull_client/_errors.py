@@ -216,7 +216,7 @@ class SequenceAheadError(DynhullError, ValueError):
 
 
 class ConsumerNotFoundError(DynhullError, LookupError):
-    """The fence or alarm has no consumer of that name."""
+    """The fence, the alarm or the feed has no consumer of that name."""
 
 
 class HullFencedError(DynhullError):

@@ -33,6 +33,7 @@ def feed(
     *,
     prefix: str | None = None,
     after: int | bytes | None = None,
+    consumer: str | None = None,
     uid: str = "",
     progress_interval: float | timedelta | None = None,
     reconnect: bool = True,
@@ -45,9 +46,9 @@ def feed(
     >>> for batch in client.feed("fleet", after=0):  # doctest: +SKIP
     ...     print(batch.revision, batch.keys, batch.points)
 
-    It begins with the next batch, unless `after` says where. Batches that the server keeps no more come as one of the
-    type "lost", which names their revisions. A program that reads slowly is sent them later, from where they are kept.
-    It needs the right to read the past of the hulls.
+    It begins with the next batch, unless `after` or a consumer says where. Batches that the server keeps no more come
+    as one of the type "lost", which names their revisions. A program that reads slowly is sent them later, from where
+    they are kept. It needs the right to read the past of the hulls.
 
     Batches of many hulls come in the order of their commits, those of a server of several workers in the order of each.
 
@@ -56,6 +57,11 @@ def feed(
         prefix: in place of a name, all hulls whose names begin with this, those to come, too; "" for all.
         after: the revision after which to begin; of many hulls the attribute `after` of an earlier batch. 0 for all
             batches that are kept.
+        consumer: the name of a durable consumer: the feed begins after what it acknowledged, and for a new consumer at
+            the oldest batch that is kept. The consumer outlives clients and servers; `ack_feed` acknowledges. If what
+            it acknowledged is of a hull that was created again or restored since then, HullReplacedError, and
+            RevisionForgottenError where that is so of the data of a prefix, until it is deleted, or acknowledges what
+            the caller has of the present hull.
         uid: the uid of the hull whose revisions the caller has: HullReplacedError if it was created again or restored
             from a backup since then.
         progress_interval: seconds without a batch after which one of the type "progress" comes; None for never.
@@ -66,6 +72,8 @@ def feed(
     """
     if (name is None) == (prefix is None):
         raise ValueError("give either name or prefix")
+    if consumer is not None and after is not None:
+        raise ValueError("give either consumer, which knows its place, or after, not both")
     if prefix is not None and uid:
         raise ValueError("uid is for one hull: a position says of which data it is")
     request = feed_pb2.FeedRequest(uid=text("uid", uid))
@@ -73,7 +81,9 @@ def feed(
         request.name = text("name", name)
     if prefix is not None:
         request.prefix = text("prefix", prefix)
-    if after is None:
+    if consumer is not None:
+        request.consumer = text("consumer", consumer)
+    elif after is None:
         request.only_new = True
     elif prefix is not None and isinstance(after, bytes):
         request.position = after
@@ -140,7 +150,7 @@ class FeedPlace(Place[FeedBatch]):
         assert self._there is not None  # the feed begins
         self._there.update((each.name, each.uid) for each in message.hulls)
         if message.position:
-            if self.request.HasField("position"):
+            if self.request.WhichOneof("start") in ("position", "consumer"):
                 yield FeedBatch("hulls", "", 0, hulls=self._there, after=None)
             self._there = None
 

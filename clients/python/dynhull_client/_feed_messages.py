@@ -118,6 +118,41 @@ class FeedBatch(Value):
     hulls: dict[str, str] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class FeedConsumer:
+    """A durable reader of the feed of a hull, or of a prefix.
+
+    Attributes:
+        name: its name.
+        hull: the hull that it reads; None for a prefix.
+        prefix: the prefix that it reads; None for a hull.
+        after: what it has acknowledged: a revision; of a prefix a position, empty for the beginning.
+        uid: the uid of the hull with that revision; empty for a prefix.
+        backlog: of a hull, the batches that it has not acknowledged; of a prefix, the commits from the acknowledged one
+            to that of the newest batch, also those of other hulls.
+        lost: of a hull, how many of them are kept no more.
+        replaced: whether the hull is not there, was created again or restored since then, or the data of the prefix
+            were restored.
+    """
+
+    name: str
+    hull: str | None
+    prefix: str | None
+    after: int | bytes
+    uid: str
+    backlog: int
+    lost: int
+    replaced: bool
+
+
+def decode_feed_consumer(message: feed_pb2.FeedConsumer) -> FeedConsumer:
+    """A durable consumer."""
+    hull = message.hull if message.HasField("hull") else None
+    prefix = message.prefix if message.HasField("prefix") else None
+    after: int | bytes = message.acknowledged_revision if prefix is None else message.position
+    return FeedConsumer(message.name, hull, prefix, after, message.uid, message.backlog, message.lost, message.replaced)
+
+
 def decode_feed_batch(message: feed_pb2.FeedBatch, after: int | None) -> FeedBatch:
     """A batch as received."""
     batch, puts = message.batch, message.batch.puts

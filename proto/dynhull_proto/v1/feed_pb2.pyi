@@ -14,11 +14,12 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class FeedRequest(_message.Message):
-    __slots__ = ("name", "after_revision", "only_new", "position", "uid", "progress_interval", "encoding", "prefix")
+    __slots__ = ("name", "after_revision", "only_new", "position", "consumer", "uid", "progress_interval", "encoding", "prefix")
     NAME_FIELD_NUMBER: _ClassVar[int]
     AFTER_REVISION_FIELD_NUMBER: _ClassVar[int]
     ONLY_NEW_FIELD_NUMBER: _ClassVar[int]
     POSITION_FIELD_NUMBER: _ClassVar[int]
+    CONSUMER_FIELD_NUMBER: _ClassVar[int]
     UID_FIELD_NUMBER: _ClassVar[int]
     PROGRESS_INTERVAL_FIELD_NUMBER: _ClassVar[int]
     ENCODING_FIELD_NUMBER: _ClassVar[int]
@@ -27,11 +28,12 @@ class FeedRequest(_message.Message):
     after_revision: int
     only_new: bool
     position: bytes
+    consumer: str
     uid: str
     progress_interval: _duration_pb2.Duration
     encoding: _points_pb2.PointEncoding
     prefix: str
-    def __init__(self, name: _Optional[str] = ..., after_revision: _Optional[int] = ..., only_new: bool = ..., position: _Optional[bytes] = ..., uid: _Optional[str] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., prefix: _Optional[str] = ...) -> None: ...
+    def __init__(self, name: _Optional[str] = ..., after_revision: _Optional[int] = ..., only_new: bool = ..., position: _Optional[bytes] = ..., consumer: _Optional[str] = ..., uid: _Optional[str] = ..., progress_interval: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., prefix: _Optional[str] = ...) -> None: ...
 
 class FeedResponse(_message.Message):
     __slots__ = ("batches", "lost", "revision", "uid", "hulls", "gone", "position")
@@ -50,6 +52,82 @@ class FeedResponse(_message.Message):
     gone: _containers.RepeatedCompositeFieldContainer[FedHull]
     position: bytes
     def __init__(self, batches: _Optional[_Iterable[_Union[FeedBatch, _Mapping]]] = ..., lost: _Optional[_Iterable[_Union[LostBatches, _Mapping]]] = ..., revision: _Optional[int] = ..., uid: _Optional[str] = ..., hulls: _Optional[_Iterable[_Union[FedHull, _Mapping]]] = ..., gone: _Optional[_Iterable[_Union[FedHull, _Mapping]]] = ..., position: _Optional[bytes] = ...) -> None: ...
+
+class FeedConsumer(_message.Message):
+    __slots__ = ("name", "hull", "prefix", "acknowledged_revision", "uid", "position", "backlog", "lost", "replaced")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    HULL_FIELD_NUMBER: _ClassVar[int]
+    PREFIX_FIELD_NUMBER: _ClassVar[int]
+    ACKNOWLEDGED_REVISION_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
+    POSITION_FIELD_NUMBER: _ClassVar[int]
+    BACKLOG_FIELD_NUMBER: _ClassVar[int]
+    LOST_FIELD_NUMBER: _ClassVar[int]
+    REPLACED_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    hull: str
+    prefix: str
+    acknowledged_revision: int
+    uid: str
+    position: bytes
+    backlog: int
+    lost: int
+    replaced: bool
+    def __init__(self, name: _Optional[str] = ..., hull: _Optional[str] = ..., prefix: _Optional[str] = ..., acknowledged_revision: _Optional[int] = ..., uid: _Optional[str] = ..., position: _Optional[bytes] = ..., backlog: _Optional[int] = ..., lost: _Optional[int] = ..., replaced: bool = ...) -> None: ...
+
+class AckFeedRequest(_message.Message):
+    __slots__ = ("name", "prefix", "consumer", "revision", "uid", "position")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    PREFIX_FIELD_NUMBER: _ClassVar[int]
+    CONSUMER_FIELD_NUMBER: _ClassVar[int]
+    REVISION_FIELD_NUMBER: _ClassVar[int]
+    UID_FIELD_NUMBER: _ClassVar[int]
+    POSITION_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    prefix: str
+    consumer: str
+    revision: int
+    uid: str
+    position: bytes
+    def __init__(self, name: _Optional[str] = ..., prefix: _Optional[str] = ..., consumer: _Optional[str] = ..., revision: _Optional[int] = ..., uid: _Optional[str] = ..., position: _Optional[bytes] = ...) -> None: ...
+
+class AckFeedResponse(_message.Message):
+    __slots__ = ("consumer",)
+    CONSUMER_FIELD_NUMBER: _ClassVar[int]
+    consumer: FeedConsumer
+    def __init__(self, consumer: _Optional[_Union[FeedConsumer, _Mapping]] = ...) -> None: ...
+
+class ListFeedConsumersRequest(_message.Message):
+    __slots__ = ("prefix", "page_size", "page_token")
+    PREFIX_FIELD_NUMBER: _ClassVar[int]
+    PAGE_SIZE_FIELD_NUMBER: _ClassVar[int]
+    PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    prefix: str
+    page_size: int
+    page_token: str
+    def __init__(self, prefix: _Optional[str] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ...) -> None: ...
+
+class ListFeedConsumersResponse(_message.Message):
+    __slots__ = ("consumers", "next_page_token")
+    CONSUMERS_FIELD_NUMBER: _ClassVar[int]
+    NEXT_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    consumers: _containers.RepeatedCompositeFieldContainer[FeedConsumer]
+    next_page_token: str
+    def __init__(self, consumers: _Optional[_Iterable[_Union[FeedConsumer, _Mapping]]] = ..., next_page_token: _Optional[str] = ...) -> None: ...
+
+class DeleteFeedConsumerRequest(_message.Message):
+    __slots__ = ("name", "prefix", "consumer")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    PREFIX_FIELD_NUMBER: _ClassVar[int]
+    CONSUMER_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    prefix: str
+    consumer: str
+    def __init__(self, name: _Optional[str] = ..., prefix: _Optional[str] = ..., consumer: _Optional[str] = ...) -> None: ...
+
+class DeleteFeedConsumerResponse(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
 
 class FedHull(_message.Message):
     __slots__ = ("name", "uid")

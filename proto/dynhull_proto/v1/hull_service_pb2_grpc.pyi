@@ -238,6 +238,18 @@ class HullServiceStub:
     It needs the right to read the past of the hull. FAILED_PRECONDITION if the server keeps no batches, or if the hull is
     over shards.
     """
+    AckFeed: _grpc.UnaryUnaryMultiCallable[_feed_pb2.AckFeedRequest, _feed_pb2.AckFeedResponse]
+    """Acknowledges batches of a feed, for a consumer. Creates the consumer if it is new. What is before that acknowledged
+    already changes nothing. It needs the same right as the feed; so do the two calls below.
+
+    A consumer stays until it is deleted, also when its hull is: one that is created again under the name is another hull
+    (see FeedConsumer.replaced). It keeps nothing from being dropped: what is kept of the past is a matter of the history of
+    hulls. RESOURCE_EXHAUSTED for more consumers than the server allows.
+    """
+    ListFeedConsumers: _grpc.UnaryUnaryMultiCallable[_feed_pb2.ListFeedConsumersRequest, _feed_pb2.ListFeedConsumersResponse]
+    """Lists consumers of feeds, in pages."""
+    DeleteFeedConsumer: _grpc.UnaryUnaryMultiCallable[_feed_pb2.DeleteFeedConsumerRequest, _feed_pb2.DeleteFeedConsumerResponse]
+    """Deletes a consumer of a feed."""
     Verify: _grpc.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
     which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
@@ -453,6 +465,18 @@ class HullServiceAsyncStub(HullServiceStub):
     It needs the right to read the past of the hull. FAILED_PRECONDITION if the server keeps no batches, or if the hull is
     over shards.
     """
+    AckFeed: _aio.UnaryUnaryMultiCallable[_feed_pb2.AckFeedRequest, _feed_pb2.AckFeedResponse]  # type: ignore[assignment]
+    """Acknowledges batches of a feed, for a consumer. Creates the consumer if it is new. What is before that acknowledged
+    already changes nothing. It needs the same right as the feed; so do the two calls below.
+
+    A consumer stays until it is deleted, also when its hull is: one that is created again under the name is another hull
+    (see FeedConsumer.replaced). It keeps nothing from being dropped: what is kept of the past is a matter of the history of
+    hulls. RESOURCE_EXHAUSTED for more consumers than the server allows.
+    """
+    ListFeedConsumers: _aio.UnaryUnaryMultiCallable[_feed_pb2.ListFeedConsumersRequest, _feed_pb2.ListFeedConsumersResponse]  # type: ignore[assignment]
+    """Lists consumers of feeds, in pages."""
+    DeleteFeedConsumer: _aio.UnaryUnaryMultiCallable[_feed_pb2.DeleteFeedConsumerRequest, _feed_pb2.DeleteFeedConsumerResponse]  # type: ignore[assignment]
+    """Deletes a consumer of a feed."""
     Verify: _aio.UnaryUnaryMultiCallable[_hull_service_pb2.VerifyRequest, _hull_service_pb2.VerifyResponse]  # type: ignore[assignment]
     """Recomputes the hull of the stored points by Chan's algorithm, and compares it with the live hull. Also decides anew on
     which side of each fence the keys of the hull are, and compares that and the events of these fences with their state.
@@ -899,6 +923,36 @@ class HullServiceServicer(metaclass=_abc_1.ABCMeta):
         It needs the right to read the past of the hull. FAILED_PRECONDITION if the server keeps no batches, or if the hull is
         over shards.
         """
+
+    @_abc_1.abstractmethod
+    def AckFeed(
+        self,
+        request: _feed_pb2.AckFeedRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_feed_pb2.AckFeedResponse, _abc.Awaitable[_feed_pb2.AckFeedResponse]]:
+        """Acknowledges batches of a feed, for a consumer. Creates the consumer if it is new. What is before that acknowledged
+        already changes nothing. It needs the same right as the feed; so do the two calls below.
+
+        A consumer stays until it is deleted, also when its hull is: one that is created again under the name is another hull
+        (see FeedConsumer.replaced). It keeps nothing from being dropped: what is kept of the past is a matter of the history of
+        hulls. RESOURCE_EXHAUSTED for more consumers than the server allows.
+        """
+
+    @_abc_1.abstractmethod
+    def ListFeedConsumers(
+        self,
+        request: _feed_pb2.ListFeedConsumersRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_feed_pb2.ListFeedConsumersResponse, _abc.Awaitable[_feed_pb2.ListFeedConsumersResponse]]:
+        """Lists consumers of feeds, in pages."""
+
+    @_abc_1.abstractmethod
+    def DeleteFeedConsumer(
+        self,
+        request: _feed_pb2.DeleteFeedConsumerRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_feed_pb2.DeleteFeedConsumerResponse, _abc.Awaitable[_feed_pb2.DeleteFeedConsumerResponse]]:
+        """Deletes a consumer of a feed."""
 
     @_abc_1.abstractmethod
     def Verify(

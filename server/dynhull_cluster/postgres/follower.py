@@ -35,7 +35,10 @@ from dynhull_server.storage.rows.totals import Totals, totals_from
 from .database import Connection, as_storage_errors
 from .reader import PostgresReader
 
-OF_FENCES = "fences", "events", "staged", "runs", "event_ids", "inside_ids", "consumer_ids", "delay_ids", "start_ids"
+OF_FENCES = (
+    *("fences", "events", "staged", "runs", "feed_consumers"),
+    *("event_ids", "inside_ids", "consumer_ids", "delay_ids", "start_ids"),
+)
 SEGMENT = "id, hull, checksum"
 DEAD_OF_FENCES = "events", "insides", "consumers", "delays", "starts"
 

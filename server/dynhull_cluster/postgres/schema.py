@@ -47,6 +47,7 @@ MIGRATIONS: dict[int, Sequence[str]] = {
         ),
     ),
     12: (),  # it had no alarms among the fences
+    13: (),  # it had no consumers of feeds
 }
 # The number of an advisory lock, held while tables are created, migrated, or filled from a folder: "dynhull".
 PREPARING = 0x64796E68756C6C

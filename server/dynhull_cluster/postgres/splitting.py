@@ -2,7 +2,8 @@
 
 A row keeps its number, its payload and its checksum, and gets another partition. So hulls, fences, their events, and
 the numbers of producers are what they were, also for callers that go on with them. A row with events of many fences is
-copied to the partitions of all fences that need it; what it has of others counts as that of deleted fences.
+copied to the partitions of all fences that need it; what it has of others counts as that of deleted fences. So is a
+consumer of the feed of a prefix, which goes on in each partition where it was in the one.
 """
 
 from collections import Counter, defaultdict
@@ -11,9 +12,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from dynhull_server.state.alarms.rule import called, unmarked
+from dynhull_server.state.feed_consumers import ConsumerId
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.records import HullRow
 from dynhull_server.storage.port import DamagedError, StorageError
+from dynhull_server.storage.rows.feed_rows import StoredFeedConsumer
 from dynhull_server.storage.rows.fence_rows import found_fences
 from dynhull_server.storage.rows.fence_runs import FenceRows
 from dynhull_server.storage.rows.ledger import HullRows, Ledger
@@ -39,6 +42,15 @@ COPY_EVENTS = (
     f"INSERT INTO events (partition, {', '.join(COLUMNS['events'])}) "  # noqa: S608  (ours)
     f"SELECT given.target, {', '.join(COLUMNS['events'])} FROM unnest(%s::bigint[], %s::integer[]) "
     "AS given (number, target) JOIN events ON events.partition = 0 AND events.rowid = given.number"
+).encode()
+MOVE_CONSUMERS = (
+    b"UPDATE consumers SET partition = given.target FROM unnest(%s::bigint[], %s::integer[]) AS given (number, target) "
+    b"WHERE consumers.partition = 0 AND consumers.rowid = given.number"
+)
+COPY_CONSUMERS = (
+    f"INSERT INTO consumers (partition, {', '.join(COLUMNS['consumers'])}) "  # noqa: S608  (ours)
+    f"SELECT given.target, {', '.join(COLUMNS['consumers'])} FROM unnest(%s::bigint[], %s::integer[]) "
+    "AS given (number, target) JOIN consumers ON consumers.partition = 0 AND consumers.rowid = given.number"
 ).encode()
 DROP_EVENTS = b"DELETE FROM events WHERE partition = 0 AND rowid = ANY(%s::bigint[])"
 
@@ -113,13 +125,16 @@ def split_rows(connection: Connection, epoch: int, partitions: int) -> list[int]
             connection.execute(_moving(table, column), _moved(places))
     events = _events_of(ledger, fences)
     _move_events(connection, events)
+    consumers = _consumers_of(ledger, partitions)
+    _move_consumers(connection, ledger, consumers)
     connection.execute("UPDATE format SET partitions = %s", [partitions])
     for partition in range(partitions):
         if partition:
             follow_owner(connection, partition, epoch)
         own_hulls = [ledger.hulls[number] for number, there in hulls.items() if there == partition]
         own_fences = [ledger.fences[number] for number, there in fences.items() if there == partition]
-        totals = _totals(ledger, own_hulls, own_fences, events[partition])
+        own_consumers = [ledger.feed_consumers[ident] for ident in consumers[partition]]
+        totals = _totals(ledger, own_hulls, own_fences, events[partition], own_consumers)
         put_totals(connection, partition, totals)
         _require_complete(connection, partition, totals)
     counted = Counter(hulls[number] for number, hull in ledger.hulls.items() if hull.row.settings.shard is None)
@@ -161,14 +176,37 @@ def _move_events(connection: Connection, events: Mapping[int, set[int]]) -> None
     connection.execute(DROP_EVENTS, [list(gone)])
 
 
-def _totals(ledger: Ledger, hulls: Sequence[HullRows], fences: Sequence[FenceRows], events: set[int]) -> Totals:
+def _consumers_of(ledger: Ledger, partitions: int) -> defaultdict[int, list[ConsumerId]]:
+    """The consumers of feeds that each partition needs."""
+    needed = defaultdict[int, list[ConsumerId]](list)
+    for ident in ledger.feed_consumers:
+        feed = ident.feed
+        for partition in range(partitions) if feed.prefix else [worker_of(feed.name, partitions)]:
+            needed[partition].append(ident)
+    return needed
+
+
+def _move_consumers(connection: Connection, ledger: Ledger, needed: Mapping[int, Sequence[ConsumerId]]) -> None:
+    places = {ident: stored.place for ident, stored in ledger.feed_consumers.items()}
+    for statement, prefix in ((COPY_CONSUMERS, True), (MOVE_CONSUMERS, False)):
+        moved = [(places[each], to) for to, some in needed.items() if to for each in some if each.feed.prefix == prefix]
+        connection.execute(statement, [[place for place, _ in moved], [to for _, to in moved]])
+
+
+def _totals(
+    ledger: Ledger,
+    hulls: Sequence[HullRows],
+    fences: Sequence[FenceRows],
+    events: set[int],
+    consumers: Sequence[StoredFeedConsumer],
+) -> Totals:
     """The totals of a partition with these rows; it gives no number to a hull that another one has had before."""
     before = ledger.totals
     _, weights = ledger.events.left(np.array(sorted(events), np.int64))
     totals = before._replace(hulls=0, batches=0, sum=0, fence_rows=0)
     totals = totals.plus(len(hulls), sum(len(hull.ids) for hull in hulls), sum(hull.sum for hull in hulls))
-    weight = sum(fence.sum for fence in fences) + int(weights.sum())
-    return totals.plus(0, 0, weight, sum(fence.count for fence in fences) + len(events))
+    weight = sum(fence.sum for fence in fences) + int(weights.sum()) + sum(each.weight for each in consumers)
+    return totals.plus(0, 0, weight, sum(fence.count for fence in fences) + len(events) + len(consumers))
 
 
 def _require_complete(connection: Connection, partition: int, totals: Totals) -> None:

@@ -97,6 +97,7 @@ class Engine:
         await self._loader.load(contents, progress)
         self._loader.restore(driver.core)
         await driver.in_turn(partial(self._restore_fences, contents))
+        self.hulls.feed_consumers.restore(await driver.on_disk(storage.feed_consumers))
         if storage.keeps:
             self.hulls.restored(incarnation_of(contents.hulls))
         driver.start(self.hulls, self.fences, CommitStamp(contents.commits, contents.committed))

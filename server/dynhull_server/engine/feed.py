@@ -75,7 +75,7 @@ class HullFeeds:
         newest = hull.counts.revision
         after = newest if after is None else after
         if after > newest:
-            oldest: Moment = await self._ask(hull, self._past.oldest_moment)
+            oldest = await self.oldest(hull)
             raise RevisionForgottenError(after, oldest.revision, newest, field="after_revision")
         yield FeedPart(after)  # the feed has begun
         while True:
@@ -88,6 +88,11 @@ class HullFeeds:
                 part = await self.next(hull, after)
             after = part.revision
             yield part
+
+    async def oldest(self, hull: LiveHull) -> Moment:
+        """The oldest revision of a hull that is kept. Raises HullNotFoundError or NotStoredError."""
+        found: Moment = await self._ask(hull, self._past.oldest_moment)
+        return found
 
     def require_kept(self, name: str) -> None:
         """Raise HullUnsuitableError, with this name, if no batches are kept."""
@@ -118,7 +123,7 @@ class HullFeeds:
             if found.committed is None or found.committed.number <= commit.number:
                 return found.revision, False
             time = found.committed.time - 1
-        oldest: Moment = await self._ask(hull, self._past.oldest_moment)
+        oldest = await self.oldest(hull)
         timed: Moment = await self._ask(hull, partial(self._past.oldest_moment, timed=True))
         if timed.revision > oldest.revision:  # formats before 11 have written those before it
             return timed.revision - 1, False
@@ -132,7 +137,7 @@ class HullFeeds:
         except NotStoredError as error:
             if not isinstance(error.__cause__, DamagedError):
                 raise
-            oldest: Moment = await self._ask(hull, self._past.oldest_moment)
+            oldest = await self.oldest(hull)
             if oldest.revision <= after:
                 raise
             return FeedPart(oldest.revision, lost=(after + 1, oldest.revision))

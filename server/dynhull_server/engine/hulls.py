@@ -25,6 +25,7 @@ from .divided_hull import DividedHull
 from .division import Divisions
 from .driver import Driver
 from .feed import HullFeeds
+from .feed_consumers import FeedConsumers
 from .feed_many import PrefixFeed
 from .fences import Fences
 from .filing import Filing
@@ -54,6 +55,7 @@ class Hulls:
         pasts: finds and rebuilds earlier revisions.
         series: the measures that are kept.
         feeds: reads the batches of each.
+        feed_consumers: those of these feeds.
         filing: writes the segments of their past.
     """
 
@@ -61,6 +63,10 @@ class Hulls:
         self.rosters = Rosters(lambda: driver.core.hulls.values())
         self.series = KeptSeries(self.of, driver)
         self.feeds = HullFeeds(driver, storage, keeps=storage.keeps)
+        self._newest = 0  # the number of the last commit with a batch
+        self.feed_consumers = FeedConsumers(
+            driver, storage, self.feeds, self.get, lambda: (self.standing, self._newest)
+        )
         self._driver = driver
         self._fences = fences
         self._divisions = divisions
@@ -259,10 +265,13 @@ class Hulls:
     def restored(self, incarnation: str) -> None:
         """Begin with the hulls of the storage, whose incarnation this is."""
         self._incarnation = incarnation
+        commits = (hull.committed for hull in self._driver.core.hulls.values())
+        self._newest = max((commit.number for commit in commits if commit is not None), default=0)
 
     def moved(self, hulls: Sequence[Hull]) -> None:
         """Wake the watchers of hulls: each has a new revision, or was deleted."""
         published = self._driver.published
+        self._newest = published.number
         for hull in hulls:
             hull.committed = published
             if hull.divided and self._divisions is not None:

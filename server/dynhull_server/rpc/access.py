@@ -69,8 +69,12 @@ class Access:
     def require_past(self, name: str) -> None:
         """Raise PermissionDeniedError if the past of the hull may not be read."""
         self.require_read(name)
-        if not name.startswith(self.past):
+        if not self.may_read_past(name):
             raise PermissionDeniedError("read the past of", name)
+
+    def may_read_past(self, name: str) -> bool:
+        """Whether the past of the hull may be read."""
+        return self.may_read(name) and name.startswith(self.past)
 
     def may_write(self, name: str) -> bool:
         """Whether the hull may be written."""
@@ -138,6 +142,10 @@ class Rights:
     def may_read(self, name: str) -> bool:
         """Whether the name may be told."""
         return self._access.may_read(name)
+
+    def may_read_past(self, name: str) -> bool:
+        """Whether the past of the hull may be read, at this moment."""
+        return self._access.may_read_past(name)
 
     def may_write(self, name: str) -> bool:
         """Whether the hull may be written, at this moment."""

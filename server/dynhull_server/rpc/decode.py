@@ -108,12 +108,12 @@ def decode_page(
         NAME.fullmatch(request.page_token) and request.page_token.startswith(request.prefix)
     ):
         raise InvalidFieldError("page_token", request.page_token, "not a page token of a call with this prefix")
-    return request.prefix, request.page_token, _page_size(request.page_size)
+    return request.prefix, request.page_token, page_size(request.page_size)
 
 
 def decode_held_page(request: hull_service_pb2.ListHeldRequest, *, strings: bool) -> tuple[Key | None, int]:
     """The key before the page, and the size of the page."""
-    size, token = _page_size(request.page_size), request.page_token
+    size, token = page_size(request.page_size), request.page_token
     if strings or not token:
         return token or None, size
     if not (token.isascii() and token.isdecimal() and int(token) < 2**64):
@@ -121,7 +121,8 @@ def decode_held_page(request: hull_service_pb2.ListHeldRequest, *, strings: bool
     return int(token), size
 
 
-def _page_size(size: int) -> int:
+def page_size(size: int) -> int:
+    """The number of entries of a page."""
     if size < 0:
         raise InvalidFieldError("page_size", size, "must not be negative")
     return min(size or DEFAULT_PAGE, LARGEST_PAGE)

@@ -7,7 +7,10 @@ import numpy as np
 from dynhull_proto.v1 import batch_pb2, feed_pb2, points_pb2
 
 from ..engine.feed import FeedPart
+from ..engine.feed_consumers import ConsumerState, standing_of
 from ..engine.feed_many import Gap, ManyFeedPart, OfHull
+from ..engine.positions import BEGINNING, encode_standings
+from ..state.feed_consumers import ConsumerId
 from ..state.records import FOREVER, NO_TIME, Cause, Condition, Expiry, HeldChange, KeyRows, PointRows, Record
 from .encode import CAUSES, encode_center, encode_keys, encode_points, encode_quarantine, encode_times
 
@@ -46,6 +49,25 @@ def _encode_gap(gap: Gap) -> feed_pb2.LostBatches:
 
 def _encode_hull(hull: OfHull) -> feed_pb2.FedHull:
     return feed_pb2.FedHull(name=hull.name, uid=hull.uid)
+
+
+def encode_feed_consumer(state: ConsumerState) -> feed_pb2.FeedConsumer:
+    """A consumer, and how far it is behind."""
+    consumer = state.consumer
+    feed, name = consumer.id
+    message = feed_pb2.FeedConsumer(name=name, backlog=state.backlog, lost=state.lost, replaced=state.replaced)
+    if feed.prefix:
+        message.prefix = feed.name
+        standing = standing_of(consumer)
+        message.position = b"" if standing == BEGINNING else encode_standings([standing])
+    else:
+        message.hull, message.uid, message.acknowledged_revision = feed.name, consumer.uid, consumer.acknowledged
+    return message
+
+
+def token_of(last: ConsumerId) -> str:
+    """The token of the page that follows a consumer."""
+    return f"{last.feed.name}:{int(last.feed.prefix)}:{last.name}"
 
 
 def encode_record(record: Record, of: OfHull, encoding: points_pb2.PointEncoding) -> feed_pb2.FeedBatch:

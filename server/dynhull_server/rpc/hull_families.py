@@ -10,12 +10,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain
+from operator import itemgetter
 from typing import Any, NamedTuple, TypeVar, get_args
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 from prometheus_client.metrics_core import Metric
 
 from ..engine.driver import Driver
+from ..engine.feed_consumers import FeedConsumers, shown
 from ..engine.hulls import Hulls
 from ..engine.measures import HullMeasures
 from ..engine.past import Outcome
@@ -28,6 +30,8 @@ from ..storage.past import Hole
 
 # The number of largest hulls with metrics of their own; for all hulls there would be too many for Prometheus.
 NAMED_HULLS = 100
+# The same for consumers of feeds.
+NAMED_CONSUMERS = 100
 # Seconds in which the measures for one page are made. What then still lacks them has those of an earlier page, if any.
 MEASURING_SECONDS = 2.0
 
@@ -122,6 +126,7 @@ class HullFamilies:
             GaugeMetricFamily("dynhull_clock_lag_seconds", behind, value=lag),
         ]
         sums += _series(self._hulls.series)
+        sums += _feed_consumers(self._hulls.feed_consumers)
         if self._prefixes:
             left_out = "Hulls under --metrics-prefix without measures here: there are more than --metrics-hulls."
             sums.append(GaugeMetricFamily("dynhull_metrics_hulls_left_out", left_out, value=survey.left_out))
@@ -198,6 +203,18 @@ class HullFamilies:
                 extra={"left_out": left_out, "metrics_hulls": self._most},
             )
         self._left_out = left_out
+
+
+def _feed_consumers(consumers: FeedConsumers) -> list[Metric]:
+    """How many there are, and how far those are behind that are so most."""
+    backlog = GaugeMetricFamily(
+        "dynhull_feed_backlog",
+        "Batches of a hull that a consumer of its feed has not acknowledged; of a prefix*, commits.",
+        labels=["feed", "consumer"],
+    )
+    for ident, behind in heapq.nlargest(NAMED_CONSUMERS, consumers.backlogs(), key=itemgetter(1)):
+        backlog.add_metric([shown(ident.feed), ident.name], behind)
+    return [GaugeMetricFamily("dynhull_feed_consumers", "Consumers of feeds.", value=len(consumers)), backlog]
 
 
 def _series(series: KeptSeries) -> list[Metric]:

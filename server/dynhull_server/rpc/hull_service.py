@@ -599,6 +599,20 @@ class HullService:
         call.access.require_past(hull.name)
         await self._feeds.send(request, hull, call)
 
+    async def AckFeed(self, request: feed_pb2.AckFeedRequest, call: Call) -> feed_pb2.AckFeedResponse:
+        return await self._feeds.acknowledge(request, call)
+
+    async def ListFeedConsumers(
+        self, request: feed_pb2.ListFeedConsumersRequest, call: Call
+    ) -> feed_pb2.ListFeedConsumersResponse:
+        return await self._feeds.listed(request, call)
+
+    async def DeleteFeedConsumer(
+        self, request: feed_pb2.DeleteFeedConsumerRequest, call: Call
+    ) -> feed_pb2.DeleteFeedConsumerResponse:
+        await self._feeds.delete(request, call)
+        return feed_pb2.DeleteFeedConsumerResponse()
+
     def _run(self, rows: int) -> Run:
         """The way to run the steps of an answer that reads this many rows."""
         return at_once if rows <= FEW_ROWS else self._aside

@@ -51,6 +51,8 @@ FINISHED = {
     "ReplaceFence",
     "DeleteFence",
     "ListFences",
+    "AckFeed",
+    "DeleteFeedConsumer",
     "AckFence",
     "DeleteConsumer",
     "CreateAlarm",

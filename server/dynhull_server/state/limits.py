@@ -38,6 +38,7 @@ class Limits:
         resume_bytes: the memory per hull for earlier vertices, from which watchers resume.
         fences: the limits on fences.
         max_past_rows: the number of points and rows of batches that a read of the past may rebuild.
+        max_feed_consumers: the number of consumers of feeds.
     """
 
     max_hulls: int
@@ -47,3 +48,4 @@ class Limits:
     resume_bytes: int
     fences: FenceLimits = FenceLimits()
     max_past_rows: int = 20_000_000
+    max_feed_consumers: int = 1_000

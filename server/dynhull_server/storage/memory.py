@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..state.changes import Change
+from ..state.feed_consumers import ConsumerId, DropFeedConsumer, FeedConsumer, PutFeedConsumer
 from ..state.fences.events.block import AppendEvents
 from ..state.fences.model.records import (
     AddFence,
@@ -79,6 +80,7 @@ class MemoryStorage:
     def __init__(self, *, keeps: bool = True) -> None:
         self.keeps = keeps
         self._hulls: dict[int, _Hull] = {}
+        self._feed_consumers: dict[ConsumerId, FeedConsumer] = {}
         self._fences: dict[int, KeptFence] = {}
         self._next_number = 1
         self._commit = CommitStamp(0, 0)
@@ -245,6 +247,11 @@ class MemoryStorage:
         """No steps: deletes leave nothing behind."""
         return iter(())
 
+    def feed_consumers(self) -> list[FeedConsumer]:
+        """The consumers of feeds."""
+        with self._turn:
+            return list(self._feed_consumers.values())
+
     def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
         """Fences as last committed; DamagedError if their hulls were not kept."""
         with self._turn:
@@ -388,6 +395,10 @@ class MemoryStorage:
             case AppendEvents():
                 for number, events in change.block.by_fence().items():
                     self._fences[number].events += events
+            case PutFeedConsumer(consumer):
+                self._feed_consumers[consumer.id] = consumer
+            case DropFeedConsumer(ident):
+                self._feed_consumers.pop(ident, None)
             case PutDelays() | DropEvents() | PutConsumer() | DropConsumer():
                 self._change(self._fences[change.number], change)
             case _:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+from ..state.feed_consumers import FeedConsumer
 from ..state.fences.model.records import FenceEvent, FenceRow, Inside, KeptFence
 from ..state.records import CommitStamp, HullRow, Kept, Keys, Record
 from .past import Past
@@ -242,6 +243,9 @@ class Storage(Past, Protocol):
 
         Run only one sweep at a time.
         """
+
+    def feed_consumers(self) -> list[FeedConsumer]:
+        """The consumers of feeds as last committed, in no order."""
 
     def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
         """Fences as last committed, with the events that follow who was inside; None where no fence has that number.

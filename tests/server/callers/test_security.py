@@ -84,6 +84,10 @@ EVERY_CALL = {
     "Track": lambda stub, name: next(stub.Track(pb.TrackRequest(name=name))),
     "Replay": lambda stub, name: next(stub.Replay(pb.ReplayRequest(name=name))),
     "Feed": lambda stub, name: next(stub.Feed(feed_pb2.FeedRequest(name=name))),
+    "AckFeed": lambda stub, name: stub.AckFeed(feed_pb2.AckFeedRequest(name=name, consumer="c")),
+    "DeleteFeedConsumer": lambda stub, name: stub.DeleteFeedConsumer(
+        feed_pb2.DeleteFeedConsumerRequest(name=name, consumer="c")
+    ),
     "WatchMany": lambda stub, name: next(stub.WatchMany(pb.WatchManyRequest(names=[name]))),
     "GetLayers": lambda stub, name: stub.GetLayers(pb.GetLayersRequest(name=name, layer_count=1)),
     "GetInfluence": lambda stub, name: stub.GetInfluence(pb.GetInfluenceRequest(name=name)),
@@ -93,6 +97,10 @@ EVERY_CALL = {
     "Frontier": lambda stub, name: stub.Frontier(pb.FrontierRequest(name=name)),
     "Verify": lambda stub, name: stub.Verify(pb.VerifyRequest(name=name)),
     "Query": lambda stub, name: next(stub.Query(iter([pb.QueryRequest(reads=[{"verify": {"name": name}}])]))),
+}
+LISTS = {
+    "ListHulls": lambda stub, name: stub.ListHulls(pb.ListHullsRequest(prefix=name)),
+    "ListFeedConsumers": lambda stub, name: stub.ListFeedConsumers(feed_pb2.ListFeedConsumersRequest(prefix=name)),
 }
 WRITES = {
     "CreateHull",
@@ -112,10 +120,10 @@ WRITES = {
 
 def test_every_call_is_tried() -> None:
     methods = pb.DESCRIPTOR.services_by_name["HullService"].methods
-    assert {method.name for method in methods} == {*EVERY_CALL, "ListHulls"}
+    assert {method.name for method in methods} == {*EVERY_CALL, *LISTS}
 
 
-@pytest.mark.parametrize("call", [*EVERY_CALL, "ListHulls"])
+@pytest.mark.parametrize("call", [*EVERY_CALL, *LISTS])
 @pytest.mark.parametrize("metadata", [None, "Bearer wrong", "Basic root-token", "root-token", "Bearer "])
 def test_without_a_token_nothing_is_answered(guarded: Server, call: str, metadata: str | None) -> None:
     """Not even whether a request is well-formed, or a name one of a hull."""
@@ -125,10 +133,7 @@ def test_without_a_token_nothing_is_answered(guarded: Server, call: str, metadat
         stub = HullServiceStub(channel)
         answers = []
         for name in ("plane", "nobody", "not a name"):
-            if call == "ListHulls":
-                refused = refusal(lambda name=name: stub.ListHulls(pb.ListHullsRequest(prefix=name)))
-            else:
-                refused = refusal(lambda name=name: EVERY_CALL[call](stub, name))
+            refused = refusal(lambda name=name: (EVERY_CALL | LISTS)[call](stub, name))
             answers.append(refused)
         assert answers[0][0] == grpc.StatusCode.UNAUTHENTICATED
         assert answers[0] == answers[1] == answers[2]

@@ -20,18 +20,26 @@ class FeedReading:
         name: the hull; None for many.
         prefix: that of many hulls; None for one.
         uid: the uid of the hull; empty if it is not known yet, and for many.
-        after: what the reader goes on after, as in a `FeedBatch`; None for new batches only.
+        after: what the reader goes on after, as in a `FeedBatch`; None for new batches only, or for a consumer's place.
+        consumer: a durable consumer, which knows where it begins; None for none.
     """
 
     name: str | None
     prefix: str | None
     uid: str
     after: int | bytes | None
+    consumer: str | None = None
 
     def feed(self, client: AsyncHullClient, progress_interval: float) -> AsyncFeed:
         """The feed of what is left."""
+        consumer = self.consumer if self.after is None else None
         return client.feed(
-            self.name, prefix=self.prefix, after=self.after, uid=self.uid, progress_interval=progress_interval
+            self.name,
+            prefix=self.prefix,
+            after=self.after,
+            consumer=consumer,
+            uid=self.uid,
+            progress_interval=progress_interval,
         )
 
     def follow(self, batch: FeedBatch) -> None:
@@ -48,6 +56,8 @@ async def look(client: AsyncHullClient, reading: FeedReading) -> None:
     with suppress(UnavailableError, HullReplacedError):
         async with reading.feed(client, 1.0) as feed:
             async for first in feed:
+                if reading.consumer is not None:
+                    return  # it begins where it is
                 if reading.after is None:
                     reading.follow(first)
                 if reading.after is not None:

@@ -87,6 +87,13 @@ LastFeedPosition = Annotated[
     Header(alias="Last-Event-ID", max_length=40_960, description="The id of the last event that was received."),
 ]
 FromTheBeginning = Annotated[bool, Query(description="Begin with the oldest batches that are kept.")]
+FeedConsumer = Annotated[
+    str | None,
+    Query(
+        pattern=NAME,
+        description="A durable consumer, which knows its place: batches after those acknowledged, or all that is kept.",
+    ),
+]
 Conflate = Annotated[bool, Query(description="Leave out events that cancel each other.")]
 
 
@@ -278,18 +285,22 @@ async def hull_feed(
     client: Caller,
     name: HullPath,
     after: AfterRevision = None,
+    consumer: FeedConsumer = None,
     last_event_id: LastEventId = None,
 ) -> Response:
     """Follow every batch of a hull with its rows: events "batch", each once and in order, with ids UID:REVISION.
 
-    It begins with the next batch unless Last-Event-ID or a revision says where. It needs the right to read the past of
-    the hull. The data is JSON, as described by the schema FeedBatch. Also: "lost", with the `first` and the `last`
-    revision of batches that are kept no more and were not sent; "replaced", when another hull has the name now, whose
-    batches follow; and "problem", which ends the stream.
+    It begins with the next batch unless Last-Event-ID, a revision or a consumer says where; a consumer acknowledges
+    with `PUT /hulls/{name}/feed/consumers/{consumer}`, and is sent what it has not acknowledged. It needs the right to
+    read the past of the hull. The data is JSON, as described by the schema FeedBatch. Also: "lost", with the `first`
+    and the `last` revision of batches that are kept no more and were not sent; "replaced", when another hull has the
+    name now, whose batches follow; and "problem", which ends the stream.
     """
+    if consumer is not None and after is not None:
+        raise ValueError("give either consumer, which knows its place, or after")
     resume = resumed(last_event_id)
-    uid, place = ("", after) if resume is None else resume
-    return await _feed(request, client, FeedReading(name, None, uid, place))
+    uid, place = ("", after) if resume is None or consumer is not None else resume
+    return await _feed(request, client, FeedReading(name, None, uid, place, consumer))
 
 
 @router.get("/feed", response_class=Described, responses=events(documents.OF_FEED))
@@ -298,18 +309,22 @@ async def feed_of_many(
     client: Caller,
     prefix: Prefix = "",
     begin: FromTheBeginning = False,
+    consumer: FeedConsumer = None,
     last_event_id: LastFeedPosition = None,
 ) -> Response:
     """Follow every batch of all hulls of a prefix, those to come, too: events "batch", each once, by their commits.
 
-    It begins with the next batch unless Last-Event-ID says where, or `begin`. It needs the right to read the past of
+    It begins with the next batch unless Last-Event-ID, `begin` or a consumer says where; a consumer acknowledges with
+    `PUT /feed/consumers/{consumer}`, and is sent what it has not acknowledged. It needs the right to read the past of
     the prefix. Events without an id belong together with those up to the next id. The data is JSON, as described by the
     schema FeedBatch. Also: "lost", with the `first` and the `last` revision of batches that are kept no more and were
     not sent; "deleted", with a `hull` that was deleted; "hulls" after Last-Event-ID, with the uids of the `hulls` that
     there are, by name: what a reader has of others is no more; and "problem", which ends the stream.
     """
-    position = None if last_event_id is None else position_of(last_event_id)
-    return await _feed(request, client, FeedReading(None, prefix, "", position or (0 if begin else None)))
+    if consumer is not None and begin:
+        raise ValueError("give either consumer, which knows its place, or begin")
+    position = None if last_event_id is None or consumer is not None else position_of(last_event_id)
+    return await _feed(request, client, FeedReading(None, prefix, "", position or (0 if begin else None), consumer))
 
 
 async def _feed(request: Request, client: AsyncHullClient, reading: FeedReading) -> EventStream:

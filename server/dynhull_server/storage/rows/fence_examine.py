@@ -15,6 +15,7 @@ from ...state.fences.model.records import Consumer
 from .encoding import checksum, weight
 from .event_blocks import Runs, decode_runs
 from .event_rows import decode_delay
+from .feed_rows import NO_FENCE, feed_consumer_from
 from .fence_ledger import DropInside, DropStaged, FenceStep
 from .fence_rows import consumer_values, found_fences
 from .fence_runs import FenceRows, Staged, Start
@@ -76,14 +77,17 @@ class FenceExamination:
         self._events()
         payload = "payload" if self._contents else "NULL"
         ledger.inside_ids = self._each("insides", f"sequence, part, parts, checksum, {payload}", self._take_inside)
-        ledger.consumer_ids = self._each("consumers", "name, acknowledged, lost, checksum", self._take_consumer)
+        of_consumers = "name, acknowledged, lost, checksum"
+        ledger.consumer_ids = self._each("consumers", of_consumers, self._take_consumer, self._take_feed_consumer)
         if self._has_delays:
             ledger.delay_ids = self._each("delays", "checksum, payload", self._take_delay)
         for number, fence in self._fences.items():
             self._judge(fence)
             self._ledger.runs.begin(number)
-        found.rows = sum(fence.count for fence in self._fences.values()) + len(self._ledger.events)
-        found.sum = sum(fence.sum for fence in self._fences.values()) + self._ledger.events.sum
+        consumers = ledger.feed_consumers.values()
+        found.rows = sum(fence.count for fence in self._fences.values()) + len(ledger.events) + len(consumers)
+        found.sum = sum(fence.sum for fence in self._fences.values()) + ledger.events.sum
+        found.sum += sum(each.weight for each in consumers)
         found.next_number = max((number + 1 for number in self._fences), default=1)
         names = Counter(fence.row.name for fence in self._fences.values())
         found.fatal += [f"{times} fences have the name {name!r}" for name, times in names.items() if times > 1]
@@ -97,12 +101,16 @@ class FenceExamination:
             found = weight(each.checksum, each.number)
             self._fences[each.number] = FenceRows(each.row, found, found)
 
-    def _each(self, table: str, columns: str, take: Callable[..., None]) -> "count[int]":
+    def _each(
+        self, table: str, columns: str, take: Callable[..., None], of_no_fence: Callable[..., None] | None = None
+    ) -> "count[int]":
         """Take the rows of a table with their fences; the others are dead. Returns the numbers of rows to come."""
         newest = 0
         for newest, number, *values in self._reader.every(table, f"rowid, fence, {columns}"):
             fence = self._fences.get(number)
-            if fence is None:
+            if number == NO_FENCE and of_no_fence is not None:
+                of_no_fence(newest, *values)
+            elif fence is None:
                 self._ledger.dead[table].append(newest)
             else:
                 take(newest, fence, *values)
@@ -175,6 +183,16 @@ class FenceExamination:
             self._blame(fence, f"the consumer {name!r} is damaged")
             return
         fence.put_consumer(consumer, place, weight(stored, number))
+
+    def _take_feed_consumer(self, place: int, text: Any, acknowledged: Any, time: Any, stored: Any) -> None:
+        try:
+            found = feed_consumer_from(text, acknowledged, time, stored, place)
+        except (ValueError, TypeError, AttributeError, struct.error) as error:
+            self._found.fatal.append(f"row {place} of consumers of feeds is damaged ({error})")
+            return
+        if found.consumer.id in self._ledger.feed_consumers:
+            self._found.fatal.append(f"the consumer {found.consumer.id.name!r} of a feed is stored twice")
+        self._ledger.feed_consumers[found.consumer.id] = found
 
     def _take_delay(self, place: int, fence: FenceRows, stored: Any, payload: Any) -> None:
         try:

@@ -6,10 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ...state.changes import Change
+from ...state.feed_consumers import ConsumerId, DropFeedConsumer, FeedConsumer, PutFeedConsumer
 from ...state.records import Append, CommitStamp, Create, Delete, HullRow
 from ..port import NotCommittedError
 from .batch_rows import batch_checksum
 from .encoding import checksum, encode, weight
+from .feed_rows import StoredFeedConsumer, feed_consumer_values, stored_feed_consumer
 from .fence_ledger import FenceChanges, FenceStep
 from .hull_rows import values
 from .ledger import HullRows, Ledger, StoredSnapshot
@@ -183,6 +185,8 @@ class Group:
         self.commit = CommitStamp(self.before.commits + 1, max(self.before.committed, now))
         # The hulls it concerns, after the changes so far.
         self._now: dict[int, _Now] = {}
+        # The consumers of feeds that they change; None for those that are deleted.
+        self._feed_consumers: dict[ConsumerId, StoredFeedConsumer | None] = {}
         self._effects: list[Callable[[], object]] = []
         self.statements: list[Statement] = []
         self._fences = FenceChanges(ledger, self.statements, self._effects)
@@ -242,6 +246,10 @@ class Group:
                 self._drop_erasure(change)
             case DropDeadSegment():
                 self._drop_dead_segment(change.place)
+            case PutFeedConsumer():
+                self._put_feed_consumer(change.consumer)
+            case DropFeedConsumer():
+                self._drop_feed_consumer(change.id)
             case _:
                 self._fences.take(change)  # any other kind is an error of types
 
@@ -391,6 +399,22 @@ class Group:
         if place in dead:
             self.statements.append(Remove("segments", (place,)))
             self._effects.append(lambda: dead.remove(place))
+
+    def _put_feed_consumer(self, consumer: FeedConsumer) -> None:
+        self._drop_feed_consumer(consumer.id)
+        stored = stored_feed_consumer(consumer, next(self._ledger.consumer_ids))
+        self._feed_consumers[consumer.id] = stored
+        self.totals = self.totals.plus(0, 0, stored.weight, 1)
+        self.statements.append(Insert("consumers", (stored.place, *feed_consumer_values(consumer))))
+        self._effects.append(lambda: self._ledger.feed_consumers.__setitem__(consumer.id, stored))
+
+    def _drop_feed_consumer(self, ident: ConsumerId) -> None:
+        known = self._feed_consumers.get(ident, self._ledger.feed_consumers.get(ident))
+        if known is not None:
+            self._feed_consumers[ident] = None
+            self.totals = self.totals.plus(0, 0, -known.weight, -1)
+            self.statements.append(Remove("consumers", (known.place,)))
+            self._effects.append(lambda: self._ledger.feed_consumers.pop(ident, None))
 
     def _replace_segment(self, values: Values) -> None:
         self.statements += [Remove("segments", (values[0],)), Insert("segments", values)]

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...state.records import DEFAULT, HullRow, HullSettings, QuarantineRules, Window
 from .encoding import checksum
-from .tables import Reader
+from .tables import FORMAT, Reader
 
 # The settings that are objects of their own.
 NESTED: dict[str, type[Window | QuarantineRules]] = {"window": Window, "quarantine": QuarantineRules}
@@ -91,17 +91,7 @@ def _of_format_3(number: int, name: str, uid: str, created: float, settings: str
 FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {
     1: ("id, name, created, config", _of_format_1),
     2: ("id, name, uid, created, max_points, checksum", _of_format_2),
-    3: ("id, name, uid, created, settings, checksum", _of_format_3),
-    4: ("id, name, uid, created, settings, checksum", _of_format_3),
-    5: ("id, name, uid, created, settings, checksum", _of_format_3),
-    6: ("id, name, uid, created, settings, checksum", _of_format_3),
-    7: ("id, name, uid, created, settings, checksum", _of_format_3),
-    8: ("id, name, uid, created, settings, checksum", _of_format_3),
-    9: ("id, name, uid, created, settings, checksum", _of_format_3),
-    10: ("id, name, uid, created, settings, checksum", _of_format_3),
-    11: ("id, name, uid, created, settings, checksum", _of_format_3),
-    12: ("id, name, uid, created, settings, checksum", _of_format_3),
-    13: ("id, name, uid, created, settings, checksum", _of_format_3),
+    **dict.fromkeys(range(3, FORMAT + 1), ("id, name, uid, created, settings, checksum", _of_format_3)),
 }
 
 

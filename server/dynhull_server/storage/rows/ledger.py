@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Self
 
+from ...state.feed_consumers import ConsumerId
 from ...state.records import HullRow
 from .event_directory import EventDirectory
+from .feed_rows import StoredFeedConsumer
 from .fence_runs import FenceRows, FenceRuns, Staged
 from .segment_rows import StoredErasure, StoredSegment
 from .totals import Totals
@@ -174,6 +176,7 @@ class Ledger:
         event_ids, inside_ids, consumer_ids, delay_ids, start_ids: the same for fences.
         events: the rows of events.
         staged: by fence, the rows of events that are not valid yet, in order.
+        feed_consumers: the consumers of feeds.
     """
 
     totals: Totals = field(default_factory=Totals)
@@ -191,6 +194,7 @@ class Ledger:
     start_ids: "count[int]" = field(default_factory=lambda: count(1))
     events: EventDirectory = field(default_factory=EventDirectory)
     staged: dict[int, list[Staged]] = field(default_factory=dict)
+    feed_consumers: dict[ConsumerId, StoredFeedConsumer] = field(default_factory=dict)
     runs: FenceRuns = field(init=False)
 
     def __post_init__(self) -> None:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ...state.changes import Change
 from ...state.errors import words
+from ...state.feed_consumers import FeedConsumer
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
 from ...state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
 from ...state.tracks import KeyChanges
@@ -288,6 +289,11 @@ class RowStorage(ABC):
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
         """A reader, and the rows of a hull as of the same moment; KeyError if no hull has that number."""
         return self._reading(lambda ledger: ledger.hulls[number].copy())
+
+    def feed_consumers(self) -> list[FeedConsumer]:
+        """The consumers of feeds as last committed."""
+        with self._visible:
+            return [each.consumer for each in self._settled().feed_consumers.values()]
 
     def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
         """Fences as last committed."""

@@ -8,9 +8,9 @@ from ..port import StorageError
 if TYPE_CHECKING:
     from array import array
 
-# The present format of rows, which has alarms among the fences; and the first ones with fences, delayed events, events
+# The present format of rows, which has consumers of feeds; and the first ones with fences, delayed events, events
 # of many fences in a row, the commits of batches, and segments of the past.
-FORMAT = 13
+FORMAT = 14
 FENCES_SINCE, DELAYS_SINCE, STARTS_SINCE, COMMITS_SINCE, SEGMENTS_SINCE = 4, 6, 7, 11, 12
 
 # The columns of each table in the present format; the first is the number of the row.

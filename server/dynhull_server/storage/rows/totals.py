@@ -25,7 +25,8 @@ class Totals(NamedTuple):
         next_number: a number greater than that of any hull ever created.
         mode: STOPPED or one of MODES. In the database file itself it is STOPPED only if the log has no acknowledged
             commits.
-        fence_rows: the number of rows of fences: their own, and those of events, consumers and who is inside.
+        fence_rows: the number of rows of fences: their own, and those of events, consumers and who is inside. And of
+            consumers of feeds.
         committed: the time of the last commit, in microseconds since 1970; it never goes back.
     """
 

@@ -170,6 +170,7 @@ SCHEMAS: dict[int, dict[str, str] | dict[str, str | None]] = {
     10: FORMAT_10,
     11: FORMAT_11,
     12: TABLES,  # it had no alarms among the fences
+    13: TABLES,  # it had no consumers of feeds
     FORMAT: TABLES,
 }
 
