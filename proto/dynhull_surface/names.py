@@ -77,6 +77,7 @@ NAMES: Mapping[str, Name] = {
     "batch.puts.points": Name(row="position"),
     "batch.puts.times": Name(option="--time", row="time"),
     "batch.puts.expire_times": Name(option="--expires", row="time to leave"),
+    "batch.puts.accuracies": Name(option="--accuracy", row="accuracy"),
     "batch.puts.ttl": Name(),
     "batch.puts.condition": Name(("only",)),
     "batch.removes": Name(("remove",), row="key"),

@@ -145,6 +145,12 @@ class FenceSettings:
         "How long a subject must be on the other side before it enters or leaves. Default: no time.",
         least=0,
     )
+    by_accuracy: bool = setting(
+        False,
+        "by_accuracy",
+        "Whether a subject whose position has an accuracy enters or leaves only once it is on the other side by more "
+        "than that.",
+    )
     near: float = setting(
         0.0, "near_distance", "With `other_hull`: the hulls are near while their distance is at most this.", least=0
     )

@@ -60,4 +60,4 @@ def _contents(stored: "Stored") -> Contents:
         None if each is None else each.astype("datetime64[us]").view(np.int64)  # NaT is NO_TIME
         for each in (stored.times, stored.expire_times)
     )
-    return Contents(stored.points, stored.keys, times, deadlines)
+    return Contents(stored.points, stored.keys, times, deadlines, accuracies=stored.accuracies)

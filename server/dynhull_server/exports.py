@@ -42,11 +42,13 @@ def in_parts(contents: Contents) -> Iterator[Contents]:
     for first in range(0, max(len(contents), 1), ROWS_A_STEP):
         rows = slice(first, first + ROWS_A_STEP)
         times, deadlines = (None if each is None else each[rows] for each in (contents.times, contents.deadlines))
-        yield Contents(contents.points[rows], None if contents.keys is None else contents.keys[rows], times, deadlines)
+        keys = None if contents.keys is None else contents.keys[rows]
+        accuracies = None if contents.accuracies is None else contents.accuracies[rows]
+        yield Contents(contents.points[rows], keys, times, deadlines, accuracies=accuracies)
 
 
 def write_csv(file: Path, parts: Iterable[Contents], *, geographic: bool = False) -> None:
-    """Write columns key, x, y (lon, lat), time and expires, those that the hull has; string keys in quotes."""
+    """Write columns key, x, y (lon, lat), time, expires, accuracy, those that the hull has; string keys in quotes."""
     with file.open("w", encoding="utf-8", newline="") as out:
         first, parts = _begun(parts)
         out.write(",".join(_names(first, geographic=geographic)) + "\n")
@@ -56,11 +58,13 @@ def write_csv(file: Path, parts: Iterable[Contents], *, geographic: bool = False
                 columns.append(list(map(_quoted if isinstance(part.keys, PackedKeys) else str, key_list(part.keys))))
             columns += [list(map(repr, axis)) for axis in part.points.T.tolist()]
             columns += [_texts(times) for times in (part.times, part.deadlines) if times is not None]
+            if part.accuracies is not None:
+                columns.append(list(map(repr, part.accuracies.tolist())))
             out.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
 def write_geojson(file: Path, parts: Iterable[Contents], *, geographic: bool = False) -> None:
-    """Write a feature for each point: its key as the id, its times as the properties time and expires.
+    """Write a feature for each point: its key as the id, and the properties time, expires and accuracy.
 
     Longitudes of a geographic hull beyond 180 degrees are written as the same place within (RFC 7946). Of a plane the
     coordinate reference system is null, so that readers do not take its points for longitudes and latitudes.
@@ -78,13 +82,13 @@ def write_geojson(file: Path, parts: Iterable[Contents], *, geographic: bool = F
 
 
 def write_parquet(file: Path, parts: Iterable[Contents], *, geographic: bool = False) -> None:
-    """Write columns key (string or uint64), x, y (lon, lat), time and expires (UTC), those that the hull has."""
+    """Write columns key (string or uint64), x, y (lon, lat), time and expires (UTC), accuracy, those that there are."""
     import pyarrow as pa  # slow to load, and only this format needs it
     import pyarrow.parquet as pq
 
     first, parts = _begun(parts)
     key = pa.string() if isinstance(first.keys, PackedKeys) else pa.uint64()
-    types = {"key": key, **dict.fromkeys(_axes(geographic=geographic), pa.float64())}
+    types = {"key": key, **dict.fromkeys(_axes(geographic=geographic), pa.float64()), "accuracy": pa.float64()}
     time = pa.timestamp("us", tz="UTC")
     schema = pa.schema([(name, types.get(name, time)) for name in _names(first, geographic=geographic)])
     with pq.ParquetWriter(file, schema) as out:
@@ -92,6 +96,8 @@ def write_parquet(file: Path, parts: Iterable[Contents], *, geographic: bool = F
             columns = [] if part.keys is None else [_arrow_keys(part.keys)]
             columns += [pa.array(np.ascontiguousarray(axis)) for axis in part.points.T]
             columns += [pa.array(_dates(times), time) for times in (part.times, part.deadlines) if times is not None]
+            if part.accuracies is not None:
+                columns.append(pa.array(part.accuracies))
             out.write_table(pa.table(columns, schema))
 
 
@@ -104,7 +110,8 @@ def _axes(*, geographic: bool) -> tuple[str, str]:
 
 def _names(contents: Contents, *, geographic: bool) -> list[str]:
     axes = dict.fromkeys(_axes(geographic=geographic), True)
-    columns = {"key": contents.keys, **axes, "time": contents.times, "expires": contents.deadlines}
+    columns: dict[str, object] = {"key": contents.keys, **axes, "time": contents.times, "expires": contents.deadlines}
+    columns["accuracy"] = contents.accuracies
     return [name for name, column in columns.items() if column is not None]
 
 
@@ -119,8 +126,11 @@ def _features(part: Contents, *, geographic: bool) -> Iterator[dict[str, Any]]:
     points = (_within_180(part.points) if geographic else part.points).tolist()
     ids = [{}] * len(points) if part.keys is None else [{"id": _json_key(key)} for key in key_list(part.keys)]
     times, expires = ([""] * len(points) if each is None else _texts(each) for each in (part.times, part.deadlines))
-    for point, of_key, *dates in zip(points, ids, times, expires, strict=True):
-        properties = {name: text for name, text in zip(("time", "expires"), dates, strict=True) if text}
+    errors = [0.0] * len(points) if part.accuracies is None else part.accuracies.tolist()
+    for point, of_key, *dates, error in zip(points, ids, times, expires, errors, strict=True):
+        properties: dict[str, Any] = {name: text for name, text in zip(("time", "expires"), dates, strict=True) if text}
+        if error:
+            properties["accuracy"] = error
         geometry = {"type": "Point", "coordinates": point}
         yield {"type": "Feature", **of_key, "properties": properties, "geometry": geometry}
 

@@ -115,7 +115,13 @@ def test_keys_and_transfers(gateway: Gateway, name: str) -> None:
     assert again[north]["duplicate"]
     found = gateway.post(f"{at}/positions", {"keys": ["a", "b"]}).json
     assert (found["present"], found["positions"]) == ([False, True], [[None, None], [1, 1]])
-    assert gateway.get(f"{other}/entities").json == {"revision": 1, "keys": ["a"], "points": [[5, 5]], "times": None}
+    assert gateway.get(f"{other}/entities").json == {
+        "revision": 1,
+        "keys": ["a"],
+        "points": [[5, 5]],
+        "times": None,
+        "accuracies": None,
+    }
     assert gateway.post(f"{at}/locate", {"keys": ["a"], "keys_of": south}).json["sides"] == [-1]
     gateway.post(f"{at}/points", {"keys": ["t"], "points": [[2, 2]], "times": ["2026-01-31T12:00:00Z"]})
     at_noon = gateway.get(f"{at}/entities").json

@@ -29,6 +29,7 @@ def test_rules_held_positions_releases_and_drops(gateway: Gateway, name: str) ->
             "growth": 5.5,
             "revision": 2,
             "confirmations": 0,
+            "accuracy": 0.0,
         }
     ]
     changed = gateway.post(f"{at}/points", {"release": ["e"], "drop": ["b", "x"]}, Idempotency_Key=f"{name}:1").json

@@ -333,6 +333,7 @@ def keyed(keys):
         conditions = (None, "absent", "present")
         columns = keys(6, revision), points(6, revision), keys(revision % 3, -revision % 7)
         rows = KeyRows(*columns, times(6, revision), times(6, -revision % 7), conditions[revision % 3])
+        rows.accuracies = np.arange(6) * 0.25
         some = KeyRows(*columns) if revision % 2 else KeyRows(keys(0), NOTHING, keys(1))
         of = {0: rows, 1: some, 2: Expiry(None, 3)}[revision // 3 % 3]
         return Record(revision, of, f"gateway {revision % 2}", revision, clock=2**53 - revision)
@@ -348,7 +349,11 @@ KINDS = {
         keyed(strings),
         lambda n: Contents(points(n), strings(n), times(n), times(n, 1)),
     ),
-    "integers": (HullSettings("int"), keyed(integers), lambda n: Contents(points(n), integers(n))),
+    "integers": (
+        HullSettings("int"),
+        keyed(integers),
+        lambda n: Contents(points(n), integers(n), accuracies=np.arange(n) % 3 / 7),
+    ),
 }
 
 
@@ -381,7 +386,9 @@ def held(keys, n, seed=0):
     measures = np.random.default_rng(seed).random((2, n))
     measures[:, 1::3] = np.nan
     revisions = np.arange(n) + 1
-    return HeldRows(keys(n, seed), points(n, seed), times(n, seed), times(n, seed + 1), *measures, revisions, revisions)
+    whens = times(n, seed), times(n, seed + 1)
+    accuracies = np.arange(n) % 2 * 1.5
+    return HeldRows(keys(n, seed), points(n, seed), *whens, *measures, revisions, revisions, accuracies)
 
 
 @pytest.mark.parametrize(("kind", "keys"), [("str", strings), ("int", integers)])

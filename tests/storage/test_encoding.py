@@ -55,6 +55,10 @@ def optional_times(rows):
     return st.none() | of_rows(times, rows, np.int64)
 
 
+def accuracies(rows):
+    return of_rows(st.floats(0, allow_infinity=False), rows, np.float64)
+
+
 @st.composite
 def point_rows(draw):
     inserts, deletes = draw(counts), draw(counts)
@@ -66,7 +70,8 @@ def held_rows(draw, kind, rows):
     measures = of_rows(st.floats(0) | st.just(np.nan), rows, np.float64)
     numbers = of_rows(st.integers(0, 2**62), rows, np.int64)
     whens = of_rows(times, rows, np.int64)
-    return HeldRows(*map(draw, (keys(kind, rows), points(rows), whens, whens, measures, measures, numbers, numbers)))
+    columns = keys(kind, rows), points(rows), whens, whens, measures, measures, numbers, numbers, accuracies(rows)
+    return HeldRows(*map(draw, columns))
 
 
 limits = st.none() | st.floats(1, allow_infinity=False)
@@ -83,7 +88,8 @@ def key_rows(draw):
     kind, puts, removes = draw(st.sampled_from(["str", "int"])), draw(counts), draw(counts)
     condition = draw(st.sampled_from([None, "absent", "present"]))
     columns = keys(kind, puts), points(puts), keys(kind, removes), optional_times(puts), optional_times(puts)
-    return KeyRows(*map(draw, columns), condition, draw(st.none() | held_changes(kind)))
+    held, errors = draw(st.none() | held_changes(kind)), draw(st.none() | accuracies(puts))
+    return KeyRows(*map(draw, columns), condition, held, errors)
 
 
 centers = st.none() | st.tuples(st.floats(-180, 180, exclude_max=True), st.floats(-90, 90))
@@ -118,6 +124,7 @@ def contents(draw):
         draw(optional_times(rows)),
         draw(optional_times(rows)),
         None if kind is None else draw(st.none() | held_rows(kind, draw(st.integers(1, 30)))),
+        None if kind is None else draw(st.none() | accuracies(rows)),
     )
 
 

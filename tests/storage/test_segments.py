@@ -370,11 +370,13 @@ def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():
         np.array([np.nan, 1e300, 2.0]),
         np.array([1, 2, 3]),
         np.array([0, 1, 2]),
+        np.array([0.1, 0, 5e-324]),
     )
     times, deadlines = np.array([5, NO_TIME, 7]), np.array([FOREVER, 9, 10])
     keyed = [
         KeyRows(some, hard[:3], none, times, deadlines, "absent"),
         KeyRows(some, hard[1:], none, np.full(3, NO_TIME), np.full(3, FOREVER)),
+        KeyRows(some, hard[1:], none, accuracies=np.array([0.1 + 0.2, 0, 1e308])),
         KeyRows(none, hard[:0], some, held=HeldChange(held, some, QuarantineRules(max_growth=2.0))),
         KeyRows(none, hard[:0], none, held=HeldChange(held, none)),
         Expiry(None, 3),

@@ -9,10 +9,13 @@ ONLY = "Put only keys that are absent from the hull, or only those that are pres
 TTL = "Time after which the keys leave the hull: 500ms, 90s, 30m, 2h or 7d; a number alone is seconds."
 
 
-def conditions(only: Only | None, ttl: str | None, *, key: str | None, expires: str | None) -> dict[str, Any]:
+def conditions(
+    only: Only | None, ttl: str | None, *, key: str | None, expires: str | None, accuracy: str | None
+) -> dict[str, Any]:
     """The arguments `only` and `ttl` of a put. ValueError if options contradict each other."""
     reasons = {
         "--expires": (expires, "leave at times of their own"),
+        "--accuracy": (accuracy, "have accuracies"),
         "--ttl": (ttl, "leave"),
         "--only": (only, "are known"),
     }

@@ -48,6 +48,13 @@ def put(
         str | None,
         typer.Option(help="Event time of the positions: ISO 8601 with a time zone, or a number since 1970."),
     ] = None,
+    accuracy: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            help="Accuracy of the positions, in units of the coordinates, or metres on the globe. Default: no error.",
+        ),
+    ] = None,
     only: Annotated[Only | None, typer.Option(help=ONLY)] = None,
     ttl: Annotated[str | None, typer.Option(help=TTL)] = None,
     as_json: AsJson = False,
@@ -64,7 +71,9 @@ def put(
 
     keys, points = keyed_rows(row)
     times = None if time is None else as_times([TimeReader("--time").read(time)] * len(keys))
-    applied = client.put(name, keys_for(client, name, keys), points, times, only=only, ttl=duration(ttl, "--ttl"))
+    accuracies = None if accuracy is None else [accuracy] * len(keys)
+    named, given = keys_for(client, name, keys), duration(ttl, "--ttl")
+    applied = client.put(name, named, points, times, only=only, ttl=given, accuracies=accuracies)
     if applied.points == applied.inserted:  # the hull was empty, and can still be another one
         _remark_on_degrees(client, name, points)
     _report(

@@ -173,7 +173,12 @@ def _ask_about_keys(
 
     keys = keys_for(client, keys_of or name, given_keys(arguments))
     if question is Question.POSITIONS:
-        answers = hull.positions(keys).positions.tolist()
+        found = hull.positions(keys)
+        answers = found.positions.tolist()
+        if as_json and found.accuracies is not None:
+            for key, answer, accuracy in zip(keys, answers, found.accuracies.tolist(), strict=True):
+                typer.echo(json_line(asked=key, answer=answer, accuracy=accuracy))
+            return
     elif question is Question.DISTANCE:
         answers = hull.distance(keys=keys, keys_of=keys_of, layer=layer).distances.tolist()
     else:

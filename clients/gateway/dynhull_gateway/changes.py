@@ -9,7 +9,7 @@ from . import schemas
 from .problems import FieldError
 from .schemas import Batch, Key, Move
 
-OF_KEYS = ("keys", "points", "remove", "only", "ttl", "expire_times")
+OF_KEYS = ("keys", "points", "remove", "only", "ttl", "expire_times", "accuracies")
 OF_POINTS = ("insert", "delete", "move")
 OF_QUARANTINE = ("release", "drop")
 
@@ -41,7 +41,7 @@ def check(batch: Batch, *within: str) -> None:
 def _check_rows(batch: Batch, within: Sequence[str]) -> None:
     """FieldError if columns are of different lengths, or keys of different kinds."""
     if batch.keys is not None:
-        _check_columns(batch, "keys", ("points", "times", "expire_times"), within)
+        _check_columns(batch, "keys", ("points", "times", "expire_times", "accuracies"), within)
     elif batch.insert is not None:
         _check_columns(batch, "insert", ("times",), within)
     if batch.move is not None:
@@ -79,6 +79,7 @@ async def apply(
             only=batch.only,
             ttl=batch.ttl,
             expire_times=batch.expire_times,
+            accuracies=batch.accuracies,
             **numbered,
         )
     if batch.release is not None:

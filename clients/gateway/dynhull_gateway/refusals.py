@@ -25,6 +25,7 @@ COLUMNS = {
     "puts.times": "time",
     "insert_times": "time",
     "puts.expire_times": "expires",
+    "puts.accuracies": "accuracy",
 }
 HINT_OF_ROWS = (
     'a row with a key is {"key": KEY, "x": X, "y": Y}, and one without [X, Y]; ?keys=none, str or int leaves keys out '

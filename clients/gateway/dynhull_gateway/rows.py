@@ -16,7 +16,7 @@ from .invalid import detail, path_in
 from .problems import cut, pointer, shown
 from .schemas import Key, Number, Point
 
-LABELS = "key", "time", "expires"
+LABELS = "key", "time", "expires", "accuracy"
 COLUMNS = "x", "y"
 
 
@@ -27,6 +27,7 @@ class Row(NamedTuple):
     point: Sequence[float] | None
     time: int | None = None
     expires: int | None = None
+    accuracy: float | None = None
 
 
 class RowError(Exception):
@@ -70,6 +71,7 @@ class XY(TypedDict):
     key: NotRequired[Key]
     time: NotRequired[Any]
     expires: NotRequired[Any]
+    accuracy: NotRequired[Any]
 
 
 class LonLat(TypedDict):
@@ -81,6 +83,7 @@ class LonLat(TypedDict):
     key: NotRequired[Key]
     time: NotRequired[Any]
     expires: NotRequired[Any]
+    accuracy: NotRequired[Any]
 
 
 POINT = TypeAdapter(Point).validate_json
@@ -91,8 +94,8 @@ LON_LAT = TypeAdapter(LonLat).validate_json
 class Ndjson:
     """Lines of JSON: arrays of x and y, objects, or points and features of GeoJSON.
 
-    Objects have coordinates with any of the names that columns have, and "key", "time" and "expires" if wanted. Other
-    members are left out. With `delete`, a key alone is a row.
+    Objects have coordinates with any of the names that columns have, and "key", "time", "expires" and "accuracy" if
+    wanted. Other members are left out. With `delete`, a key alone is a row.
     """
 
     def __init__(self, labels: LabelReader, *, delete: bool) -> None:
@@ -117,10 +120,10 @@ class Ndjson:
                     point = given["lon"], given["lat"]
                     if point[1] == UNKNOWN_LATITUDE:
                         raise BadValueError("lat", NOT_AVAILABLE, point[1])
-                times: tuple[int | None, ...] = ()
-                if "time" in given or "expires" in given:
-                    times = self._labels.times(given.get("time"), given.get("expires"))
-                found.rows.append(Row(given.get("key"), _exact(point), *times))
+                others: tuple[Any, ...] = ()
+                if "time" in given or "expires" in given or "accuracy" in given:
+                    others = self._labels.others(*(given.get(name) for name in LABELS[1:]))
+                found.rows.append(Row(given.get("key"), _exact(point), *others))
                 continue
             except (ValidationError, BadValueError):
                 pass
@@ -149,16 +152,17 @@ class Ndjson:
             return Row(None, [number(each, name) for each, name in zip(value, COLUMNS, strict=False)])
         if not isinstance(value, dict):
             raise ValueError("must be an object, or an array of two numbers")
-        key, time, expires = self._labels(*(value.get(name) for name in LABELS))
+        labels = self._labels(*(value.get(name) for name in LABELS))
+        key, others = labels[0], labels[1:]
         names = pair_of(value)
         if names is None and self._delete and key is not None:
             return Row(key, None)
         x, y = names or COLUMNS
-        return Row(key, available((x, y), coordinate(value.get(x), x), coordinate(value.get(y), y)), time, expires)
+        return Row(key, available((x, y), coordinate(value.get(x), x), coordinate(value.get(y), y)), *others)
 
 
 class Csv:
-    """Lines of CSV: first the names of the columns, of the coordinates and of key, time and expires if there are any.
+    """Lines of CSV: first the names of the columns: coordinates, and key, time, expires, accuracy if there are any.
 
     A row is one line, with as many fields as the first. Columns with other names are left out.
     """
@@ -198,8 +202,8 @@ class Csv:
             point = available((x, y), coordinate(cells[first], x), coordinate(cells[second], y))
         if not self._labelled:
             return Row(None, point)
-        key, time, expires = self._labels(*(None if place is None else cells[place] for place in self._places))
-        return Row(key, point, time, expires)
+        labels = self._labels(*(None if place is None else cells[place] for place in self._places))
+        return Row(labels[0], point, *labels[1:])
 
     def _name(self, first: list[str]) -> None:
         header = [each.strip().lower() for each in first]
@@ -214,7 +218,8 @@ class Csv:
             x, y = names
             self._point = (x, header.index(x)), (y, header.index(y))
         elif not (self._delete and "key" in header):
-            detail = "the first line must name the columns, separated by commas: x,y or lon,lat, and key, time, expires"
+            labels = ", ".join(LABELS)
+            detail = f"the first line must name the columns, separated by commas: x,y or lon,lat, and {labels}"
             raise RowError(0, detail, "header", cut(",".join(header)))
 
 
@@ -236,7 +241,7 @@ Geometry = Annotated[PointGeometry | MultiPointGeometry, Field(discriminator="ty
 
 
 class PointFeature(BaseModel):
-    """A feature; its id is the key, and its properties have the times."""
+    """A feature; its id is the key, and its properties have the times and the accuracy."""
 
     type: Literal["Feature"]
     id: Key | None = None
@@ -282,17 +287,18 @@ class GeoJson:
             self._add(feature, found, ("features", index))
 
     def _add(self, geo: Any, found: Found, within: tuple[str | int, ...]) -> None:
-        key, time, expires = None, None, None
+        key: str | int | None = None
+        others: Sequence[Any] = ()
         if isinstance(geo, PointFeature):
             properties = geo.properties or {}
             try:
-                key, time, expires = self._labels(geo.id, properties.get("time"), properties.get("expires"))
+                key, *others = self._labels(geo.id, *(properties.get(name) for name in LABELS[1:]))
             except BadValueError as error:
                 found.add_bad(error.problem, pointer((*within, "properties", error.name)), shown(error.value))
                 return
             geo = geo.geometry
         positions = [geo.coordinates] if isinstance(geo, PointGeometry) else geo.coordinates
-        found.rows.extend(Row(key, (x, y), time, expires) for x, y, *_ in positions)
+        found.rows.extend(Row(key, (x, y), *others) for x, y, *_ in positions)
 
     def _refuse(self, text: bytes, error: ValidationError, found: Found, within: tuple[str | int, ...]) -> None:
         """Add what is wrong with a text; of a collection with features, one by one."""

@@ -66,6 +66,7 @@ Key = (
     Annotated[str, Field(strict=True, min_length=1, max_length=255)]
     | Annotated[int, Field(strict=True, ge=0, le=LARGEST)]
 )
+Accuracy = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 Time = Annotated[AwareDatetime, BeforeValidator(_time)]
 Points = list[Point]
 
@@ -366,6 +367,9 @@ class Batch(Request):
     only: Literal["absent", "present"] | None = Field(None, description="Put only new keys, or only known ones.")
     ttl: Seconds | None = Field(None, description="Seconds after which the keys leave.")
     expire_times: list[Time] | None = Field(None, description="Times at which the keys leave, instead of ttl.")
+    accuracies: list[Accuracy] | None = Field(
+        None, description="How far the positions may be from where the keys are: units of the coordinates, or metres."
+    )
     missing: Literal["raise", "count"] | None = Field(
         None, description="Refuse the batch, or skip and count, where a point or key is not there."
     )
@@ -510,6 +514,7 @@ class Positions(Response):
     positions: Rows
     present: Booleans
     times: Times | None
+    accuracies: Numbers | None = Field(None, description="How far each may be from where its key is; null for none.")
 
 
 class KeyTrack(Response):
@@ -535,6 +540,7 @@ class Entities(Response):
     keys: Keys
     points: Rows
     times: Times | None
+    accuracies: Numbers | None = Field(None, description="As for `Positions`.")
 
 
 @answering(sdk.Sampled)

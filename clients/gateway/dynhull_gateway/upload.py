@@ -153,11 +153,12 @@ class Upload:
             if self._shape is None:
                 self._shape = shape
             if shape != self._shape:
-                column = next(column for column in range(len(LABELS)) if shape[column] is not self._shape[column])
+                column = next(column for column in range(len(shape)) if shape[column] is not self._shape[column])
                 here, first = (_kind(each[column], LABELS[column]) for each in (shape, self._shape))
                 found.refuse(number, f"is {here}, and {first} in the first row: all rows are alike", LABELS[column])
-            elif row.expires is not None and row.key is None:
-                found.refuse(number, "is for rows with a key", "expires")
+            elif row.key is None and (row.expires is not None or row.accuracy):
+                field = "expires" if row.expires is not None else "accuracy"
+                found.refuse(number, "is for rows with a key", field)
         found.bad.sort(key=lambda error: error.row)
 
     def _leave_out(self, bad: Iterable[RowError], first: int) -> None:
@@ -227,10 +228,12 @@ class Upload:
             return await self._client.apply(self._name, delete=points, missing="count", **numbered)
         times = _times([row.time for row in rows])
         if keyed:
-            expires = _times([row.expires for row in rows])
-            return await self._client.put(
-                self._name, keys, points, times, expire_times=expires, **self._conditions, **numbered
-            )
+            accuracies = [row.accuracy or 0.0 for row in rows]
+            columns: dict[str, Any] = {
+                "expire_times": _times([row.expires for row in rows]),
+                "accuracies": accuracies if any(accuracies) else None,
+            }
+            return await self._client.put(self._name, keys, points, times, **columns, **self._conditions, **numbered)
         if self._conditions:
             raise ValueError(f"{' and '.join(self._conditions)} are for rows with keys to put")
         return await self._client.apply(self._name, insert=points, times=times, **numbered)

@@ -71,13 +71,15 @@ class AsyncWriter:
         only: Only | None = None,
         ttl: float | timedelta | None = None,
         expire_times: Any = None,
+        accuracies: Any = None,
         sequence: int | None = None,
     ) -> asyncio.Future[Applied]:
         """Add points to the next batch, all to the same one; waits while too many are not acknowledged.
 
         Returns the future of the batch's effect. Arguments and errors as for `Writer.put`.
         """
-        parts = put_parts(self._writing, insert, delete, move, keys, points, times, only, ttl, expire_times)
+        columns = times, only, ttl, expire_times, accuracies
+        parts = put_parts(self._writing, insert, delete, move, keys, points, *columns)
         return await self._add(parts, sequence)
 
     async def remove(self, keys: Any, *, sequence: int | None = None) -> asyncio.Future[Applied]:

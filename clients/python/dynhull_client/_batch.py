@@ -11,6 +11,7 @@ from dynhull.arrays import as_points
 from dynhull.keys import take_keys
 from dynhull_proto.v1 import batch_pb2, points_pb2
 
+from ._accuracies import DOUBLE, as_accuracies
 from ._keys import checked_keys, decode_keys, encode_keys, plain_keys
 from ._times import encode_duration, encode_times
 
@@ -33,7 +34,6 @@ CONDITIONS = {
 }
 BYTES_PER_POINT = 16
 BYTES_PER_TIME = 8
-DOUBLE = np.dtype("<f8")
 
 
 class Batch:
@@ -50,6 +50,7 @@ class Batch:
         only: as for `HullClient.put`.
         ttl: as for `HullClient.put`.
         expire_times: as for `HullClient.put`.
+        accuracies: as for `HullClient.put`.
         release: keys in quarantine to let in. Without keys to put and to remove, as `drop`.
         drop: keys in quarantine whose held position is dropped.
         missing: for a key to remove or a point to delete that the hull does not hold, "raise" refuses the batch and
@@ -72,6 +73,7 @@ class Batch:
         only: Only | None = None,
         ttl: float | timedelta | None = None,
         expire_times: Any = None,
+        accuracies: Any = None,
         release: Any = None,
         drop: Any = None,
         missing: Missing | None = None,
@@ -109,6 +111,8 @@ class Batch:
                 self._rows += len(checked)
         if not (only is None and ttl is None and expire_times is None):
             self._set_conditions(only, ttl, expire_times)
+        if accuracies is not None:
+            self._set_accuracies(accuracies)
 
     @property
     def message(self) -> batch_pb2.Batch:
@@ -165,6 +169,14 @@ class Batch:
             rows = len(puts.points.packed) // BYTES_PER_POINT
             puts.expire_times.CopyFrom(encode_times(expire_times, rows, "expire_times"))
 
+    def _set_accuracies(self, accuracies: Any) -> None:
+        if not self._message.HasField("puts"):
+            raise ValueError("accuracies are given with keys to put")
+        rows = len(self._message.puts.points.packed) // BYTES_PER_POINT
+        found = as_accuracies(accuracies, rows)
+        if len(found):
+            self._message.puts.accuracies.packed = np.asarray(found, DOUBLE).tobytes()
+
 
 def join_batches(batches: Sequence[batch_pb2.Batch]) -> batch_pb2.Batch:
     """One batch with the effect of all these, which have the same policies.
@@ -186,7 +198,13 @@ def keep_last_rows(batch: batch_pb2.Batch) -> None:
         return
     batch.puts.keys.CopyFrom(encode_keys(take_keys(keys, rows)))
     puts = batch.puts
-    columns = (puts.points, BYTES_PER_POINT), (puts.times, BYTES_PER_TIME), (puts.expire_times, BYTES_PER_TIME)
+    columns: tuple[tuple[Any, int], ...] = (
+        (puts.points, BYTES_PER_POINT),
+        (puts.times, BYTES_PER_TIME),
+        (puts.expire_times, BYTES_PER_TIME),
+    )
+    if puts.HasField("accuracies"):
+        columns += ((puts.accuracies, BYTES_PER_TIME),)
     for packed, width in columns:
         packed.packed = np.frombuffer(packed.packed, f"V{width}")[rows].tobytes() if packed.packed else b""
 

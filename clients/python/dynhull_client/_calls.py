@@ -288,6 +288,7 @@ def put(
     only: Only | None = None,
     ttl: float | timedelta | None = None,
     expire_times: Any = None,
+    accuracies: Any = None,
     producer: str = "",
     sequence: int = 0,
     may_skip: bool = False,
@@ -308,12 +309,15 @@ def put(
         only: "absent" puts new keys only, "present" known keys only; the others are skipped and counted.
         ttl: the time after which the keys leave the hull, in seconds or as a timedelta.
         expire_times: (n,) the times at which the keys leave, instead of `ttl`.
+        accuracies: (n,) how far the positions may be from where the keys really are, in units of the coordinates, or
+            metres on the globe; without them, or 0, not at all. Fences with `by_accuracy` ask for them.
         producer: as for `apply`.
         sequence: as for `apply`.
         may_skip: as for `apply`.
         timeout: seconds, instead of the client's.
     """
-    batch = Batch(keys=keys, points=points, times=times, remove=remove, only=only, ttl=ttl, expire_times=expire_times)
+    columns = {"keys": keys, "points": points, "times": times, "expire_times": expire_times, "accuracies": accuracies}
+    batch = Batch(**columns, remove=remove, only=only, ttl=ttl)
     return apply_batch(name, batch, producer, sequence, may_skip, timeout)
 
 

@@ -5,11 +5,13 @@ from datetime import datetime
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull._value import Value
 from dynhull.arrays import Points
 from dynhull_proto.v1 import batch_pb2, feed_pb2, points_pb2
 
+from ._accuracies import decode_accuracies
 from ._batch import Only
 from ._keys import KeyTuple, decode_names
 from ._messages import BATCH, CAUSES, Cause, decode_points
@@ -74,6 +76,7 @@ class FeedBatch(Value):
         times: (n,) the event times of the points put or inserted, as datetime64[us] in UTC, NaT for one without; None
             if none has one.
         expire_times: (n,) when the points put leave the hull, likewise.
+        accuracies: (n,) how far the points put may be from where the keys really are; None if none has an error.
         only: "absent" or "present" if only keys that are so are put; None for all.
         lenient: whether some of the deletes are of points that the hull did not have.
         expired: the number of points that have left because of the time.
@@ -105,6 +108,7 @@ class FeedBatch(Value):
     deletes: Points = field(default_factory=_no_points)
     times: Times | None = None
     expire_times: Times | None = None
+    accuracies: npt.NDArray[np.float64] | None = None
     only: Only | None = None
     lenient: bool = False
     expired: int = 0
@@ -173,6 +177,7 @@ def decode_feed_batch(message: feed_pb2.FeedBatch, after: int | None) -> FeedBat
         deletes=decode_points(batch.deletes),
         times=None if times is None else _known(times),
         expire_times=_known(puts.expire_times) if puts.HasField("expire_times") else None,
+        accuracies=decode_accuracies(puts),
         only=ONLY.get(puts.condition),
         lenient=batch.missing_points == batch_pb2.MISSING_POINT_POLICY_COUNT,
         expired=message.expired_count,

@@ -144,8 +144,9 @@ class FenceEvent:
             if the subject is gone, infinite if the area is empty.
         event_time: the event time of the position; None if it has none.
         time: when the server made the event; None for "lost" and "progress".
-        first_time: with `confirmations` or `min_dwell`, when the subject changed its side; of "dwell", since when it
-            has been inside; None otherwise.
+        first_time: with `confirmations` or `min_dwell`, when the subject changed its side; with `by_accuracy` alone,
+            since when its position has been on this side, if it was not certain at once; of "dwell", since when it has
+            been inside; None otherwise.
         inside: of "snapshot" and "closed", the subjects that were inside, by hull.
         first: of "lost", the first sequence that was dropped; 0 otherwise.
         last: of "lost", the last sequence that was dropped; 0 otherwise.

@@ -48,6 +48,7 @@ def fence_events_between(  # noqa: D417  # the settings have their descriptions
     dwell: float | timedelta | None = None,
     confirmations: int = 0,
     min_dwell: float | timedelta | None = None,
+    by_accuracy: bool = False,
     near: float = 0.0,
     without_self: bool = False,
     layer: int = 1,

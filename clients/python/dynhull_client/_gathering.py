@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dynhull.arrays import as_points
 
+from ._accuracies import as_accuracies
 from ._batch import Batch, join_batches, keep_last_rows
 from ._keys import checked_keys, plain_keys
 from ._times import as_microseconds, as_times
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 Key = str | int
 UNTIMED = 0
-Conditions = tuple["Only | None", "float | timedelta | None", bool]
+Conditions = tuple["Only | None", "float | timedelta | None", bool, bool]
 """What all keys that a batch puts have in common."""
 
 
@@ -37,7 +38,7 @@ class Part:
         rows: their number.
         latest: the last time of each key that is put, UNTIMED without times; None for a key that is removed.
         timed: whether the rows to put or insert have times; None if there are none.
-        conditions: `only`, `ttl` and whether there are times at which keys leave; None if no keys are put.
+        conditions: `only`, `ttl`, whether there are times at which keys leave, and accuracies; None if no keys are put.
         kind: str or int for such keys, None for points without keys.
     """
 
@@ -60,6 +61,7 @@ def put_parts(
     only: Only | None,
     ttl: float | timedelta | None,
     expire_times: Any,
+    accuracies: Any,
 ) -> list[Part]:
     """Points to insert, delete and move as one part, or keys to put as `Batch` takes them.
 
@@ -67,17 +69,21 @@ def put_parts(
     """
     options: Any = {"insert": insert, "delete": delete, "move": move, "only": only, "ttl": ttl}
     options["missing"] = writing.missing
+    columns: dict[str, Any]
     if keys is None or points is None:
-        batch = Batch(**options, keys=keys, points=points, times=times, expire_times=expire_times)
+        columns = {"keys": keys, "points": points, "times": times, "expire_times": expire_times}
+        batch = Batch(**options, **columns, accuracies=accuracies)
         return [Part(batch.message, batch.rows, timed=None if insert is None else times is not None)]
     checked, xy = checked_keys(keys), as_points(points, "points", on_globe=None)
     micros = None if times is None else as_microseconds(times, len(xy), "times")
     ends = None if expire_times is None else as_microseconds(expire_times, len(xy), "expire_times")
-    columns: dict[str, Any] = {"keys": checked, "points": xy, "times": as_times(micros), "expire_times": as_times(ends)}
+    errors = None if accuracies is None else as_accuracies(accuracies, len(xy))
+    columns = {"keys": checked, "points": xy, "times": as_times(micros), "expire_times": as_times(ends)}
+    columns["accuracies"] = errors
     whole = Batch(**options, **columns)
     names = plain_keys(checked)
     stamps = [UNTIMED] * len(names) if micros is None else micros.tolist()
-    conditions: Conditions = only, ttl, ends is not None
+    conditions: Conditions = only, ttl, ends is not None, errors is not None
     parts = []
     for rows in _runs(names, stamps, writing.coalesce == "last" and only != "absent"):
         batch = whole

@@ -89,6 +89,7 @@ class Ingest:
         only: Only | None = None,
         ttl: float | timedelta | None = None,
         expire_times: Any = None,
+        accuracies: Any = None,
     ) -> None:
         """Send a batch; arguments as for `HullClient.apply` or, in a keyed hull, `HullClient.put`.
 
@@ -109,6 +110,7 @@ class Ingest:
             only=only,
             ttl=ttl,
             expire_times=expire_times,
+            accuracies=accuracies,
         )
         if self._call is None:
             raise RuntimeError("an Ingest works only inside its context: write `with client.ingest(...) as stream:`")

@@ -21,6 +21,7 @@ from dynhull_surface.counts import Applied as Applied
 from dynhull_surface.counts import Ingested as Ingested
 from dynhull_surface.settings import Ahead, Clock, Ordering
 
+from ._accuracies import decode_accuracies
 from ._keys import KeyTuple, decode_keys, decode_names, join_keys
 from ._quarantine_messages import Quarantine, decode_quarantine
 from ._times import Times, decode_time, decode_times
@@ -196,12 +197,14 @@ class Positions(Value):
         present: (n,) whether the hull has the key.
         times: (n,) the event time of each key as datetime64[us] in UTC; 1970-01-01 for a key without one, NaT for a
             missing key; None if the hull has no times.
+        accuracies: (n,) how far each may be from where its key really is, 0 for a missing key; None if all are exact.
     """
 
     revision: int
     positions: Points
     present: npt.NDArray[np.bool_]
     times: Times | None = None
+    accuracies: npt.NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -213,12 +216,14 @@ class Entities(Value):
         keys: n keys, ascending, strings bytewise: `dynhull.keys.PackedKeys` or (n,) uint64.
         points: (n, 2) their positions.
         times: as in `Positions`.
+        accuracies: as in `Positions`.
     """
 
     revision: int
     keys: Keys
     points: Points
     times: Times | None = None
+    accuracies: npt.NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -231,6 +236,7 @@ class Stored(Value):
         keys: n keys, ascending, strings bytewise: `dynhull.keys.PackedKeys` or (n,) uint64; None if it is not keyed.
         times: (n,) event times as datetime64[us] in UTC, NaT for a point without one; None if the hull has none.
         expire_times: (n,) when each leaves the hull, likewise; None if no put has said so.
+        accuracies: (n,) how far each may be from where it really is; None if no position has an error.
     """
 
     info: HullInfo
@@ -238,6 +244,7 @@ class Stored(Value):
     keys: Keys | None = None
     times: Times | None = None
     expire_times: Times | None = None
+    accuracies: npt.NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -576,7 +583,7 @@ def decode_positions(message: hull_service_pb2.GetPositionsResponse) -> Position
     times = decode_times(message.times) if message.HasField("times") else None
     if times is not None:
         times[~present] = np.datetime64("NaT")
-    return Positions(message.revision, decode_points(message.positions), present, times)
+    return Positions(message.revision, decode_points(message.positions), present, times, decode_accuracies(message))
 
 
 def decode_entities(parts: Iterable[hull_service_pb2.ReadEntitiesResponse]) -> Entities:
@@ -587,6 +594,7 @@ def decode_entities(parts: Iterable[hull_service_pb2.ReadEntitiesResponse]) -> E
         join_keys([decode_keys(part.keys) for part in received]),
         np.concatenate([decode_points(part.positions) for part in received]),
         np.concatenate([decode_times(part.times) for part in received]) if received[0].HasField("times") else None,
+        np.concatenate([decode_accuracies(part) for part in received]) if received[0].HasField("accuracies") else None,
     )
 
 
@@ -601,6 +609,7 @@ def decode_stored(message: hull_service_pb2.ReadPointsResponse, info: HullInfo) 
         keys,
         _known(message.times, message.timed) if message.HasField("times") else None,
         _known(message.expire_times, message.expires) if message.HasField("expire_times") else None,
+        decode_accuracies(message),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from dynhull_proto.v1 import hull_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
+from ._accuracies import decode_accuracies
 from ._keys import decode_names
 from ._times import decode_times
 
@@ -47,6 +48,7 @@ class HeldPosition:
         growth: the factor by which it would enlarge the area of the hull; None if that is not too much.
         revision: the revision that has held it.
         confirmations: how often it has been confirmed so far.
+        accuracy: how far it may be from where its key really is.
     """
 
     key: str | int
@@ -56,6 +58,7 @@ class HeldPosition:
     growth: float | None
     revision: int
     confirmations: int
+    accuracy: float = 0.0
 
     @property
     def breaks(self) -> tuple[str, ...]:
@@ -89,6 +92,7 @@ def decode_held(message: pb.ListHeldResponse) -> list[HeldPosition]:
     times: list[datetime | None] = [None] * len(keys)
     if message.HasField("times"):
         times = [each.replace(tzinfo=UTC) for each in decode_times(message.times).tolist()]
+    accuracies = decode_accuracies(message)
     columns = zip(
         keys,
         positions,
@@ -97,11 +101,12 @@ def decode_held(message: pb.ListHeldResponse) -> list[HeldPosition]:
         message.growths,
         message.revisions,
         message.confirmations,
+        [0.0] * len(keys) if accuracies is None else accuracies.tolist(),
         strict=True,
     )
     return [
-        HeldPosition(key, (x, y), time, _broken(speed), _broken(growth), revision, confirmed)
-        for key, (x, y), time, speed, growth, revision, confirmed in columns
+        HeldPosition(key, (x, y), time, _broken(speed), _broken(growth), revision, confirmed, accuracy)
+        for key, (x, y), time, speed, growth, revision, confirmed, accuracy in columns
     ]
 
 

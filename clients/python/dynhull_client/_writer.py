@@ -85,6 +85,7 @@ class Writer:
         only: Only | None = None,
         ttl: float | timedelta | None = None,
         expire_times: Any = None,
+        accuracies: Any = None,
         sequence: int | None = None,
     ) -> Future[Applied]:
         """Add points to the next batch; waits while too many are not acknowledged.
@@ -103,6 +104,7 @@ class Writer:
             only: the keys to put, only new or only known ones; as for `HullClient.put`.
             ttl: the time after which the keys leave; as for `HullClient.put`.
             expire_times: (n,) the times at which the keys leave; as for `HullClient.put`.
+            accuracies: (n,) how far the positions may be from where the keys really are; as for `HullClient.put`.
             sequence: with `may_skip`, the number of these changes, greater than all before; without it, None.
 
         Returns:
@@ -115,7 +117,8 @@ class Writer:
             DynhullError: the writer has ended: nothing after its error was applied.
             RuntimeError: the writer is closed, or belongs to the process that this one was forked from.
         """
-        parts = put_parts(self._writing, insert, delete, move, keys, points, times, only, ttl, expire_times)
+        columns = times, only, ttl, expire_times, accuracies
+        parts = put_parts(self._writing, insert, delete, move, keys, points, *columns)
         return self._add(parts, sequence)
 
     def remove(self, keys: Any, *, sequence: int | None = None) -> Future[Applied]:

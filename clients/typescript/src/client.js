@@ -74,6 +74,7 @@ import { pastOf } from "./past.js"
  * @property {"absent" | "present"} [only]
  * @property {number} [ttl]
  * @property {readonly Time[]} [expireTimes]
+ * @property {readonly number[]} [accuracies]
  * @property {"raise" | "count"} [missing]
  *
  * @typedef {object} Numbering makes a batch one that may be sent again
@@ -109,6 +110,7 @@ import { pastOf } from "./past.js"
  * @property {number} [dwell]
  * @property {number} [confirmations]
  * @property {number} [minDwell]
+ * @property {boolean} [byAccuracy]
  * @property {number} [near]
  * @property {boolean} [withoutSelf]
  * @property {number} [layer]

@@ -27,7 +27,7 @@ from google.protobuf import duration_pb2 as google_dot_protobuf_dot_duration__pb
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x64ynhull_proto/v1/batch.proto\x12\ndynhull.v1\x1a\x1d\x64ynhull_proto/v1/points.proto\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\x90\x03\n\x05\x42\x61tch\x12#\n\x07inserts\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12#\n\x07\x64\x65letes\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\x12 \n\x05moves\x18\x03 \x01(\x0b\x32\x11.dynhull.v1.Moves\x12\x36\n\x0emissing_points\x18\x04 \x01(\x0e\x32\x1e.dynhull.v1.MissingPointPolicy\x12\x1e\n\x04puts\x18\x05 \x01(\x0b\x32\x10.dynhull.v1.Puts\x12!\n\x07removes\x18\x06 \x01(\x0b\x32\x10.dynhull.v1.Keys\x12\x32\n\x0cmissing_keys\x18\x07 \x01(\x0e\x32\x1c.dynhull.v1.MissingKeyPolicy\x12\'\n\x0cinsert_times\x18\x08 \x01(\x0b\x32\x11.dynhull.v1.Times\x12\"\n\x08releases\x18\t \x01(\x0b\x32\x10.dynhull.v1.Keys\x12\x1f\n\x05\x64rops\x18\n \x01(\x0b\x32\x10.dynhull.v1.Keys\"\xea\x01\n\x04Puts\x12\x1e\n\x04keys\x18\x01 \x01(\x0b\x32\x10.dynhull.v1.Keys\x12\"\n\x06points\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\x12 \n\x05times\x18\x03 \x01(\x0b\x32\x11.dynhull.v1.Times\x12+\n\tcondition\x18\x04 \x01(\x0e\x32\x18.dynhull.v1.PutCondition\x12&\n\x03ttl\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\'\n\x0c\x65xpire_times\x18\x06 \x01(\x0b\x32\x11.dynhull.v1.Times\"V\n\x05Moves\x12#\n\x07origins\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12(\n\x0c\x64\x65stinations\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\"\xe4\x02\n\x0b\x42\x61tchResult\x12\x10\n\x08revision\x18\x01 \x01(\x04\x12\x14\n\x0chull_changed\x18\x05 \x01(\x08\x12\x13\n\x0bpoint_count\x18\x06 \x01(\x04\x12\x11\n\tduplicate\x18\x07 \x01(\x08\x12.\n\nclock_time\x18\x0e \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x11\n\theld_rows\x18\x10 \x03(\r\x12\x10\n\x08inserted\x18\x02 \x01(\x04\x12\x0f\n\x07\x64\x65leted\x18\x03 \x01(\x04\x12\x0f\n\x07missing\x18\x04 \x01(\x04\x12\r\n\x05moved\x18\x08 \x01(\x04\x12\r\n\x05stale\x18\t \x01(\x04\x12\x0c\n\x04late\x18\n \x01(\x04\x12\x0f\n\x07skipped\x18\x0b \x01(\x04\x12\x0f\n\x07\x63lamped\x18\x0c \x01(\x04\x12\x0f\n\x07\x65victed\x18\r \x01(\x04\x12\x0c\n\x04held\x18\x0f \x01(\x04\x12\x10\n\x08released\x18\x11 \x01(\x04\x12\x0f\n\x07\x64ropped\x18\x12 \x01(\x04*\x82\x01\n\x0cPutCondition\x12\x1d\n\x19PUT_CONDITION_UNSPECIFIED\x10\x00\x12\x18\n\x14PUT_CONDITION_ALWAYS\x10\x01\x12\x1b\n\x17PUT_CONDITION_IF_ABSENT\x10\x02\x12\x1c\n\x18PUT_CONDITION_IF_PRESENT\x10\x03*s\n\x10MissingKeyPolicy\x12\"\n\x1eMISSING_KEY_POLICY_UNSPECIFIED\x10\x00\x12\x1c\n\x18MISSING_KEY_POLICY_COUNT\x10\x01\x12\x1d\n\x19MISSING_KEY_POLICY_REFUSE\x10\x02*U\n\x05\x43\x61use\x12\x15\n\x11\x43\x41USE_UNSPECIFIED\x10\x00\x12\x0f\n\x0b\x43\x41USE_BATCH\x10\x01\x12\x10\n\x0c\x43\x41USE_EXPIRY\x10\x02\x12\x12\n\x0e\x43\x41USE_RECENTER\x10\x03*{\n\x12MissingPointPolicy\x12$\n MISSING_POINT_POLICY_UNSPECIFIED\x10\x00\x12\x1f\n\x1bMISSING_POINT_POLICY_REFUSE\x10\x01\x12\x1e\n\x1aMISSING_POINT_POLICY_COUNT\x10\x02\x42/\n\ndynhull.v1Z\x14\x64ynhull/v1;dynhullv1\xaa\x02\nDynhull.V1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x64ynhull_proto/v1/batch.proto\x12\ndynhull.v1\x1a\x1d\x64ynhull_proto/v1/points.proto\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\"\x90\x03\n\x05\x42\x61tch\x12#\n\x07inserts\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12#\n\x07\x64\x65letes\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\x12 \n\x05moves\x18\x03 \x01(\x0b\x32\x11.dynhull.v1.Moves\x12\x36\n\x0emissing_points\x18\x04 \x01(\x0e\x32\x1e.dynhull.v1.MissingPointPolicy\x12\x1e\n\x04puts\x18\x05 \x01(\x0b\x32\x10.dynhull.v1.Puts\x12!\n\x07removes\x18\x06 \x01(\x0b\x32\x10.dynhull.v1.Keys\x12\x32\n\x0cmissing_keys\x18\x07 \x01(\x0e\x32\x1c.dynhull.v1.MissingKeyPolicy\x12\'\n\x0cinsert_times\x18\x08 \x01(\x0b\x32\x11.dynhull.v1.Times\x12\"\n\x08releases\x18\t \x01(\x0b\x32\x10.dynhull.v1.Keys\x12\x1f\n\x05\x64rops\x18\n \x01(\x0b\x32\x10.dynhull.v1.Keys\"\x96\x02\n\x04Puts\x12\x1e\n\x04keys\x18\x01 \x01(\x0b\x32\x10.dynhull.v1.Keys\x12\"\n\x06points\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\x12 \n\x05times\x18\x03 \x01(\x0b\x32\x11.dynhull.v1.Times\x12+\n\tcondition\x18\x04 \x01(\x0e\x32\x18.dynhull.v1.PutCondition\x12&\n\x03ttl\x18\x05 \x01(\x0b\x32\x19.google.protobuf.Duration\x12\'\n\x0c\x65xpire_times\x18\x06 \x01(\x0b\x32\x11.dynhull.v1.Times\x12*\n\naccuracies\x18\x07 \x01(\x0b\x32\x16.dynhull.v1.Accuracies\"V\n\x05Moves\x12#\n\x07origins\x18\x01 \x01(\x0b\x32\x12.dynhull.v1.Points\x12(\n\x0c\x64\x65stinations\x18\x02 \x01(\x0b\x32\x12.dynhull.v1.Points\"\xe4\x02\n\x0b\x42\x61tchResult\x12\x10\n\x08revision\x18\x01 \x01(\x04\x12\x14\n\x0chull_changed\x18\x05 \x01(\x08\x12\x13\n\x0bpoint_count\x18\x06 \x01(\x04\x12\x11\n\tduplicate\x18\x07 \x01(\x08\x12.\n\nclock_time\x18\x0e \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x11\n\theld_rows\x18\x10 \x03(\r\x12\x10\n\x08inserted\x18\x02 \x01(\x04\x12\x0f\n\x07\x64\x65leted\x18\x03 \x01(\x04\x12\x0f\n\x07missing\x18\x04 \x01(\x04\x12\r\n\x05moved\x18\x08 \x01(\x04\x12\r\n\x05stale\x18\t \x01(\x04\x12\x0c\n\x04late\x18\n \x01(\x04\x12\x0f\n\x07skipped\x18\x0b \x01(\x04\x12\x0f\n\x07\x63lamped\x18\x0c \x01(\x04\x12\x0f\n\x07\x65victed\x18\r \x01(\x04\x12\x0c\n\x04held\x18\x0f \x01(\x04\x12\x10\n\x08released\x18\x11 \x01(\x04\x12\x0f\n\x07\x64ropped\x18\x12 \x01(\x04*\x82\x01\n\x0cPutCondition\x12\x1d\n\x19PUT_CONDITION_UNSPECIFIED\x10\x00\x12\x18\n\x14PUT_CONDITION_ALWAYS\x10\x01\x12\x1b\n\x17PUT_CONDITION_IF_ABSENT\x10\x02\x12\x1c\n\x18PUT_CONDITION_IF_PRESENT\x10\x03*s\n\x10MissingKeyPolicy\x12\"\n\x1eMISSING_KEY_POLICY_UNSPECIFIED\x10\x00\x12\x1c\n\x18MISSING_KEY_POLICY_COUNT\x10\x01\x12\x1d\n\x19MISSING_KEY_POLICY_REFUSE\x10\x02*U\n\x05\x43\x61use\x12\x15\n\x11\x43\x41USE_UNSPECIFIED\x10\x00\x12\x0f\n\x0b\x43\x41USE_BATCH\x10\x01\x12\x10\n\x0c\x43\x41USE_EXPIRY\x10\x02\x12\x12\n\x0e\x43\x41USE_RECENTER\x10\x03*{\n\x12MissingPointPolicy\x12$\n MISSING_POINT_POLICY_UNSPECIFIED\x10\x00\x12\x1f\n\x1bMISSING_POINT_POLICY_REFUSE\x10\x01\x12\x1e\n\x1aMISSING_POINT_POLICY_COUNT\x10\x02\x42/\n\ndynhull.v1Z\x14\x64ynhull/v1;dynhullv1\xaa\x02\nDynhull.V1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,20 +35,20 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'dynhull_proto.v1.batch_pb2'
 if not _descriptor._USE_C_DESCRIPTORS:
   _globals['DESCRIPTOR']._loaded_options = None
   _globals['DESCRIPTOR']._serialized_options = b'\n\ndynhull.v1Z\024dynhull/v1;dynhullv1\252\002\nDynhull.V1'
-  _globals['_PUTCONDITION']._serialized_start=1228
-  _globals['_PUTCONDITION']._serialized_end=1358
-  _globals['_MISSINGKEYPOLICY']._serialized_start=1360
-  _globals['_MISSINGKEYPOLICY']._serialized_end=1475
-  _globals['_CAUSE']._serialized_start=1477
-  _globals['_CAUSE']._serialized_end=1562
-  _globals['_MISSINGPOINTPOLICY']._serialized_start=1564
-  _globals['_MISSINGPOINTPOLICY']._serialized_end=1687
+  _globals['_PUTCONDITION']._serialized_start=1272
+  _globals['_PUTCONDITION']._serialized_end=1402
+  _globals['_MISSINGKEYPOLICY']._serialized_start=1404
+  _globals['_MISSINGKEYPOLICY']._serialized_end=1519
+  _globals['_CAUSE']._serialized_start=1521
+  _globals['_CAUSE']._serialized_end=1606
+  _globals['_MISSINGPOINTPOLICY']._serialized_start=1608
+  _globals['_MISSINGPOINTPOLICY']._serialized_end=1731
   _globals['_BATCH']._serialized_start=141
   _globals['_BATCH']._serialized_end=541
   _globals['_PUTS']._serialized_start=544
-  _globals['_PUTS']._serialized_end=778
-  _globals['_MOVES']._serialized_start=780
-  _globals['_MOVES']._serialized_end=866
-  _globals['_BATCHRESULT']._serialized_start=869
-  _globals['_BATCHRESULT']._serialized_end=1225
+  _globals['_PUTS']._serialized_end=822
+  _globals['_MOVES']._serialized_start=824
+  _globals['_MOVES']._serialized_end=910
+  _globals['_BATCHRESULT']._serialized_start=913
+  _globals['_BATCHRESULT']._serialized_end=1269
 # @@protoc_insertion_point(module_scope)

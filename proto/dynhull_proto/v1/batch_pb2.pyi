@@ -77,20 +77,22 @@ class Batch(_message.Message):
     def __init__(self, inserts: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., deletes: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., moves: _Optional[_Union[Moves, _Mapping]] = ..., missing_points: _Optional[_Union[MissingPointPolicy, str]] = ..., puts: _Optional[_Union[Puts, _Mapping]] = ..., removes: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., missing_keys: _Optional[_Union[MissingKeyPolicy, str]] = ..., insert_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., releases: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., drops: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ...) -> None: ...
 
 class Puts(_message.Message):
-    __slots__ = ("keys", "points", "times", "condition", "ttl", "expire_times")
+    __slots__ = ("keys", "points", "times", "condition", "ttl", "expire_times", "accuracies")
     KEYS_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     TIMES_FIELD_NUMBER: _ClassVar[int]
     CONDITION_FIELD_NUMBER: _ClassVar[int]
     TTL_FIELD_NUMBER: _ClassVar[int]
     EXPIRE_TIMES_FIELD_NUMBER: _ClassVar[int]
+    ACCURACIES_FIELD_NUMBER: _ClassVar[int]
     keys: _points_pb2.Keys
     points: _points_pb2.Points
     times: _points_pb2.Times
     condition: PutCondition
     ttl: _duration_pb2.Duration
     expire_times: _points_pb2.Times
-    def __init__(self, keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., condition: _Optional[_Union[PutCondition, str]] = ..., ttl: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., expire_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
+    accuracies: _points_pb2.Accuracies
+    def __init__(self, keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., condition: _Optional[_Union[PutCondition, str]] = ..., ttl: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., expire_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., accuracies: _Optional[_Union[_points_pb2.Accuracies, _Mapping]] = ...) -> None: ...
 
 class Moves(_message.Message):
     __slots__ = ("origins", "destinations")

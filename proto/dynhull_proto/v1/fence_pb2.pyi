@@ -113,7 +113,7 @@ class FenceConsumer(_message.Message):
     def __init__(self, name: _Optional[str] = ..., acknowledged_sequence: _Optional[int] = ..., backlog: _Optional[int] = ..., oldest_event_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., lost: _Optional[int] = ...) -> None: ...
 
 class FenceConfig(_message.Message):
-    __slots__ = ("hull_area", "polygon_area", "circle_area", "subject_hull", "subject_prefix", "other_hull", "boundary", "margin", "near_distance", "initial", "report_crosses", "dwell", "confirmations", "min_dwell", "max_events", "max_event_age")
+    __slots__ = ("hull_area", "polygon_area", "circle_area", "subject_hull", "subject_prefix", "other_hull", "boundary", "margin", "near_distance", "initial", "report_crosses", "dwell", "confirmations", "min_dwell", "max_events", "max_event_age", "by_accuracy")
     HULL_AREA_FIELD_NUMBER: _ClassVar[int]
     POLYGON_AREA_FIELD_NUMBER: _ClassVar[int]
     CIRCLE_AREA_FIELD_NUMBER: _ClassVar[int]
@@ -130,6 +130,7 @@ class FenceConfig(_message.Message):
     MIN_DWELL_FIELD_NUMBER: _ClassVar[int]
     MAX_EVENTS_FIELD_NUMBER: _ClassVar[int]
     MAX_EVENT_AGE_FIELD_NUMBER: _ClassVar[int]
+    BY_ACCURACY_FIELD_NUMBER: _ClassVar[int]
     hull_area: HullArea
     polygon_area: PolygonArea
     circle_area: CircleArea
@@ -146,7 +147,8 @@ class FenceConfig(_message.Message):
     min_dwell: _duration_pb2.Duration
     max_events: int
     max_event_age: _duration_pb2.Duration
-    def __init__(self, hull_area: _Optional[_Union[HullArea, _Mapping]] = ..., polygon_area: _Optional[_Union[PolygonArea, _Mapping]] = ..., circle_area: _Optional[_Union[CircleArea, _Mapping]] = ..., subject_hull: _Optional[str] = ..., subject_prefix: _Optional[str] = ..., other_hull: _Optional[str] = ..., boundary: _Optional[_Union[FenceBoundary, str]] = ..., margin: _Optional[float] = ..., near_distance: _Optional[float] = ..., initial: _Optional[_Union[FenceInitial, str]] = ..., report_crosses: bool = ..., dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., confirmations: _Optional[int] = ..., min_dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_events: _Optional[int] = ..., max_event_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ...) -> None: ...
+    by_accuracy: bool
+    def __init__(self, hull_area: _Optional[_Union[HullArea, _Mapping]] = ..., polygon_area: _Optional[_Union[PolygonArea, _Mapping]] = ..., circle_area: _Optional[_Union[CircleArea, _Mapping]] = ..., subject_hull: _Optional[str] = ..., subject_prefix: _Optional[str] = ..., other_hull: _Optional[str] = ..., boundary: _Optional[_Union[FenceBoundary, str]] = ..., margin: _Optional[float] = ..., near_distance: _Optional[float] = ..., initial: _Optional[_Union[FenceInitial, str]] = ..., report_crosses: bool = ..., dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., confirmations: _Optional[int] = ..., min_dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_events: _Optional[int] = ..., max_event_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., by_accuracy: bool = ...) -> None: ...
 
 class HullArea(_message.Message):
     __slots__ = ("name", "without_self", "layer")

@@ -217,7 +217,7 @@ class ListHeldRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., page_size: _Optional[int] = ..., page_token: _Optional[str] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class ListHeldResponse(_message.Message):
-    __slots__ = ("revision", "keys", "positions", "times", "speeds", "growths", "revisions", "confirmations", "held_count", "next_page_token")
+    __slots__ = ("revision", "keys", "positions", "times", "speeds", "growths", "revisions", "confirmations", "held_count", "next_page_token", "accuracies")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
     POSITIONS_FIELD_NUMBER: _ClassVar[int]
@@ -228,6 +228,7 @@ class ListHeldResponse(_message.Message):
     CONFIRMATIONS_FIELD_NUMBER: _ClassVar[int]
     HELD_COUNT_FIELD_NUMBER: _ClassVar[int]
     NEXT_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    ACCURACIES_FIELD_NUMBER: _ClassVar[int]
     revision: int
     keys: _points_pb2.Keys
     positions: _points_pb2.Points
@@ -238,7 +239,8 @@ class ListHeldResponse(_message.Message):
     confirmations: _containers.RepeatedScalarFieldContainer[int]
     held_count: int
     next_page_token: str
-    def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., speeds: _Optional[_Iterable[float]] = ..., growths: _Optional[_Iterable[float]] = ..., revisions: _Optional[_Iterable[int]] = ..., confirmations: _Optional[_Iterable[int]] = ..., held_count: _Optional[int] = ..., next_page_token: _Optional[str] = ...) -> None: ...
+    accuracies: _points_pb2.Accuracies
+    def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., speeds: _Optional[_Iterable[float]] = ..., growths: _Optional[_Iterable[float]] = ..., revisions: _Optional[_Iterable[int]] = ..., confirmations: _Optional[_Iterable[int]] = ..., held_count: _Optional[int] = ..., next_page_token: _Optional[str] = ..., accuracies: _Optional[_Union[_points_pb2.Accuracies, _Mapping]] = ...) -> None: ...
 
 class ApplyRequest(_message.Message):
     __slots__ = ("name", "batch", "producer", "sequence", "may_skip", "after_sequence", "uid")
@@ -495,16 +497,18 @@ class GetPositionsRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class GetPositionsResponse(_message.Message):
-    __slots__ = ("revision", "positions", "present", "times")
+    __slots__ = ("revision", "positions", "present", "times", "accuracies")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     POSITIONS_FIELD_NUMBER: _ClassVar[int]
     PRESENT_FIELD_NUMBER: _ClassVar[int]
     TIMES_FIELD_NUMBER: _ClassVar[int]
+    ACCURACIES_FIELD_NUMBER: _ClassVar[int]
     revision: int
     positions: _points_pb2.Points
     present: bytes
     times: _points_pb2.Times
-    def __init__(self, revision: _Optional[int] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., present: _Optional[bytes] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
+    accuracies: _points_pb2.Accuracies
+    def __init__(self, revision: _Optional[int] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., present: _Optional[bytes] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., accuracies: _Optional[_Union[_points_pb2.Accuracies, _Mapping]] = ...) -> None: ...
 
 class ReadEntitiesRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time", "at_uid")
@@ -523,16 +527,18 @@ class ReadEntitiesRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class ReadEntitiesResponse(_message.Message):
-    __slots__ = ("revision", "keys", "positions", "times")
+    __slots__ = ("revision", "keys", "positions", "times", "accuracies")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     KEYS_FIELD_NUMBER: _ClassVar[int]
     POSITIONS_FIELD_NUMBER: _ClassVar[int]
     TIMES_FIELD_NUMBER: _ClassVar[int]
+    ACCURACIES_FIELD_NUMBER: _ClassVar[int]
     revision: int
     keys: _points_pb2.Keys
     positions: _points_pb2.Points
     times: _points_pb2.Times
-    def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ...) -> None: ...
+    accuracies: _points_pb2.Accuracies
+    def __init__(self, revision: _Optional[int] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., accuracies: _Optional[_Union[_points_pb2.Accuracies, _Mapping]] = ...) -> None: ...
 
 class ReadPointsRequest(_message.Message):
     __slots__ = ("name", "min_revision", "encoding", "at_revision", "at_time", "at_uid")
@@ -551,7 +557,7 @@ class ReadPointsRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., min_revision: _Optional[int] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ..., at_revision: _Optional[int] = ..., at_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., at_uid: _Optional[str] = ...) -> None: ...
 
 class ReadPointsResponse(_message.Message):
-    __slots__ = ("revision", "hull", "points", "keys", "times", "timed", "expire_times", "expires")
+    __slots__ = ("revision", "hull", "points", "keys", "times", "timed", "expire_times", "expires", "accuracies")
     REVISION_FIELD_NUMBER: _ClassVar[int]
     HULL_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
@@ -560,6 +566,7 @@ class ReadPointsResponse(_message.Message):
     TIMED_FIELD_NUMBER: _ClassVar[int]
     EXPIRE_TIMES_FIELD_NUMBER: _ClassVar[int]
     EXPIRES_FIELD_NUMBER: _ClassVar[int]
+    ACCURACIES_FIELD_NUMBER: _ClassVar[int]
     revision: int
     hull: _hull_pb2.Hull
     points: _points_pb2.Points
@@ -568,7 +575,8 @@ class ReadPointsResponse(_message.Message):
     timed: bytes
     expire_times: _points_pb2.Times
     expires: bytes
-    def __init__(self, revision: _Optional[int] = ..., hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., timed: _Optional[bytes] = ..., expire_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., expires: _Optional[bytes] = ...) -> None: ...
+    accuracies: _points_pb2.Accuracies
+    def __init__(self, revision: _Optional[int] = ..., hull: _Optional[_Union[_hull_pb2.Hull, _Mapping]] = ..., points: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., timed: _Optional[bytes] = ..., expire_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., expires: _Optional[bytes] = ..., accuracies: _Optional[_Union[_points_pb2.Accuracies, _Mapping]] = ...) -> None: ...
 
 class SupportRequest(_message.Message):
     __slots__ = ("name", "min_revision", "directions", "encoding", "include_keys", "layer", "at_revision", "at_time", "at_uid")

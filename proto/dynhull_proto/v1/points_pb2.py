@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1d\x64ynhull_proto/v1/points.proto\x12\ndynhull.v1\x1a\x1fgoogle/protobuf/timestamp.proto\"-\n\x06Points\x12\x0e\n\x06packed\x18\x01 \x01(\x0c\x12\x13\n\x0b\x63oordinates\x18\x02 \x03(\x01\"a\n\x04Keys\x12\x0f\n\x07lengths\x18\x01 \x01(\x0c\x12\x0c\n\x04text\x18\x02 \x01(\x0c\x12\x0f\n\x07strings\x18\x03 \x03(\t\x12\x17\n\x0fpacked_integers\x18\x04 \x01(\x0c\x12\x10\n\x08integers\x18\x05 \x03(\x04\"G\n\x05Times\x12\x0e\n\x06packed\x18\x01 \x01(\x0c\x12.\n\ntimestamps\x18\x02 \x03(\x0b\x32\x1a.google.protobuf.Timestamp*j\n\rPointEncoding\x12\x1e\n\x1aPOINT_ENCODING_UNSPECIFIED\x10\x00\x12\x19\n\x15POINT_ENCODING_PACKED\x10\x01\x12\x1e\n\x1aPOINT_ENCODING_COORDINATES\x10\x02\x42/\n\ndynhull.v1Z\x14\x64ynhull/v1;dynhullv1\xaa\x02\nDynhull.V1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1d\x64ynhull_proto/v1/points.proto\x12\ndynhull.v1\x1a\x1fgoogle/protobuf/timestamp.proto\"-\n\x06Points\x12\x0e\n\x06packed\x18\x01 \x01(\x0c\x12\x13\n\x0b\x63oordinates\x18\x02 \x03(\x01\"a\n\x04Keys\x12\x0f\n\x07lengths\x18\x01 \x01(\x0c\x12\x0c\n\x04text\x18\x02 \x01(\x0c\x12\x0f\n\x07strings\x18\x03 \x03(\t\x12\x17\n\x0fpacked_integers\x18\x04 \x01(\x0c\x12\x10\n\x08integers\x18\x05 \x03(\x04\",\n\nAccuracies\x12\x0e\n\x06packed\x18\x01 \x01(\x0c\x12\x0e\n\x06values\x18\x02 \x03(\x01\"G\n\x05Times\x12\x0e\n\x06packed\x18\x01 \x01(\x0c\x12.\n\ntimestamps\x18\x02 \x03(\x0b\x32\x1a.google.protobuf.Timestamp*j\n\rPointEncoding\x12\x1e\n\x1aPOINT_ENCODING_UNSPECIFIED\x10\x00\x12\x19\n\x15POINT_ENCODING_PACKED\x10\x01\x12\x1e\n\x1aPOINT_ENCODING_COORDINATES\x10\x02\x42/\n\ndynhull.v1Z\x14\x64ynhull/v1;dynhullv1\xaa\x02\nDynhull.V1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,12 +33,14 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'dynhull_proto.v1.points_pb2
 if not _descriptor._USE_C_DESCRIPTORS:
   _globals['DESCRIPTOR']._loaded_options = None
   _globals['DESCRIPTOR']._serialized_options = b'\n\ndynhull.v1Z\024dynhull/v1;dynhullv1\252\002\nDynhull.V1'
-  _globals['_POINTENCODING']._serialized_start=297
-  _globals['_POINTENCODING']._serialized_end=403
+  _globals['_POINTENCODING']._serialized_start=343
+  _globals['_POINTENCODING']._serialized_end=449
   _globals['_POINTS']._serialized_start=78
   _globals['_POINTS']._serialized_end=123
   _globals['_KEYS']._serialized_start=125
   _globals['_KEYS']._serialized_end=222
-  _globals['_TIMES']._serialized_start=224
-  _globals['_TIMES']._serialized_end=295
+  _globals['_ACCURACIES']._serialized_start=224
+  _globals['_ACCURACIES']._serialized_end=268
+  _globals['_TIMES']._serialized_start=270
+  _globals['_TIMES']._serialized_end=341
 # @@protoc_insertion_point(module_scope)

@@ -41,6 +41,14 @@ class Keys(_message.Message):
     integers: _containers.RepeatedScalarFieldContainer[int]
     def __init__(self, lengths: _Optional[bytes] = ..., text: _Optional[bytes] = ..., strings: _Optional[_Iterable[str]] = ..., packed_integers: _Optional[bytes] = ..., integers: _Optional[_Iterable[int]] = ...) -> None: ...
 
+class Accuracies(_message.Message):
+    __slots__ = ("packed", "values")
+    PACKED_FIELD_NUMBER: _ClassVar[int]
+    VALUES_FIELD_NUMBER: _ClassVar[int]
+    packed: bytes
+    values: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, packed: _Optional[bytes] = ..., values: _Optional[_Iterable[float]] = ...) -> None: ...
+
 class Times(_message.Message):
     __slots__ = ("packed", "timestamps")
     PACKED_FIELD_NUMBER: _ClassVar[int]

@@ -109,7 +109,12 @@ class ServedRoot:
             times = found.times
             if times is not None:
                 times = np.where(each.present, each.times, times)
-            found = Found(np.where(here, each.points, found.points), found.present | each.present, times)
+            accuracies = found.accuracies
+            if accuracies is None or each.accuracies is None:
+                accuracies = each.accuracies if accuracies is None else accuracies
+            else:
+                accuracies = accuracies + each.accuracies  # a key is in one shard
+            found = Found(np.where(here, each.points, found.points), found.present | each.present, times, accuracies)
         return counts, found, vertices
 
     async def contents(self) -> tuple[Counts, Contents]:

@@ -32,7 +32,8 @@ class Dealt:
         rows = self._order[self._starts[first] : self._starts[end]]
         times, deadlines = (None if each is None else each[rows] for each in (contents.times, contents.deadlines))
         keys = None if contents.keys is None else keys_at(contents.keys, rows)
-        return Contents(contents.points[rows], keys, times, deadlines)
+        accuracies = None if contents.accuracies is None else contents.accuracies[rows]
+        return Contents(contents.points[rows], keys, times, deadlines, accuracies=accuracies)
 
 
 def puts(contents: Contents, clock: int | None) -> Iterator[Admitted]:
@@ -53,5 +54,6 @@ def puts(contents: Contents, clock: int | None) -> Iterator[Admitted]:
                 keys_at(keys, rows[:0]),
                 times[rows] if have_times and times is not None else None,
                 None if contents.deadlines is None else contents.deadlines[rows],
+                accuracies=None if contents.accuracies is None else contents.accuracies[rows],
             )
             yield gate.AdmittedPuts(put, clock, 0, 0, refuse_missing=False)

@@ -127,6 +127,7 @@ def _keyed_part(admitted: gate.AdmittedPuts, puts: RowNumbers, removes: RowNumbe
         None if rows.times is None else rows.times[puts],
         None if rows.deadlines is None else rows.deadlines[puts],
         rows.condition,
+        accuracies=None if rows.accuracies is None else rows.accuracies[puts],
     )
     return Part(gate.AdmittedPuts(part, admitted.clock, 0, 0, admitted.refuse_missing), removes)
 

@@ -11,7 +11,7 @@ from dynhull_proto.v1 import batch_pb2, points_pb2
 
 from ..state.admission import GREATEST_TIME, shown
 from ..state.batch import NO_POINTS, Batch, KeyedBatch
-from ..state.records import Condition, Keys, Times
+from ..state.records import Accuracies, Condition, Keys, Times
 from .decode import InvalidFieldError, decode_points
 from .decode_settings import MICROSECONDS, NANOSECONDS, decode_duration
 
@@ -24,7 +24,7 @@ CONDITIONS: dict[int, Condition | None] = {
     batch_pb2.PUT_CONDITION_IF_PRESENT: "present",
 }
 BYTES_PER_NUMBER = 8
-SIGNED, UNSIGNED = np.dtype("<i8"), np.dtype("<u8")
+SIGNED, UNSIGNED, DOUBLE = np.dtype("<i8"), np.dtype("<u8"), np.dtype("<f8")
 MOST_KEY_BYTES = 255
 NANOSECONDS_PER_SECOND = 1_000_000_000
 NO_STRINGS, NO_INTEGERS = PackedKeys(b"", b""), np.empty(0, np.uint64)
@@ -81,6 +81,7 @@ def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
         ttl = decode_duration(puts.ttl, "batch.puts.ttl", least=1)
     if ttl is not None and deadlines is not None:
         raise InvalidFieldError("batch.puts.ttl", "ttl and expire_times", "use one or the other")
+    accuracies = _decode_accuracies(puts.accuracies, rows) if has_of_puts("accuracies") else None
     condition = puts.condition
     if condition not in CONDITIONS:
         raise InvalidFieldError("batch.puts.condition", condition, "not a condition that this server supports")
@@ -112,6 +113,7 @@ def _decode_keyed(batch: batch_pb2.Batch) -> KeyedBatch | None:
         missing_keys == batch_pb2.MISSING_KEY_POLICY_REFUSE,
         named.get("releases"),
         named.get("drops"),
+        accuracies=accuracies,
     )
 
 
@@ -168,7 +170,28 @@ def _numbers(packed: bytes, field: str, kind: np.dtype[Any]) -> npt.NDArray[Any]
     return np.frombuffer(packed, kind)
 
 
-# Times
+# Accuracies and times
+
+
+def _decode_accuracies(accuracies: points_pb2.Accuracies, rows: int) -> Accuracies | None:
+    """The errors of as many positions as there are keys; None if all are 0."""
+    field = "batch.puts.accuracies"
+    if accuracies.packed and accuracies.values:
+        raise InvalidFieldError(field, "packed and values", "use one encoding or the other")
+    if accuracies.packed:
+        decoded = _numbers(accuracies.packed, f"{field}.packed", DOUBLE).astype(np.float64, copy=False)
+    elif accuracies.values:
+        decoded = np.array(accuracies.values, np.float64)
+    else:
+        return None
+    if len(decoded) != rows:
+        problem = f"must be as many as the keys, {rows}, or none"
+        raise InvalidFieldError(field, f"{len(decoded)} accuracies", problem)
+    bad = ~((decoded >= 0) & (decoded < np.inf))
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InvalidFieldError(field, float(decoded[row]), "must be finite and not negative", row)
+    return decoded + 0.0 if decoded.any() else None  # without negative zeros
 
 
 def _decode_row_times(times: points_pb2.Times, field: str, rows: int, what: str) -> Times | None:

@@ -79,6 +79,7 @@ def decode_fence(
         _decode_duration(config, "min_dwell"),
         config.max_events,
         _decode_duration(config, "max_event_age"),
+        config.by_accuracy,
     )
     _refuse_contradictions(decoded)
     return decoded
@@ -169,6 +170,8 @@ def _refuse_contradictions(config: FenceConfig) -> None:
             raise InvalidFieldError("config.margin", config.margin, "must be positive with without_self")
         if not config.closed:
             raise InvalidFieldError("config.boundary", "FENCE_BOUNDARY_OPEN", "closed with without_self")
+        if config.by_accuracy:
+            raise InvalidFieldError("config.by_accuracy", "true", "cannot be combined with without_self")
 
 
 def _refuse_for_other_hull(config: FenceConfig) -> None:
@@ -185,6 +188,7 @@ def _refuse_for_other_hull(config: FenceConfig) -> None:
         ("config.confirmations", config.confirmations),
         ("config.min_dwell", config.min_dwell),
         ("config.dwell", config.dwell),
+        ("config.by_accuracy", config.by_accuracy),
     ):
         if value:
             raise InvalidFieldError(field, value, "only for fences that compare keys")

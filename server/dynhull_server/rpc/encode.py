@@ -30,6 +30,7 @@ from ..state.hull_state import Counts, VertexKeys
 from ..state.records import (
     FOREVER,
     NO_TIME,
+    Accuracies,
     Cause,
     Center,
     Contents,
@@ -105,6 +106,13 @@ def encode_times(times: Times, encoding: points_pb2.PointEncoding) -> points_pb2
     for time in known.tolist():
         message.timestamps.add().FromMicroseconds(time)
     return message
+
+
+def encode_accuracies(accuracies: Accuracies, encoding: points_pb2.PointEncoding) -> points_pb2.Accuracies:
+    """Accuracies: packed, or as a list where points are lists of coordinates."""
+    if encoding != points_pb2.POINT_ENCODING_COORDINATES:
+        return points_pb2.Accuracies(packed=accuracies.astype("<f8", copy=False).tobytes())
+    return points_pb2.Accuracies(values=accuracies.tolist())
 
 
 def encode_settings(settings: HullSettings, shards: int) -> hull_pb2.HullConfig:
@@ -221,6 +229,7 @@ def encode_positions(
         positions=encode_points(found.points, encoding),
         present=found.present.tobytes(),
         times=None if found.times is None else encode_times(found.times, encoding),
+        accuracies=None if found.accuracies is None else encode_accuracies(found.accuracies, encoding),
     )
 
 
@@ -235,6 +244,7 @@ def encode_entities(
         keys=encode_keys(entities.keys[rows], encoding),
         positions=encode_points(entities.points[rows], encoding),
         times=times,
+        accuracies=None if entities.accuracies is None else encode_accuracies(entities.accuracies[rows], encoding),
     )
 
 
@@ -255,6 +265,8 @@ def encode_part(
         known = contents.deadlines[rows] != FOREVER
         part.expire_times.CopyFrom(encode_times(np.where(known, contents.deadlines[rows], NO_TIME), encoding))
         part.expires = _which(known)
+    if contents.accuracies is not None:
+        part.accuracies.CopyFrom(encode_accuracies(contents.accuracies[rows], encoding))
     return part
 
 
@@ -279,6 +291,7 @@ def encode_held(
         confirmations=held.confirmed.tolist(),
         held_count=counts.held,
         next_page_token=token,
+        accuracies=encode_accuracies(held.accuracies, encoding) if held.accuracies.any() else None,
     )
 
 

@@ -12,7 +12,15 @@ from ..engine.feed_many import Gap, ManyFeedPart, OfHull
 from ..engine.positions import BEGINNING, encode_standings
 from ..state.feed_consumers import ConsumerId
 from ..state.records import FOREVER, NO_TIME, Cause, Condition, Expiry, HeldChange, KeyRows, PointRows, Record
-from .encode import CAUSES, encode_center, encode_keys, encode_points, encode_quarantine, encode_times
+from .encode import (
+    CAUSES,
+    encode_accuracies,
+    encode_center,
+    encode_keys,
+    encode_points,
+    encode_quarantine,
+    encode_times,
+)
 
 CONDITIONS: dict[Condition | None, batch_pb2.PutCondition] = {
     None: batch_pb2.PUT_CONDITION_UNSPECIFIED,
@@ -124,6 +132,8 @@ def _write_keys(rows: KeyRows, batch: batch_pb2.Batch, encoding: points_pb2.Poin
     if rows.deadlines is not None and (rows.deadlines != FOREVER).any():
         known = np.where(rows.deadlines == FOREVER, NO_TIME, rows.deadlines)
         puts.expire_times.CopyFrom(encode_times(known, encoding))
+    if rows.accuracies is not None:
+        puts.accuracies.CopyFrom(encode_accuracies(rows.accuracies, encoding))
     batch.removes.CopyFrom(encode_keys(rows.removes, encoding))
 
 

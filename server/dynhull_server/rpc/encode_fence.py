@@ -47,6 +47,7 @@ def encode_config(config: FenceConfig) -> fence_pb2.FenceConfig:
         report_crosses=config.crosses,
         confirmations=config.confirmations,
         max_events=config.max_events,
+        by_accuracy=config.by_accuracy,
     )
     area = config.area
     if isinstance(area, HullArea):

@@ -8,7 +8,7 @@ import numpy as np
 
 from dynhull.arrays import Points
 
-from .records import Condition, Keys, QuarantineRules, Times
+from .records import Accuracies, Condition, Keys, QuarantineRules, Times
 
 
 @dataclass(slots=True)
@@ -48,6 +48,7 @@ class KeyedBatch:
         releases: keys whose held position is let in. A batch with this or one of the next two has no puts or removes.
         drops: keys whose held position is dropped.
         rules: the rules of the quarantine from now on; None for the same as before.
+        accuracies: (n,) the errors of the positions, or None: 0 for all.
     """
 
     kind: Literal["str", "int"]
@@ -62,6 +63,7 @@ class KeyedBatch:
     releases: Keys | None = None
     drops: Keys | None = None
     rules: QuarantineRules | None = None
+    accuracies: Accuracies | None = None
 
     @property
     def field(self) -> str:

@@ -19,6 +19,7 @@ Cause = Literal["batch", "expiry", "recenter", "quarantine", "division", "epoch"
 Center = tuple[float, float]  # longitude and latitude in degrees
 Keys = PackedKeys | npt.NDArray[np.uint64]
 Times = npt.NDArray[np.int64]  # microseconds since 1970
+Accuracies = npt.NDArray[np.float64]  # how far positions may be from where they really are; 0 for not at all
 NO_TIME = -(2**63)
 FOREVER = 2**63 - 1
 # The producers in the log of a shard: the steps of its root, and the epochs that were begun.
@@ -169,6 +170,7 @@ class HeldRows:
         growths: (n,) the factor by which each would enlarge the area of the hull, NaN if that is not too much.
         revisions: (n,) the revisions that have held them.
         confirmed: (n,) the positions since then that are consistent with the one before.
+        accuracies: (n,) the errors of the positions.
     """
 
     keys: Keys
@@ -179,6 +181,7 @@ class HeldRows:
     growths: npt.NDArray[np.float64]
     revisions: npt.NDArray[np.int64]
     confirmed: npt.NDArray[np.int64]
+    accuracies: Accuracies
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -211,6 +214,7 @@ class KeyRows:
         condition: which keys are put: all, or only those that are absent or present.
         removes: keys removed; missing ones are ignored.
         held: what it changes in the quarantine, or None.
+        accuracies: (n,) the errors of the positions, or None: 0 for all.
     """
 
     keys: Keys
@@ -220,6 +224,7 @@ class KeyRows:
     deadlines: Times | None = None
     condition: Condition | None = None
     held: HeldChange | None = None
+    accuracies: Accuracies | None = None
 
     def __len__(self) -> int:
         return len(self.keys) + len(self.removes)
@@ -366,6 +371,7 @@ class Contents:
         deadlines: (n,) the time at which each point leaves; None for a hull without deadlines, FOREVER for a point that
             has none.
         held: the positions in quarantine; None for none.
+        accuracies: (n,) the errors of the positions; None where all are 0.
     """
 
     points: Points = field(default_factory=lambda: np.empty((0, 2)))
@@ -373,6 +379,7 @@ class Contents:
     times: Times | None = None
     deadlines: Times | None = None
     held: HeldRows | None = None
+    accuracies: Accuracies | None = None
 
     def __len__(self) -> int:
         return len(self.points)

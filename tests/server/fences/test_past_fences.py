@@ -43,6 +43,8 @@ FENCES = {
     "other": {"area": "all/b", "subjects": "all/a", "margin": 0.5},
     "pair": {"area": "all/b", "other_hull": "all/c", "near": 1.0},
     "confirmed": {"area": TRIANGLE, "subjects": "all/a", "confirmations": 2},
+    "accurate": {"area": "all/b", "subjects": "all/accurate", "by_accuracy": True, "margin": 0.5},
+    "globe-accurate": {"area": Circle(13.4, 52.4, 60_000), "subjects": "all/globe", "by_accuracy": True},
     "globe": {"area": [[13, 52], [13.8, 52], [13.8, 52.7]], "subjects": "all/globe"},
     "globes": {"area": "all/globe", "subjects": "all/globe", "boundary": "open"},
     "held": {"area": TRIANGLE, "subjects": "all/held", "initial": "events"},
@@ -112,7 +114,7 @@ def write(client, rng):
 @pytest.fixture(scope="module")
 def written(client):
     """Fences that were there, beside hulls that have changed since."""
-    rng = random.Random(5)
+    rng, other = random.Random(5), random.Random(6)
     client.create_hull("all/a", keyed="str")
     client.create_hull("all/b", keyed="str", max_points=20)
     client.create_hull("all/c", keyed="str")
@@ -121,14 +123,21 @@ def written(client):
     client.create_hull("all/globe", keyed="str", geographic=True, center=(13.4, 52.4))
     client.create_hull("all/held", keyed="str", quarantine=Quarantine(max_growth=1.5))
     client.create_hull("all/leaving", keyed="str")
+    client.create_hull("all/accurate", keyed="str")
     for name, settings in FENCES.items():
         client.create_fence(name, **settings)
     for _ in range(80):
         write(client, rng)
+        keys = other.sample(KEYS, 2)
+        errors = None if other.random() < 0.2 else [other.choice([0, 1, 5, 9]) for _ in keys]
+        client.put(
+            "all/accurate", keys, [(other.randint(-10, 10), other.randint(-10, 10)) for _ in keys], accuracies=errors
+        )
     for _ in range(12):
         keys = rng.sample(KEYS, 6)
         xy = np.array([(rng.randint(-10, 10), rng.randint(-10, 10)) for _ in keys]) * rng.choice([1, 1, 3])
-        client.put("all/globe", keys, xy / 10 + [13.4, 52.4])
+        metres = [other.choice([0, 5_000, 20_000, 60_000]) for _ in keys]
+        client.put("all/globe", keys, xy / 10 + [13.4, 52.4], accuracies=metres)
         client.put("all/held", keys, xy)
         client.put("all/leaving", keys, xy, ttl=rng.choice([0.001, 100]))
 

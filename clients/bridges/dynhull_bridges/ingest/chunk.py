@@ -52,6 +52,7 @@ class Chunk:
         self.points: list[tuple[float, float]] = []
         self.times: list[int | None] = []
         self.expires: list[int | None] = []
+        self._accuracies: list[float] = []
         self.deletes = False
         self._known: set[Any] = set()
         taken.left += 1
@@ -71,6 +72,11 @@ class Chunk:
             return None
         return as_times([LARGEST_TIME if each is None else each for each in self.expires])
 
+    @property
+    def accuracies(self) -> list[float] | None:
+        """How far the positions may be from where the keys really are; None if none has an error."""
+        return self._accuracies if any(self._accuracies) else None
+
     def admits(self, rows: Sequence[Row]) -> bool:
         """Whether the rows of another message fit."""
         if not self.messages:
@@ -87,6 +93,7 @@ class Chunk:
             self.points.append((row.x, row.y))
             self.times.append(row.time)
             self.expires.append(row.expires)
+            self._accuracies.append(row.accuracy)
             if row.key is not None:
                 self.keys.append(row.key)
                 self._known.add(row.key)

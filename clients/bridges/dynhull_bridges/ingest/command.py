@@ -66,6 +66,12 @@ def ingest(
     expires: Annotated[
         str | None, _mapping("Time at which the key leaves the hull, written like --time; if missing: never.")
     ] = None,
+    accuracy: Annotated[
+        str | None,
+        _mapping(
+            "Accuracy of the position, in units of the coordinates, or metres on the globe; if missing: no error."
+        ),
+    ] = None,
     only: Annotated[Only | None, _reading(ONLY)] = None,
     ttl: Annotated[str | None, _reading(TTL)] = None,
     format: Annotated[  # noqa: A002
@@ -155,8 +161,8 @@ def ingest(
     deletes = tombstones is Tombstones.DELETE
     form = time_form(option_of, time_unit, time_zone, ambiguous, time_format)
     nmea = format is Contents.NMEA
-    of_puts = conditions(only, ttl, key=key, expires=expires)
-    mapping = Mapping(hull, x, y, key, time, expires, form, each, deletes=deletes, nmea=nmea)
+    of_puts = conditions(only, ttl, key=key, expires=expires, accuracy=accuracy)
+    mapping = Mapping(hull, x, y, key, time, expires, accuracy, form, each, deletes=deletes, nmea=nmea)
     on_globe = mapping.degrees if geographic is None else geographic
     given = (("--grace", grace), ("--report", report), ("--patience", patience))
     seconds = {option: duration(text, option) for option, text in given}

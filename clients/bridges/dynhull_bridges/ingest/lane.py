@@ -208,6 +208,7 @@ class ChunkLane:
                     points=rest.points,
                     times=times,
                     expire_times=rest.ends,
+                    accuracies=rest.accuracies,
                     sequence=sequence,
                     **self._conditions,
                 )

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import orjson
 
 from dynhull_cli.reading.columns import are_degrees, available
-from dynhull_cli.reading.labels import key_of
+from dynhull_cli.reading.labels import accuracy_of, key_of
 from dynhull_cli.reading.nmea import position
 from dynhull_cli.reading.time_forms import TimeForm
 from dynhull_cli.reading.times import EPOCH, NAMES, TimeReader
@@ -32,6 +32,7 @@ class Row(NamedTuple):
     time: int | None
     expires: int | None = None
     deletes: bool = False
+    accuracy: float = 0.0
 
 
 class Mapping:
@@ -43,6 +44,7 @@ class Mapping:
         key: an expression for the key; None for points without keys.
         time: an expression for the event time; None for none.
         expires: an expression for the time at which the key leaves, if it leaves; None for none.
+        accuracy: an expression for the accuracy of the position, if it has one; None for none.
         form: how times are written.
         each: a path to an array with a row in each element; None if a message is one row.
         deletes: whether a message without contents deletes its key.
@@ -68,6 +70,7 @@ class Mapping:
         key: str | None,
         time: str | None,
         expires: str | None,
+        accuracy: str | None,
         form: TimeForm,
         each: str | None,
         *,
@@ -77,6 +80,7 @@ class Mapping:
         self.hull = hull if is_fixed(hull) else None
         self.keyed = key is not None
         leaving = [] if expires is None else ["expires", expires]
+        leaving += [] if accuracy is None else ["accuracy", accuracy]
         more = [*leaving, *_written(form), *(["delete"] if deletes else []), *(["nmea"] if nmea else [])]
         self.digest = sha256(repr((hull, x, y, key, time, str(form.unit), each, *more)).encode()).hexdigest()[:12]
         self._axes = last_name(x), last_name(y)
@@ -92,6 +96,7 @@ class Mapping:
         self._key = None if key is None else value_of(key, "--key")
         self._time = None if time is None else value_of(time, "--time")
         self._expires = None if expires is None else value_of(expires, "--expires")
+        self._accuracy = None if accuracy is None else value_of(accuracy, "--accuracy")
         self.times, self.ends = TimeReader("time", form), TimeReader("expires", form)
         if each is not None and not each.startswith("$"):
             raise ValueError(f"--each {each!r} is no path: it begins with $")
@@ -144,11 +149,16 @@ class Mapping:
         x = coordinate(_found(self._x, message, document), "x")
         y = coordinate(_found(self._y, message, document), "y")
         place = available(self._axes, x, y)
-        return Row(self._name(message, document), key, *place, time, self._end_of(message, document))
+        end, accuracy = self._end_of(message, document), self._accuracy_of(message, document)
+        return Row(self._name(message, document), key, *place, time, end, accuracy=accuracy)
 
     def _end_of(self, message: Message, document: Any) -> int | None:
         found = None if self._expires is None else _found(self._expires, message, document)
         return None if found is None or found == "" else self.ends.read(found)
+
+    def _accuracy_of(self, message: Message, document: Any) -> float:
+        found = None if self._accuracy is None else _found(self._accuracy, message, document)
+        return 0.0 if found is None or found == "" else accuracy_of(found, "accuracy")
 
     def _name(self, message: Message, document: Any) -> str:
         hull = self._hull(message, document)

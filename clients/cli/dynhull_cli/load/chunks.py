@@ -40,6 +40,7 @@ class Rows:
         keys: the key of each; None without a column of keys.
         times: the time of each in microseconds since 1970; None without a column of times.
         expires: the time at which each leaves, None for never; None where none leaves.
+        accuracies: how far each may be from where it really is, None for not at all; None where none has an error.
     """
 
     points: Points
@@ -48,12 +49,13 @@ class Rows:
     keys: list[Key] | None = None
     times: list[int] | None = None
     expires: list[int | None] | None = None
+    accuracies: list[float | None] | None = None
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __getitem__(self, rows: slice) -> "Rows":
-        keys, times, expires = self.keys, self.times, self.expires
+        keys, times, expires, accuracies = self.keys, self.times, self.expires, self.accuracies
         return Rows(
             self.points[rows],
             self.numbers[rows],
@@ -61,6 +63,7 @@ class Rows:
             None if keys is None else keys[rows],
             None if times is None else times[rows],
             None if expires is None else expires[rows],
+            None if accuracies is None else accuracies[rows],
         )
 
     def by_expiry(self) -> "list[Rows]":
@@ -77,13 +80,14 @@ class Rows:
 
     def bad(self, row: int, reason: str) -> BadRow:
         """One of the rows as a bad one; its text is made of what was read."""
-        labels = (None if each is None else each[row] for each in (self.keys, self.times, self.expires))
+        columns: tuple[list[Any] | None, ...] = self.keys, self.times, self.expires, self.accuracies
+        labels = (None if each is None else each[row] for each in columns)
         text = ",".join(str(each) for each in (*self.points[row].tolist(), *labels) if each is not None)
         return BadRow(f"{self.unit} {self.numbers[row]}", reason, text)
 
     def at(self, rows: list[int]) -> "Rows":
         """Some rows, given by their numbers."""
-        columns: list[Any] = [self.keys, self.times, self.expires]
+        columns: list[Any] = [self.keys, self.times, self.expires, self.accuracies]
         kept = self.points[rows], self.numbers[rows], self.unit
         return Rows(*kept, *(None if each is None else [each[row] for row in rows] for each in columns))
 
@@ -108,13 +112,13 @@ def picked(
 ) -> Chunk:
     """Make a chunk from rows with their numbers, of lines, say: the `unit`.
 
-    `positions` returns the points of a row, and `labels` their key, time and time to leave; they raise ValueError if it
-    has none.
+    `positions` returns the points of a row, and `labels` their key, time, time to leave and accuracy; they raise
+    ValueError if it has none.
     `text` returns its text for messages.
     """
     points: list[Position] = []
     numbers: list[int] = []
-    columns: tuple[list[Any], ...] = [], [], []
+    columns: tuple[list[Any], ...] = [], [], [], []
     bad = []
     for number, row in rows:
         try:
@@ -179,7 +183,10 @@ def _joined(parts: list[Rows]) -> Rows:
     expires: list[int | None] | None = None
     if any(part.expires is not None for part in parts):
         expires = list(chain.from_iterable(part.expires or [None] * len(part) for part in parts))
+    accuracies: list[float | None] | None = None
+    if any(part.accuracies is not None for part in parts):
+        accuracies = list(chain.from_iterable(part.accuracies or [None] * len(part) for part in parts))
     points, numbers = (
         np.concatenate(each) for each in zip(*((part.points, part.numbers) for part in parts), strict=True)
     )
-    return Rows(points, numbers, parts[0].unit, keys, times, expires)
+    return Rows(points, numbers, parts[0].unit, keys, times, expires, accuracies)

@@ -90,6 +90,13 @@ def load(
         str | None,
         _input("Column of the times at which keys leave the hull, written like --time; empty for never. With --key."),
     ] = None,
+    accuracy: Annotated[
+        str | None,
+        _input(
+            "Column of the accuracies of positions, in units of the coordinates, or metres on the globe; empty for "
+            "none. With --key."
+        ),
+    ] = None,
     only: Annotated[Only | None, _input(ONLY)] = None,
     ttl: Annotated[str | None, _input(TTL)] = None,
     geometry: Annotated[
@@ -163,7 +170,7 @@ def load(
     _check(decimal, replace=replace, resume=resume, again=again)
     if time is None and expires is None:
         _refuse_forms({"--time-unit": time_unit, "--time-zone": time_zone, "--time-format": time_format})
-    of_puts = conditions(only, ttl, key=key, expires=expires)
+    of_puts = conditions(only, ttl, key=key, expires=expires, accuracy=accuracy)
     options = Options(
         x,
         y,
@@ -181,6 +188,7 @@ def load(
         time_zone=time_zone,
         ambiguous=ambiguous,
         time_format=time_format,
+        accuracy=accuracy,
     )
     options.time_form()  # what is wrong with it is said before the file is opened
     if file is None and sys.stdin.isatty():

@@ -49,6 +49,7 @@ class Options:
         time_zone: the time zone of times that have none.
         ambiguous: what becomes of times that exist twice or not at all in it.
         time_format: the form of times, for strptime.
+        accuracy: the column or member of the accuracies; None for positions without an error.
     """
 
     x: str | None = None
@@ -67,11 +68,13 @@ class Options:
     time_zone: str | None = None
     ambiguous: Ambiguous = Ambiguous.REFUSE
     time_format: str | None = None
+    accuracy: str | None = None
 
     @property
     def labels(self) -> tuple[tuple[str, str | None], ...]:
-        """The options that name the columns of keys, times and times to leave, and these columns."""
-        return ("--key", self.key), ("--time", self.time), ("--expires", self.expires)
+        """The options that name the columns of keys, times, times to leave and accuracies, and these columns."""
+        names = self.key, self.time, self.expires, self.accuracy
+        return tuple(zip(("--key", "--time", "--expires", "--accuracy"), names, strict=True))
 
     def time_form(self) -> TimeForm:
         """How times are written. ValueError names the option that is wrong."""

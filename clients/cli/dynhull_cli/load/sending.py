@@ -175,4 +175,6 @@ class Sending:
         if rows.keys is None:
             return writer.put(insert=rows.points, times=times)
         expires = None if rows.expires is None else as_times(rows.expires)
-        return writer.put(keys=rows.keys, points=rows.points, times=times, expire_times=expires, **self._conditions)
+        accuracies = None if rows.accuracies is None else [each or 0.0 for each in rows.accuracies]
+        columns: dict[str, Any] = {"times": times, "expire_times": expires, "accuracies": accuracies}
+        return writer.put(keys=rows.keys, points=rows.points, **columns, **self._conditions)

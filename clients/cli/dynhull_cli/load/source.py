@@ -54,6 +54,7 @@ APPLIES_TO = {
     "time_zone": ROWS,
     "ambiguous": ROWS,
     "time_format": ROWS,
+    "accuracy": ROWS,
 }
 
 

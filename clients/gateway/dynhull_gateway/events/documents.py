@@ -101,6 +101,7 @@ class FeedBatch(BaseModel):
     deletes: Rows = Field([], description="The points deleted from it.")
     times: list[str | None] = Field([], description="The event times of the points put or inserted, null for none.")
     expire_times: list[str | None] = Field([], description="When the points put leave the hull, likewise.")
+    accuracies: list[float] | None = Field(None, description="How far the points put may be from where the keys are.")
     held: FeedHeld | None = Field(None, description="What it has changed in the quarantine.")
 
 

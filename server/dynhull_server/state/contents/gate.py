@@ -109,6 +109,7 @@ class Gate:
             points=found.points,
             times=found.times if has_times or self._settings.by_event_time else None,
             deadlines=found.deadlines if has_deadlines else None,
+            accuracies=found.accuracies if found.accuracies.any() else None,
         )
 
     def judge(

@@ -20,6 +20,9 @@ def joined(parts: Sequence[Contents]) -> Contents:
     lengths = [len(each) for each in parts]
     times = _joined_times([each.times for each in parts], lengths, NO_TIME)
     deadlines = _joined_times([each.deadlines for each in parts], lengths, FOREVER)
+    accuracies = None
+    if any(each.accuracies is not None for each in parts):
+        accuracies = np.concatenate([np.zeros(len(p)) if p.accuracies is None else p.accuracies for p in parts])
     keys = [each.keys for each in parts if each.keys is not None]
     if not keys:
         order = np.lexsort((points[:, 1], points[:, 0]) if times is None else (points[:, 1], points[:, 0], times))
@@ -29,7 +32,8 @@ def joined(parts: Sequence[Contents]) -> Contents:
     ordered = [names[row] for row in order.tolist()]
     sorted_keys: Keys = PackedKeys.pack(ordered) if isinstance(keys[0], PackedKeys) else np.array(ordered, np.uint64)
     times, deadlines = (None if each is None else each[order] for each in (times, deadlines))
-    return Contents(points[order], sorted_keys, times, deadlines)
+    accuracies = None if accuracies is None else accuracies[order]
+    return Contents(points[order], sorted_keys, times, deadlines, accuracies=accuracies)
 
 
 def _joined_times(parts: Sequence[Times | None], lengths: Sequence[int], none: int) -> Times | None:

@@ -48,7 +48,9 @@ def selected(rows: KeyRows, which: npt.NDArray[np.bool_]) -> KeyRows:
     """The puts of some rows, and all removes."""
     times = None if rows.times is None else rows.times[which]
     deadlines = None if rows.deadlines is None else rows.deadlines[which]
-    return KeyRows(select_keys(rows.keys, which), rows.points[which], rows.removes, times, deadlines, rows.condition)
+    accuracies = None if rows.accuracies is None else rows.accuracies[which]
+    keys = select_keys(rows.keys, which)
+    return KeyRows(keys, rows.points[which], rows.removes, times, deadlines, rows.condition, accuracies=accuracies)
 
 
 def select_keys(keys: Keys, which: npt.NDArray[np.bool_]) -> Keys:
@@ -92,7 +94,11 @@ def merged(group: list[KeyRows]) -> KeyRows:
     kind = group[0].keys
     points = np.concatenate([rows.points for rows in group])[chosen]
     removed = [key for key, row in last.items() if row == REMOVED]
-    return KeyRows(of_kind(put, kind), points, of_kind(removed, kind), times)
+    accuracies = None
+    if any(rows.accuracies is not None for rows in group):
+        columns = [np.zeros(len(rows.keys)) if rows.accuracies is None else rows.accuracies for rows in group]
+        accuracies = np.concatenate(columns)[chosen]
+    return KeyRows(of_kind(put, kind), points, of_kind(removed, kind), times, accuracies=accuracies)
 
 
 def of_kind(keys: list[Any], kind: Keys) -> Keys:

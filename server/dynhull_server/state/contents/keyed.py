@@ -17,6 +17,7 @@ from ..errors import InvalidBatchError, KeyMissingError, KeyRepeatedError, Limit
 from ..frames import Globe
 from ..records import (
     NO_TIME,
+    Accuracies,
     Cause,
     Center,
     Contents,
@@ -28,6 +29,7 @@ from ..records import (
     Record,
     Times,
 )
+from .accuracies import AccuracyTable
 from .deadlines import Deadlines, Key
 from .gate import NOTHING_HELD, AdmittedPuts, Gate
 from .key_rows import (
@@ -48,8 +50,8 @@ from .quarantine import Quarantine
 
 # Keys whose deadline has come are removed in parts of this size: reading a list of keys keeps other threads waiting.
 REMOVED_TOGETHER = 8192
-# Beyond twice the number of keys, deadlines of keys that have left are dropped.
-MOST_SPARE_DEADLINES = 1024
+# Beyond twice the number of keys, deadlines and accuracies of keys that have left are dropped.
+MOST_SPARE = 1024
 KINDS = {"str": "strings", "int": "integers"}
 NOTHING_PUT = Put(0, 0, 0, 0, 0)
 
@@ -62,11 +64,13 @@ class Found:
         points: (n, 2) the position of each key; NaN for a missing key.
         present: (n,) which keys are there.
         times: (n,) their times, NO_TIME for a key without one; None for a hull without times.
+        accuracies: (n,) the errors of the positions; None where all are 0.
     """
 
     points: Points
     present: npt.NDArray[np.bool_]
     times: Times | None
+    accuracies: Accuracies | None
 
 
 class Keyed:
@@ -109,6 +113,7 @@ class Keyed:
         self.follows_server = settings.window is None or settings.window.clock == "server"
         self.mirror: Mirror | None = None
         self._deadlines = Deadlines()
+        self._accuracies = AccuracyTable()
         self.ended: list[Key] = []
         self._earliest: int | None = None  # no point has an earlier time
         self.timed = settings.window is not None or settings.by_event_time
@@ -147,6 +152,7 @@ class Keyed:
             batch = self._gate.opened(batch, self.globe)
         quarantine = self.quarantine
         rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
+        rows.accuracies = batch.accuracies
         held, puts = batch.of_quarantine, len(batch.keys)
         admission = admit(self._settings, batch.times, puts, "puts.times", arrived, self.clock, held=held)
         rows.times = admission.times
@@ -292,7 +298,13 @@ class Keyed:
         keys, points, times = self.hull.entities()
         deadlines = self._deadlines.of(key_list(keys)) if len(self._deadlines) else None
         held = self.quarantine.stored() if self.quarantine else None
-        return Contents(points, keys, stored_times(times) if self.timed else None, deadlines, held)
+        accuracies = self.accuracies(keys)
+        return Contents(points, keys, stored_times(times) if self.timed else None, deadlines, held, accuracies)
+
+    def accuracies(self, keys: Keys) -> Accuracies | None:
+        """The errors of the positions of keys that are there; None where all are 0."""
+        found = self._accuracies.of(key_list(keys)) if len(self._accuracies) else None
+        return found if found is not None and found.any() else None
 
     def in_plane(self) -> KeyedHull:
         """The keys as points of a plane: those of a geographic hull at their projections. O(n log n) the first time."""
@@ -306,7 +318,9 @@ class Keyed:
         """The positions of keys of the hull's kind."""
         points = self.hull.positions(keys)
         times = stored_times(self.hull.times(keys)) if self.timed else None
-        return Found(points, ~np.isnan(points[:, 0]), times)
+        present = ~np.isnan(points[:, 0])
+        accuracies = self.accuracies(keys)
+        return Found(points, present, times, None if accuracies is None else np.where(present, accuracies, 0.0))
 
     # Changes
 
@@ -324,6 +338,8 @@ class Keyed:
             self._note_times(stored.times)
         if stored.deadlines is not None:
             self._deadlines.set(key_list(keys), stored.deadlines.tolist())
+        if stored.accuracies is not None:
+            self._accuracies.set(key_list(keys), stored.accuracies.tolist())
 
     def _carry_out(self, rows: KeyRows) -> tuple[Put, int, int]:
         """Apply rows whose keys are all different. Returns the counts of the puts, keys removed, and keys evicted."""
@@ -332,15 +348,19 @@ class Keyed:
             self.mirror.change(rows)
         removed = hull.remove_many(rows.removes, missing="ignore") if len(rows.removes) else 0
         written = None
-        if rows.deadlines is not None or len(self._deadlines):
+        has_deadlines = rows.deadlines is not None or len(self._deadlines) > 0
+        has_accuracies = rows.accuracies is not None or len(self._accuracies) > 0
+        if has_deadlines or has_accuracies:
             written = self._written(rows)
         put = NOTHING_PUT
         if len(rows.keys):  # otherwise a hull by event time would ask for times
             put = update(hull, rows, rows.points)
         if times is not None:
             self._note_times(times)
-        if written is not None:
+        if written is not None and has_deadlines:
             self._set_deadlines(rows, written)
+        if written is not None and has_accuracies:
+            self._set_accuracies(rows, written)
         window = self._settings.window
         surplus = 0 if window is None or not window.max_points else len(hull) - window.max_points
         if surplus > 0 and self.mirror is not None:
@@ -370,10 +390,22 @@ class Keyed:
         else:
             self._deadlines.set(keys, rows.deadlines[written].tolist())
         self._deadlines.drop(key_list(rows.removes))
-        if len(self._deadlines) > 2 * len(self.hull) + MOST_SPARE_DEADLINES:
+        if len(self._deadlines) > 2 * len(self.hull) + MOST_SPARE:
             keys = self._deadlines.keys()
             there = self._has(of_kind(keys, rows.keys))
             self._deadlines.drop(compress(keys, (~there).tolist()))  # evicted, or too old before their deadline
+
+    def _set_accuracies(self, rows: KeyRows, written: npt.NDArray[np.bool_]) -> None:
+        keys = list(compress(key_list(rows.keys), written.tolist()))
+        if rows.accuracies is None:
+            self._accuracies.drop(keys)
+        else:
+            self._accuracies.set(keys, rows.accuracies[written].tolist())
+        self._accuracies.drop(key_list(rows.removes))
+        if len(self._accuracies) > 2 * len(self.hull) + MOST_SPARE:
+            keys = self._accuracies.keys()
+            there = self._has(of_kind(keys, rows.keys))
+            self._accuracies.drop(compress(keys, (~there).tolist()))  # evicted, or too old
 
     def _expire(self, until: int | None, clock: int) -> int:
         """Remove the points that leave. Returns their number."""

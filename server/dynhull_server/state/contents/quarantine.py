@@ -35,6 +35,7 @@ class Held(NamedTuple):
     growth: float
     revision: int
     confirmed: int
+    accuracy: float
 
 
 @dataclass(slots=True)
@@ -192,7 +193,9 @@ class Quarantine:
                     continue
             deadline = FOREVER if rows.deadlines is None else int(rows.deadlines[row])
             found.held.append(row)
-            new.append(Held(x, y, time, deadline, float(speeds[row]), float(growths[row]), revision, confirmed))
+            accuracy = 0.0 if rows.accuracies is None else float(rows.accuracies[row])
+            measures = float(speeds[row]), float(growths[row])
+            new.append(Held(x, y, time, deadline, *measures, revision, confirmed, accuracy))
         if self._held:
             self._drop_others(rows, keys, written & unbroken, hull, found, dropped)
         if new or dropped:
@@ -254,7 +257,8 @@ class Quarantine:
 
 def rows_of(keys: Keys, held: list[Held]) -> HeldRows:
     """Positions in quarantine as columns."""
-    x, y, times, deadlines, speeds, growths, revisions, confirmed = zip(*held, strict=True) if held else ((),) * 8
+    columns = zip(*held, strict=True) if held else ((),) * 9
+    x, y, times, deadlines, speeds, growths, revisions, confirmed, accuracies = columns
     return HeldRows(
         keys,
         np.column_stack([np.array(x, np.float64), np.array(y, np.float64)]),
@@ -264,11 +268,12 @@ def rows_of(keys: Keys, held: list[Held]) -> HeldRows:
         np.array(growths, np.float64),
         np.array(revisions, np.int64),
         np.array(confirmed, np.int64),
+        np.array(accuracies, np.float64),
     )
 
 
 def _items(rows: HeldRows) -> Iterable[tuple[Any, ...]]:
-    columns = (rows.times, rows.deadlines, rows.speeds, rows.growths, rows.revisions, rows.confirmed)
+    columns = (rows.times, rows.deadlines, rows.speeds, rows.growths, rows.revisions, rows.confirmed, rows.accuracies)
     return zip(key_list(rows.keys), *rows.points.T.tolist(), *(column.tolist() for column in columns), strict=True)
 
 

@@ -67,6 +67,7 @@ def _plain(
         _column(found[7], np.float64).reshape(-1, 2),
         _column(found[8], np.int64),
         _column(found[9], np.int64),
+        np.zeros(len(ops)),  # batches with accuracies are none of these
         [None] * len(ops),
     )
 

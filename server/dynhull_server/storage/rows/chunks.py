@@ -11,8 +11,18 @@ import numpy as np
 from dynhull.keys import PackedKeys
 
 from ...state.records import CommitStamp, Contents, Division, Kept, Keys, QuarantineRules, Tally, Times
-from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
-from .held_rows import held_bytes, held_starts, joined_held, take_held
+from .columns import (
+    ACCURACY_BYTES,
+    INTEGER_BYTES,
+    POINT_BYTES,
+    TIME_BYTES,
+    Cursor,
+    accuracy_bytes,
+    key_bytes,
+    point_bytes,
+    time_bytes,
+)
+from .held_rows import held_bytes, held_starts, inaccurate, joined_held, take_held
 
 CHUNK_BYTES = 2**19  # a commit that delays later ones only briefly; a chunk of strings can be one row longer
 
@@ -20,6 +30,7 @@ CHUNK_BYTES = 2**19  # a commit that delays later ones only briefly; a chunk of 
 HEADER = struct.Struct("<II")
 HAS_TIMES, HAS_DEADLINES, STRINGS, INTEGERS = 1, 2, 4, 8
 HELD = 16  # the points of this chunk are in quarantine
+HAS_ACCURACIES = 32  # since format 13
 
 
 class ChunkRows(NamedTuple):
@@ -47,6 +58,7 @@ def _starts(contents: Contents) -> list[int]:
     Contents without points have one chunk, which says which columns they have.
     """
     row = POINT_BYTES + TIME_BYTES * sum(column is not None for column in (contents.times, contents.deadlines))
+    row += 0 if contents.accuracies is None else ACCURACY_BYTES
     if isinstance(contents.keys, PackedKeys):
         lengths = np.frombuffer(contents.keys.lengths, np.uint8)
         ends = np.cumsum(lengths, dtype=np.int64) + np.arange(1, len(lengths) + 1) * (row + 1)
@@ -62,6 +74,7 @@ def chunk(contents: Contents, cut: ChunkRows) -> bytes:
     if cut.held:
         assert held is not None  # `cuts` has found some
         kind = STRINGS if isinstance(held.keys, PackedKeys) else INTEGERS
+        kind |= HAS_ACCURACIES if inaccurate(held, rows) else 0
         return HEADER.pack(rows.stop - rows.start, kind | HELD) + held_bytes(held, rows)
     points, flags = contents.points[rows], 0
     columns = [point_bytes(points)]
@@ -69,6 +82,9 @@ def chunk(contents: Contents, cut: ChunkRows) -> bytes:
         if times is not None:
             flags |= flag
             columns.append(time_bytes(times[rows]))
+    if contents.accuracies is not None:
+        flags |= HAS_ACCURACIES
+        columns.append(accuracy_bytes(contents.accuracies[rows]))
     if contents.keys is not None:
         flags |= STRINGS if isinstance(contents.keys, PackedKeys) else INTEGERS
         columns.append(key_bytes(contents.keys[rows]))
@@ -120,21 +136,25 @@ def joined(parts: Sequence[Contents]) -> Contents:
     points = np.concatenate([np.empty((0, 2)), *(part.points for part in parts)])
     times, deadlines = (_joined_times([getattr(part, name) for part in parts]) for name in ("times", "deadlines"))
     held = joined_held([part.held for part in parts if part.held is not None])
-    return Contents(points, _joined_keys([part.keys for part in parts]), times, deadlines, held)
+    found = [part.accuracies for part in parts if part.accuracies is not None]
+    accuracies = np.concatenate(found) if found else None
+    return Contents(points, _joined_keys([part.keys for part in parts]), times, deadlines, held, accuracies)
 
 
 def _decoded(data: bytes) -> Contents:
     cursor = Cursor(memoryview(data))
     count, flags = HEADER.unpack(cursor.take(HEADER.size))
     if flags & HELD:
-        return Contents(held=take_held(cursor, count, strings=bool(flags & STRINGS)))
+        strings, accuracies = bool(flags & STRINGS), bool(flags & HAS_ACCURACIES)
+        return Contents(held=take_held(cursor, count, strings=strings, accuracies=accuracies))
     points = cursor.points(count)
     times = cursor.times(count) if flags & HAS_TIMES else None
     deadlines = cursor.times(count) if flags & HAS_DEADLINES else None
+    errors = cursor.accuracies(count) if flags & HAS_ACCURACIES else None
     keys: Keys | None = None
     if flags & (STRINGS | INTEGERS):
         keys = cursor.strings(count) if flags & STRINGS else cursor.integers(count)
-    return Contents(points, keys, times, deadlines)
+    return Contents(points, keys, times, deadlines, accuracies=errors)
 
 
 def _points_only(data: bytes) -> Contents:

@@ -5,10 +5,10 @@ import numpy as np
 from dynhull.arrays import Points
 from dynhull.keys import PackedKeys
 
-from ...state.records import Keys, Times
+from ...state.records import Accuracies, Keys, Times
 
 DOUBLE, SIGNED, UNSIGNED = np.dtype("<f8"), np.dtype("<i8"), np.dtype("<u8")
-POINT_BYTES, TIME_BYTES, INTEGER_BYTES = 16, 8, 8
+POINT_BYTES, TIME_BYTES, INTEGER_BYTES, ACCURACY_BYTES = 16, 8, 8, 8
 
 
 def point_bytes(points: Points) -> bytes:
@@ -19,6 +19,11 @@ def point_bytes(points: Points) -> bytes:
 def time_bytes(times: Times) -> bytes:
     """(n,) times as 8 n bytes."""
     return np.ascontiguousarray(times, SIGNED).tobytes()
+
+
+def accuracy_bytes(accuracies: Accuracies) -> bytes:
+    """(n,) accuracies as 8 n bytes."""
+    return np.ascontiguousarray(accuracies, DOUBLE).tobytes()
 
 
 def key_bytes(keys: Keys) -> bytes:
@@ -68,6 +73,10 @@ class Cursor:
     def times(self, rows: int) -> Times:
         """(rows,) times."""
         return np.frombuffer(self.take(rows * TIME_BYTES), SIGNED).astype(np.int64, copy=False)
+
+    def accuracies(self, rows: int) -> Accuracies:
+        """(rows,) accuracies."""
+        return np.frombuffer(self.take(rows * ACCURACY_BYTES), DOUBLE).astype(np.float64, copy=False)
 
     def strings(self, rows: int) -> PackedKeys:
         """String keys; ValueError also if they are not UTF-8."""

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from ...state.records import Cause, Condition, Division, Expiry, KeyRows, PointRows, Record, Rows, Shares, Tally
-from .columns import Cursor, key_bytes, point_bytes, time_bytes
+from .columns import Cursor, accuracy_bytes, key_bytes, point_bytes, time_bytes
 from .held_rows import change_bytes, take_change
 
 # The number of points inserted, keys put or points expired; that of points deleted or keys removed; the sequence
@@ -34,7 +34,8 @@ HAS_HELD = 4  # since format 8
 HAS_SHARES = 8  # since format 9
 HAS_DIVISION = 16  # since format 10
 HAS_CAUSE = 32  # since format 11
-FURTHER = HAS_CENTER | MAY_SKIP | HAS_HELD | HAS_SHARES | HAS_DIVISION | HAS_CAUSE
+HAS_ACCURACIES = 64  # since format 13
+FURTHER = HAS_CENTER | MAY_SKIP | HAS_HELD | HAS_SHARES | HAS_DIVISION | HAS_CAUSE | HAS_ACCURACIES
 CAUSES: dict[Cause, bytes] = {
     "batch": b"\1",
     "expiry": b"\2",
@@ -62,6 +63,9 @@ def encode(records: Iterable[Record]) -> bytes:
         if record.center is not None:
             further |= HAS_CENTER
             columns.insert(0, CENTER.pack(*record.center))
+        if isinstance(record.rows, KeyRows) and record.rows.accuracies is not None:
+            further |= HAS_ACCURACIES
+            columns.append(accuracy_bytes(record.rows.accuracies))
         if isinstance(record.rows, KeyRows) and record.rows.held is not None:
             further |= HAS_HELD
             columns.append(change_bytes(record.rows.held))
@@ -92,6 +96,10 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
         clock = _time(cursor) if flags & HAS_CLOCK else None
         center = CENTER.unpack(cursor.take(CENTER.size)) if further & HAS_CENTER else None
         rows = _decoded(cursor, added, removed, flags)
+        if further & HAS_ACCURACIES:
+            if not isinstance(rows, KeyRows):
+                raise ValueError("points without keys have accuracies")
+            rows.accuracies = cursor.accuracies(added)
         if further & HAS_HELD:
             if not isinstance(rows, KeyRows):
                 raise ValueError("points without keys are in quarantine")

@@ -92,6 +92,7 @@ class Erasing:
             times=None if rows.times is None else rows.times[~put],
             deadlines=None if rows.deadlines is None else rows.deadlines[~put],
             held=held,
+            accuracies=None if rows.accuracies is None else rows.accuracies[~put],
         )
         return replace(record, rows=left)
 
@@ -105,6 +106,7 @@ class Erasing:
             None if contents.times is None else contents.times[left],
             None if contents.deadlines is None else contents.deadlines[left],
             None if held is None else _held(held, ~self._among(held.keys)),
+            None if contents.accuracies is None else contents.accuracies[left],
         )
 
 
@@ -127,4 +129,5 @@ def _held(held: HeldRows, left: npt.NDArray[np.bool_]) -> HeldRows:
         held.growths[left],
         held.revisions[left],
         held.confirmed[left],
+        held.accuracies[left],
     )

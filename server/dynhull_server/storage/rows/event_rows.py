@@ -36,7 +36,7 @@ KEY_BITS = 3
 HAS_FIRST_TIME, HAS_HULL, HAS_INSIDE = 4, 8, 16
 # Of some keys inside: beside their kind, whether their times follow.
 HAS_SINCE = 4
-ENTERS, HAS_STANDING = 4, 8  # of a delay: beside the kind of its key
+ENTERS, HAS_STANDING, IN_DOUBT = 4, 8, 16  # of a delay: beside the kind of its key
 STANDING = struct.Struct("<?dqq")  # a standing: whether there was a measure before, that, and two times
 
 
@@ -107,7 +107,8 @@ def encode_delay(subject: Subject, delay: Delay) -> bytes:
     hull, key = subject
     kind = STRING_KEY if isinstance(key, str) else INTEGER_KEY
     standing = delay.standing
-    out = bytearray((kind | ENTERS * delay.enters | HAS_STANDING * (standing is not None), delay.causes))
+    flags = ENTERS * delay.enters | HAS_STANDING * (standing is not None) | IN_DOUBT * delay.doubt
+    out = bytearray((kind | flags, delay.causes))
     put_text(out, hull)
     if isinstance(key, str):
         put_text(out, key)
@@ -138,7 +139,7 @@ def decode_delay(data: bytes) -> tuple[Subject, Delay]:
         standing = AlarmStanding(previous if there else None, *times)
     if not cursor.at_end:
         raise ValueError("bytes follow the delay")
-    return (hull, key), Delay(kind & ENTERS != 0, since, reports, causes, standing)
+    return (hull, key), Delay(kind & ENTERS != 0, since, reports, causes, standing, kind & IN_DOUBT != 0)
 
 
 def put_members(out: bytearray, members: tuple[Members, ...]) -> None:

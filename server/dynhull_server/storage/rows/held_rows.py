@@ -7,35 +7,56 @@ import numpy as np
 from dynhull.keys import PackedKeys
 
 from ...state.records import HeldChange, HeldRows, QuarantineRules
-from .columns import INTEGER_BYTES, POINT_BYTES, TIME_BYTES, Cursor, key_bytes, point_bytes, time_bytes
+from .columns import (
+    ACCURACY_BYTES,
+    INTEGER_BYTES,
+    POINT_BYTES,
+    TIME_BYTES,
+    Cursor,
+    accuracy_bytes,
+    key_bytes,
+    point_bytes,
+    time_bytes,
+)
 
-# Of a change: the positions held, the keys dropped, and whether rules follow.
-CHANGE = struct.Struct("<II?")
+# Of a change: the positions held, the keys dropped, and flags: whether rules follow, and accuracies, since format 13.
+CHANGE = struct.Struct("<IIB")
+HAS_RULES, HAS_ACCURACIES = 1, 2
 RULES = struct.Struct("<ddI")  # the limits, NaN for none, and the confirmations
-# The bytes of a held position beside its key: times, deadlines, speeds, growths, revisions and confirmations.
-HELD_BYTES = POINT_BYTES + 6 * TIME_BYTES
+# The bytes of a held position beside its key: times, deadlines, speeds, growths, revisions, confirmations; accuracies.
+HELD_BYTES = POINT_BYTES + 6 * TIME_BYTES + ACCURACY_BYTES
 
 
 def held_bytes(held: HeldRows, rows: slice = slice(None)) -> bytes:
-    """Some positions in quarantine."""
+    """Some positions in quarantine; with accuracies where some position is inaccurate: see `inaccurate`."""
     measures = np.column_stack([held.speeds[rows], held.growths[rows]])
     integers = (held.times, held.deadlines, held.revisions, held.confirmed)
     columns = [key_bytes(held.keys[rows]), point_bytes(held.points[rows]), point_bytes(measures)]
-    return b"".join([*columns, *(time_bytes(column[rows]) for column in integers)])
+    columns += [time_bytes(column[rows]) for column in integers]
+    if inaccurate(held, rows):
+        columns.append(accuracy_bytes(held.accuracies[rows]))
+    return b"".join(columns)
 
 
-def take_held(cursor: Cursor, count: int, *, strings: bool) -> HeldRows:
+def inaccurate(held: HeldRows, rows: slice = slice(None)) -> bool:
+    """Whether some of the positions have an error."""
+    return bool(held.accuracies[rows].any())
+
+
+def take_held(cursor: Cursor, count: int, *, strings: bool, accuracies: bool) -> HeldRows:
     """The inverse of `held_bytes`."""
     keys = cursor.strings(count) if strings else cursor.integers(count)
     points, measures = cursor.points(count), cursor.points(count)
     times, deadlines, revisions, confirmed = (cursor.times(count) for _ in range(4))
-    return HeldRows(keys, points, times, deadlines, measures[:, 0], measures[:, 1], revisions, confirmed)
+    errors = cursor.accuracies(count) if accuracies else np.zeros(count)
+    return HeldRows(keys, points, times, deadlines, measures[:, 0], measures[:, 1], revisions, confirmed, errors)
 
 
 def change_bytes(change: HeldChange) -> bytes:
     """A change of a quarantine."""
     rules = change.rules
-    parts = [CHANGE.pack(len(change.rows), len(change.dropped), rules is not None)]
+    flags = HAS_RULES * (rules is not None) | HAS_ACCURACIES * inaccurate(change.rows)
+    parts = [CHANGE.pack(len(change.rows), len(change.dropped), flags)]
     if rules is not None:
         parts.append(RULES.pack(_number(rules.max_speed), _number(rules.max_growth), rules.confirmations))
     return b"".join([*parts, key_bytes(change.dropped), held_bytes(change.rows)])
@@ -43,13 +64,14 @@ def change_bytes(change: HeldChange) -> bytes:
 
 def take_change(cursor: Cursor, *, strings: bool) -> HeldChange:
     """The inverse of `change_bytes`."""
-    held, dropped, has_rules = CHANGE.unpack(cursor.take(CHANGE.size))
+    held, dropped, flags = CHANGE.unpack(cursor.take(CHANGE.size))
     rules = None
-    if has_rules:
+    if flags & HAS_RULES:
         speed, growth, confirmations = RULES.unpack(cursor.take(RULES.size))
         rules = QuarantineRules(_limit(speed), _limit(growth), confirmations)
     keys = cursor.strings(dropped) if strings else cursor.integers(dropped)
-    return HeldChange(take_held(cursor, held, strings=strings), keys, rules)
+    accuracies = bool(flags & HAS_ACCURACIES)
+    return HeldChange(take_held(cursor, held, strings=strings, accuracies=accuracies), keys, rules)
 
 
 def held_starts(held: HeldRows, size: int) -> list[int]:
@@ -69,7 +91,7 @@ def joined_held(parts: list[HeldRows]) -> HeldRows | None:
         return parts[0] if parts else None
     keys = [part.keys for part in parts]
     strings = [each for each in keys if isinstance(each, PackedKeys)]
-    columns = ("points", "times", "deadlines", "speeds", "growths", "revisions", "confirmed")
+    columns = ("points", "times", "deadlines", "speeds", "growths", "revisions", "confirmed", "accuracies")
     return HeldRows(
         PackedKeys(b"".join(each.lengths for each in strings), b"".join(each.data for each in strings))
         if strings

@@ -14,6 +14,7 @@ from dynhull.keys import PackedKeys
 from ...state.records import (
     FOREVER,
     NO_TIME,
+    Accuracies,
     Cause,
     CommitStamp,
     Contents,
@@ -62,6 +63,7 @@ class SegmentColumns:
         keys: the keys of the rows that have one.
         points: (n, 2) positions, NaN for none.
         event_time, expire_time: the times of these; NO_TIME and FOREVER for none.
+        accuracy: how far each position may be from where it really is; 0 for not at all.
         detail: what no column has, as JSON; None for nothing.
     """
 
@@ -79,6 +81,7 @@ class SegmentColumns:
     points: Points
     event_time: Times
     expire_time: Times
+    accuracy: Accuracies
     detail: list[str | None]
 
     def __len__(self) -> int:
@@ -119,6 +122,7 @@ class _Piece:
     times: Times | None = None
     deadlines: Times | None = None
     details: Sequence[dict[str, Any]] = ()
+    accuracies: Accuracies | None = None
 
 
 @dataclass(slots=True)
@@ -170,7 +174,7 @@ def columns_of_state(
     """The contents of a hull at a revision as columns."""
     op = INSERT if identity == "multiset" else PUT
     columns = contents.keys, contents.points, contents.times, contents.deadlines
-    pieces = [_Piece(ROWS, op, len(contents), *columns)]
+    pieces = [_Piece(ROWS, op, len(contents), *columns, accuracies=contents.accuracies)]
     if contents.held is not None:
         pieces.append(_held(contents.held))
     number, time = commit or (NO_TIME, NO_TIME)
@@ -192,6 +196,7 @@ def contents_of(columns: SegmentColumns, *, times: bool, deadlines: bool) -> Con
         np.ascontiguousarray(columns.event_time[:rows]) if times else None,
         np.ascontiguousarray(columns.expire_time[:rows]) if deadlines else None,
         reader.held(rows, len(columns)) if rows < len(columns) else None,
+        _accuracies(columns.accuracy[:rows]),
     )
 
 
@@ -228,7 +233,8 @@ def _rows(rows: Rows, said: dict[str, Any]) -> list[_Piece]:
     if rows.condition is not None:
         said["condition"] = rows.condition
     if len(rows.keys):
-        found.append(_Piece(ROWS, PUT, len(rows.keys), rows.keys, rows.points, rows.times, rows.deadlines))
+        of_puts = rows.keys, rows.points, rows.times, rows.deadlines
+        found.append(_Piece(ROWS, PUT, len(rows.keys), *of_puts, accuracies=rows.accuracies))
     if len(rows.removes):
         found.append(_Piece(ROWS, REMOVE, len(rows.removes), rows.removes))
     if rows.held is not None:
@@ -259,7 +265,8 @@ def _held(held: HeldRows) -> _Piece:
         {"speed": _number(speed), "growth": _number(growth), "revision": revision, "confirmed": confirmed}
         for speed, growth, revision, confirmed in zip(*(column.tolist() for column in numbers), strict=True)
     ]
-    return _Piece(HELD, HOLD, len(held), held.keys, held.points, held.times, held.deadlines, details)
+    columns = held.keys, held.points, held.times, held.deadlines, details, held.accuracies
+    return _Piece(HELD, HOLD, len(held), *columns)
 
 
 def _number(value: float) -> float | None:
@@ -291,6 +298,7 @@ def _joined(heads: _Heads, pieces: list[_Piece], identity: Identity) -> SegmentC
         np.concatenate([np.empty((0, 2)), *(_points(piece) for piece in pieces)]),
         _joined_times([(piece.count, piece.times) for piece in pieces], NO_TIME),
         _joined_times([(piece.count, piece.deadlines) for piece in pieces], FOREVER),
+        _joined_accuracies(pieces),
         detail,
     )
 
@@ -311,6 +319,16 @@ def _joined_times(parts: list[tuple[int, Times | None]], none: int) -> Times:
         return np.full(sum(count for count, _ in parts), none, np.int64)
     columns = [np.full(count, none, np.int64) if times is None else times for count, times in parts]
     return np.concatenate([np.empty(0, np.int64), *columns])
+
+
+def _joined_accuracies(pieces: list[_Piece]) -> Accuracies:
+    if all(piece.accuracies is None for piece in pieces):
+        return np.zeros(sum(piece.count for piece in pieces))
+    return np.concatenate([np.zeros(each.count) if each.accuracies is None else each.accuracies for each in pieces])
+
+
+def _accuracies(column: Accuracies) -> Accuracies | None:
+    return np.ascontiguousarray(column) if column.any() else None
 
 
 class Batches:
@@ -406,6 +424,7 @@ class Batches:
             deadlines,
             said.get("condition"),
             self._change(removed, end) if said.get("held") else None,
+            _accuracies(columns.accuracy[start:added]),
         )
 
     def _change(self, start: int, end: int) -> HeldChange:
@@ -432,6 +451,7 @@ class Batches:
             numbers("growth", np.float64),
             numbers("revision", np.int64),
             numbers("confirmed", np.int64),
+            np.ascontiguousarray(columns.accuracy[start:end]),
         )
 
     def _times(self, times: Times, none: int, *, always: bool) -> Times | None:

@@ -103,7 +103,7 @@ def _keys(batches: Batches, settings: HullSettings, first: int, last: int) -> Ro
     keys = batches.keys(rows.start, rows.stop)
     at = np.flatnonzero(columns.keyed[rows]) + rows.start
     put = columns.op[at] == PUT
-    times, deadlines = columns.event_time[at], columns.expire_time[at]
+    times, deadlines, accuracies = columns.event_time[at], columns.expire_time[at], columns.accuracy[at]
     if _some_only(times[put], NO_TIME) or _some_only(deadlines[put], FOREVER):
         return None
     newest = _newest(key_codes(keys), times if settings.by_event_time else None)
@@ -114,6 +114,7 @@ def _keys(batches: Batches, settings: HullSettings, first: int, last: int) -> Ro
         select_keys(keys, leaves),
         times[stays] if _dated(times[put], NO_TIME) else None,
         deadlines[stays] if _dated(deadlines[put], FOREVER) else None,
+        accuracies=accuracies[stays] if accuracies[stays].any() else None,
     )
 
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 NOTHING = dict.fromkeys(("commit", "committed", "clock", "event_time"), NO_TIME) | {"expire_time": FOREVER}
 
 VERSION = 1
+ACCURACY = "accuracy"  # a column of files in which some position has an error, the last one
 FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
 MOST_PLACES = 12
 EXACT = 2**53  # below that every whole number is a double
@@ -125,10 +126,15 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
         metadata = None if scale is None else {SCALE: str(scale).encode()}
         columns_of_table[name] = values
         fields[name] = pa.field(name, values.type, metadata=metadata)
+    names = list(ORDER)
+    if columns.accuracy.any():
+        names.append(ACCURACY)
+        columns_of_table[ACCURACY] = pa.array(columns.accuracy[order], mask=columns.accuracy[order] == 0)
+        fields[ACCURACY] = pa.field(ACCURACY, pa.float64())
     told = {f"dynhull.{name}": value for name, value in about.items()}
     head = {FORMAT: str(VERSION).encode(), b"dynhull.identity": columns.identity.encode()} | told
-    schema = pa.schema([fields[name] for name in ORDER], {**head, STATE: state} if state else head)
-    table = pa.table([columns_of_table[name] for name in ORDER], schema=schema)
+    schema = pa.schema([fields[name] for name in names], {**head, STATE: state} if state else head)
+    table = pa.table([columns_of_table[name] for name in names], schema=schema)
     sink = pa.BufferOutputStream()
     pq.write_table(
         table,
@@ -322,6 +328,8 @@ def _all(file: pq.ParquetFile) -> SegmentColumns:
     count, at = len(belongs), 0
     arrays: dict[str, npt.NDArray[Any]] = {"revision": revision, "place": place}
     columns = ["cause", "kind", "op", "key", "x", "y", *_with_values(file, (*NOTHING, "detail"))]
+    if ACCURACY in file.schema_arrow.names:
+        columns.append(ACCURACY)
     detail: list[str | None] = [None] * count
     codes, words, number = np.full(count, NONE, np.int32), list[pa.Array](), 0
     for group in range(file.num_row_groups):
@@ -341,6 +349,7 @@ def _all(file: pq.ParquetFile) -> SegmentColumns:
         if "detail" in columns:
             for row, text in zip(rows.tolist(), table.column("detail").to_pylist(), strict=True):
                 detail[row] = text
+    arrays.setdefault(ACCURACY, _exact(count))
     for name, values in _arrays(file.schema_arrow.empty_table()).items():
         arrays.setdefault(name, _constant(NOTHING[name], count) if name in NOTHING else values)
     keyed = codes != NONE
@@ -422,8 +431,22 @@ def _arrays(table: pa.Table) -> dict[str, npt.NDArray[Any]]:
         "kind": _codes(table, "kind", KINDS),
         "op": _codes(table, "op", OPS),
         "points": np.column_stack([_coordinates(table, name) for name in "xy"]),
+        "accuracy": _accuracy(table),
         **{name: _integers(table, name, none) for name, none in there.items()},
     }
+
+
+def _accuracy(table: pa.Table) -> npt.NDArray[np.float64]:
+    """The errors of positions; of files without the column 0 for all."""
+    if ACCURACY not in table.schema.names:
+        return _exact(len(table))
+    found: npt.NDArray[np.float64] = _filled(table.column(ACCURACY), 0.0).to_numpy()
+    return found
+
+
+def _exact(count: int) -> npt.NDArray[np.float64]:
+    """No errors."""
+    return np.broadcast_to(np.float64(0), count)
 
 
 def _optional(values: Integers, none: int, kind: pa.DataType) -> pa.Array:

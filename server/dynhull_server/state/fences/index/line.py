@@ -233,8 +233,11 @@ class Line:
         """The revisions of the hulls that are areas of keys, by name."""
         return {name: area.hull.state.counts.revision for name, area in self.areas.items()}
 
-    def changed(self, hulls: Iterable[Hull]) -> Iterator[tuple[Subjects, Crossings]]:
-        """The subjects whose side has changed, now that these hulls have; who has nothing to say costs nothing."""
+    def changed(self, hulls: Iterable[Hull], doubting: set[Fence]) -> Iterator[tuple[Subjects, Crossings]]:
+        """The subjects whose side has changed, now that these hulls have; who has nothing to say costs nothing.
+
+        Fences whose area has moved, and may now be certain of others, are added to those `doubting`.
+        """
         touched: dict[str, Subjects] = {}
         for hull in hulls:
             name = hull.name
@@ -245,6 +248,8 @@ class Line:
             for fence, vertices in () if area is None else area.moved():
                 for each in fence.subjects.values():
                     each.lay(fence.number, fence.row.config, vertices)
+                    if fence in each.delaying and fence.row.config.by_accuracy:
+                        doubting.add(fence)
                 touched |= fence.subjects
         for _, subjects in sorted(touched.items()):
             crossings = subjects.take()

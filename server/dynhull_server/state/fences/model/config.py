@@ -60,6 +60,8 @@ class FenceConfig:
         dwell: the time inside after which a subject makes an event.
         confirmations: the number of consecutive reports that must agree before a subject enters or leaves.
         min_dwell: how long a subject must be on the other side before it enters or leaves.
+        by_accuracy: whether a subject enters or leaves only once it is on the other side by more than the accuracy of
+            its position.
         max_events: the number of events to keep, 0 for the limit of the server.
         max_event_age: how long events are kept.
     """
@@ -77,6 +79,7 @@ class FenceConfig:
     min_dwell: int = 0
     max_events: int = 0
     max_event_age: int = 0
+    by_accuracy: bool = False
 
     @property
     def rule(self) -> AlarmRule | None:
@@ -86,6 +89,11 @@ class FenceConfig:
     @property
     def delays(self) -> bool:
         """Whether a change of side becomes an event only later."""
+        return self.confirms or self.by_accuracy
+
+    @property
+    def confirms(self) -> bool:
+        """Whether it becomes one only when later reports agree, or after some time."""
         return bool(self.confirmations or self.min_dwell)
 
     @property

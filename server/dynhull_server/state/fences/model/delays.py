@@ -1,4 +1,4 @@
-"""Changes of side that are no events yet, because reports that agree or time are missing.
+"""Changes of side that are no events yet, because certainty, reports that agree or time are missing.
 
 Beside these rules a fence decides sides as without them; its index knows the sides. A subject with a delay is reported
 to be on the other one.
@@ -72,8 +72,12 @@ class Delays:
             del self._of[hull]
 
     def confirmed(self, delay: Delay) -> bool:
-        """Whether the subject has reported often enough."""
-        return delay.reports >= self._config.confirmations
+        """Whether the subject has reported often enough, and not only with positions in doubt."""
+        return not delay.doubt and delay.reports >= self._config.confirmations
+
+    def doubts(self, hull: str) -> list[Key]:
+        """The keys of a hull no position of which on the other side was certain so far. O(delays)."""
+        return [key for key, delay in self.of(hull).items() if delay.doubt]
 
     def ripe(self, delay: Delay, now: int) -> bool:
         """Whether nothing is missing any more."""

@@ -78,6 +78,8 @@ class Delay(NamedTuple):
             Of an alarm, the revision with which the condition began to hold.
         causes: why it changed its side.
         standing: of an alarm, what else is known.
+        doubt: whether no position on that side was certain so far, with `by_accuracy`; `causes` are then those of the
+            last one.
     """
 
     enters: bool
@@ -85,6 +87,7 @@ class Delay(NamedTuple):
     reports: int
     causes: int
     standing: AlarmStanding | None = None
+    doubt: bool = False
 
 
 class Origin(NamedTuple):

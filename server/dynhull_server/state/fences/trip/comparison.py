@@ -1,6 +1,6 @@
 """What a change of hulls means for their fences: who has crossed, and the events of that."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -114,10 +114,15 @@ class Comparison:
                 crossed: dict[str, tuple[Subjects, Crossings | None]] = {
                     name: (line.subjects[name], None) for name in changed if name in line.subjects
                 }
-                crossed |= {each.hull.name: (each, crossings) for each, crossings in line.changed(hulls)}
+                doubting = set[Fence]()
+                crossed |= {each.hull.name: (each, crossings) for each, crossings in line.changed(hulls, doubting)}
+                for fence in doubting:
+                    for name, subjects in fence.subjects.items():
+                        crossed.setdefault(name, (subjects, None))
                 areas = line.area_revisions()
                 for name, (subjects, crossings) in sorted(crossed.items()):
-                    self.cross(subjects, crossings, areas, swap, now, changed.get(name), carried.get(name, NOBODY))
+                    origins = carried.get(name, NOBODY)
+                    self.cross(subjects, crossings, areas, swap, now, changed.get(name), origins, doubting)
                 for fence, pair, causes in line.paired(hulls):
                     self.leg(fence).paired(pair, causes, now)
                 names = {hull.name for hull in hulls}
@@ -139,8 +144,12 @@ class Comparison:
         now: int,
         changed: KeysChanged | None = None,
         origins: Mapping[Key, Origin] = NOBODY,
+        doubting: Collection[Fence] = (),
     ) -> None:
-        """Make the events of a change of the keys of a hull, or of the areas of its fences with these revisions."""
+        """Make the events of a change of the keys of a hull, or of the areas of its fences with these revisions.
+
+        The areas of those `doubting` have moved.
+        """
         crossed = set()
         if crossings is not None and len(crossings):
             if changed is not None and changed.expired and swap is not EXPIRY:  # which says it of all
@@ -156,14 +165,16 @@ class Comparison:
                     if fence.delays is None:
                         leg.crossed(subjects, crossings, rows, swap, now, own)
                     else:
-                        delay(leg, subjects, crossings, rows, swap, now, changed, own)
+                        delay(leg, subjects, crossings, rows, swap, now, changed, own, moved=fence in doubting)
                 crossings = some(crossings, np.flatnonzero(~apart))
             if len(crossings):
                 self.log.add(subjects, crossings, areas, swap, now)
-        for fence in () if changed is None else list(subjects.delaying):
-            if fence not in crossed:  # subjects may have reported that they stay
-                leg = self.leg(fence)
-                delay(leg, subjects, None, NO_ROWS, None, now, changed, known_to(fence, origins))
+        for fence in list(subjects.delaying):
+            if fence not in crossed and (
+                changed is not None or fence in doubting
+            ):  # they may have reported that they stay
+                leg, own, moved = self.leg(fence), known_to(fence, origins), fence in doubting
+                delay(leg, subjects, None, NO_ROWS, None, now, changed, own, moved=moved)
 
     def _apart(self, crossings: Crossings, origins: Mapping[Key, Origin]) -> npt.NDArray[np.bool_] | None:
         """(n,) which crossings are of fences that look at each of their events; None if none is."""

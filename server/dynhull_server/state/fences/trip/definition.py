@@ -20,7 +20,7 @@ from ..model.records import NO_WAITS, Cause, EventType, FenceRow, Inside, Waits
 from ..model.requests import CreateFence, DeleteFence, ReplaceFence
 from .alarms import look, watched_hulls
 from .comparison import Comparison, Ground
-from .delayed import end_all
+from .delayed import doubt_new, end_all
 from .leg import FenceLeg, members
 
 # The area of a fence that is replaced does not move.
@@ -86,6 +86,7 @@ class Definition:
             self._drop(fence)
             raise
         self._comparison.legs[number] = leg
+        doubt_new(leg, request.time)
         if config.initial == "snapshot":
             leg.summed_up(EventType.SNAPSHOT, Cause.CREATED, request.time)
         elif config.initial == "events":
@@ -185,6 +186,7 @@ class Definition:
         for name, subjects in fence.subjects.items():
             if fence.number in subjects.index:
                 subjects.index.drop(fence.number)
+            subjects.delaying.discard(fence)
             if not subjects.fences and all(other.subjects.get(name) is not subjects for other in others):
                 subjects.detach()
 

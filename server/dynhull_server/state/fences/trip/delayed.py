@@ -1,11 +1,12 @@
-"""What a change of a hull means for a fence whose events are delayed: `confirmations` and `min_dwell`."""
+"""What a change of a hull means for a fence whose events are delayed: by accuracy, confirmations or time."""
 
 from collections.abc import Collection, Mapping
 
 import numpy as np
+import numpy.typing as npt
 
 from dynhull import Crossings
-from dynhull.keys import key_list
+from dynhull.keys import key_list, take_keys
 
 from ...records import NO_TIME
 from ..events.sequences import Swap, caused
@@ -29,6 +30,8 @@ def delay(
     now: int,
     changed: KeysChanged | None,
     origins: Mapping[Key, Origin] = NOBODY,
+    *,
+    moved: bool = False,
 ) -> None:
     """Begin and end delays, and make the events for which nothing is missing any more.
 
@@ -41,6 +44,7 @@ def delay(
         now: the time.
         changed: what has happened to the keys; None where only the area has changed.
         origins: where subjects of this fence come from, with their delays.
+        moved: whether the area has.
     """
     delays, hull = leg.fence.delays, subjects.hull.name
     assert delays is not None  # the caller checks it
@@ -51,14 +55,20 @@ def delay(
         begun = _follow(leg, subjects, crossings, rows, swap, now)
     waiting = delays.of(hull)  # another one, if there were none before
     touched = set(begun)
+    reports: Collection[Key] = ()
     if changed is not None and waiting:
         _leave(leg, subjects, changed, now)
-        if leg.row.config.confirmations:
-            for key in changed.reports(keyed(subjects.hull.state), waiting, origins.keys()):
-                each = waiting[key]
-                if key not in begun and not delays.confirmed(each):
-                    leg.put_delay((hull, key), each._replace(reports=each.reports + 1))
-                    touched.add(key)
+        config = leg.row.config
+        if config.confirmations or config.by_accuracy:
+            reports = changed.reports(keyed(subjects.hull.state), waiting, origins.keys())
+        for key in reports if config.confirmations else ():
+            each = waiting[key]
+            if key not in begun and not each.doubt and not delays.confirmed(each):
+                leg.put_delay((hull, key), each._replace(reports=each.reports + 1))
+                touched.add(key)
+    if waiting and leg.row.config.by_accuracy:
+        looked = delays.doubts(hull) if moved else [key for key in reports if waiting[key].doubt]
+        touched.update(_certain(leg, subjects, [key for key in looked if key not in begun], reports, now, moved=moved))
     ripe = [(hull, key) for key in touched if key in waiting and delays.ripe(waiting[key], leg.time(now))]
     end_some(leg, subjects, ripe, Cause(0), now)
     told = {event.key for event in leg.events[first:] if event.type is not EventType.CROSS}
@@ -70,6 +80,39 @@ def delay(
         event._replace(sequence=start + place, origin=origins.get(event.key))  # type: ignore[arg-type]
         for place, event in enumerate(ordered)
     ]
+
+
+def _certain(
+    leg: FenceLeg, subjects: Subjects, doubtful: Collection[Key], reports: Collection[Key], now: int, *, moved: bool
+) -> list[Key]:
+    """End the doubt of those of some keys that are on their side by more than their accuracy. Returns these."""
+    delays, hull, config = leg.fence.delays, subjects.hull.name, leg.row.config
+    if delays is None or not doubtful:
+        return []
+    waiting, keys = delays.of(hull), subjects.keys(doubtful)
+    inside = np.array([waiting[key].enters for key in key_list(keys)], np.bool_)
+    clear = subjects.clear(leg, keys, keyed(subjects.hull.state).positions(keys), inside)
+    reported, certain = set(reports), []
+    for key, is_clear in zip(key_list(keys), clear.tolist(), strict=True):
+        if not is_clear:
+            continue
+        own, each = key in reported, waiting[key]
+        causes = (Cause.MOVED if own else Cause(0)) | (Cause.AREA if moved else Cause(0))
+        since = leg.time(now) if config.confirms else each.since
+        ends = each._replace(since=since, reports=int(own and config.confirmations > 0), causes=causes, doubt=False)
+        leg.put_delay((hull, key), ends)
+        certain.append(key)
+    return certain
+
+
+def doubt_new(leg: FenceLeg, now: int) -> None:
+    """Let those be outside of a new fence whose position is not certainly inside of its area."""
+    for subjects in leg.fence.subjects.values() if leg.row.config.by_accuracy else ():
+        keys = subjects.index.inside(leg.row.number)
+        points = keyed(subjects.hull.state).positions(keys)
+        clear = subjects.clear(leg, keys, points, np.ones(len(keys), np.bool_))
+        for key in key_list(take_keys(keys, np.flatnonzero(~clear))):
+            leg.put_delay((subjects.hull.name, key), Delay(True, leg.time(now), 0, int(Cause.CREATED), doubt=True))
 
 
 def take_over(leg: FenceLeg, subjects: Subjects, origins: Mapping[Key, Origin]) -> None:
@@ -110,9 +153,15 @@ def end_some(leg: FenceLeg, subjects: Subjects, ripe: Collection[Subject], more:
 
 def end_all(leg: FenceLeg, now: int) -> None:
     """End the delays for which nothing is missing by the present settings of the fence, which has been replaced."""
-    delays, time = leg.fence.delays, leg.time(now)
+    delays, time, config = leg.fence.delays, leg.time(now), leg.row.config
     if delays is None:
         return
+    for hull, subjects in leg.fence.subjects.items():
+        doubtful = delays.doubts(hull)
+        if config.by_accuracy:
+            _certain(leg, subjects, doubtful, (), now, moved=False)
+        for key in () if config.by_accuracy else doubtful:
+            leg.put_delay((hull, key), delays.of(hull)[key]._replace(doubt=False))
     ripe: dict[str, list[Subject]] = {}
     for subject, each in delays.all():
         if delays.ripe(each, time):
@@ -130,6 +179,7 @@ def _follow(
     numbers = np.arange(len(crossings))[rows]
     at_once = []
     begun = set()
+    doubtful = _doubtful(leg, subjects, crossings, numbers) if leg.row.config.by_accuracy else frozenset()
     columns = zip(
         numbers.tolist(),
         key_list(crossings.keys[rows]),
@@ -149,7 +199,11 @@ def _follow(
                 leg.put_delay((hull, key), None)
         elif waits:  # it is back
             leg.put_delay((hull, key), None)
-        elif not leg.row.config.delays:  # the fence has been replaced by one without such rules
+        elif number in doubtful:
+            doubt = Delay(change > 0, leg.time(now), 0, caused(causes, swap), doubt=True)
+            leg.put_delay((hull, key), doubt)
+            begun.add(key)
+        elif not leg.row.config.confirms:  # or the fence has been replaced by one without such rules
             at_once.append(number)
         else:
             own = causes & OWN != 0
@@ -160,6 +214,17 @@ def _follow(
     if at_once:
         leg.crossed(subjects, crossings, np.array(at_once, np.intp), swap, now)
     return begun
+
+
+def _doubtful(
+    leg: FenceLeg, subjects: Subjects, crossings: Crossings, numbers: npt.NDArray[np.intp]
+) -> Collection[int]:
+    """The rows of those among some that change sides by less than their accuracy."""
+    changes, gone = crossings.changes[numbers], crossings.causes[numbers] & GONE != 0
+    rows = numbers[(np.abs(changes) == 1) & ~gone]
+    keys, points = take_keys(crossings.keys, rows), crossings.points[rows]
+    clear = subjects.clear(leg, keys, points, crossings.changes[rows] > 0)
+    return frozenset(rows[~clear].tolist())
 
 
 def _leave(leg: FenceLeg, subjects: Subjects, changed: KeysChanged, now: int) -> None:

@@ -136,7 +136,7 @@ class FenceLeg:
     def entered(self, subjects: Subjects, now: int) -> None:
         """Make an event of each subject that is inside of a new fence."""
         time, hull, revisions = self.time(now), subjects.hull.name, self._revisions(subjects.hull)
-        keys = subjects.index.inside(self.fence.number)
+        keys = self.fence.keys_inside(subjects)
         points = keyed(subjects.hull.state).positions(keys).tolist()
         for key, (x, y), event_time in zip(key_list(keys), points, _event_times(subjects, keys), strict=True):
             subject = EventType.ENTER, Cause.CREATED, hull, key, *revisions
