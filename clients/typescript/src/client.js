@@ -1,22 +1,19 @@
 import { Connection, path } from "./connection.js"
-import { fromWire, isoTime, snake } from "./json.js"
-import { follow } from "./sse.js"
-import { fenceEvent, hullEvent } from "./watch.js"
-import { Writer } from "./writer.js"
-import { Reads } from "./reads.js"
+import { Joined } from "./joined.js"
+import { fromWire, isoTime, micros, momentOf, toWire } from "./json.js"
 import { pastOf } from "./past.js"
+import { Streams } from "./streams.js"
+import { Writer } from "./writer.js"
+
+/** Gateways send a comment each 15 seconds. */
+const SILENCE = 45
 
 /**
  * @typedef {import("./exact.js").Point} Point
- * @typedef {import("./hull-copy.js").HullCopy} HullCopy
  * @typedef {import("./hull-copy.js").Key} Key
- * @typedef {import("./hull-copies.js").HullCopies} HullCopies
- * @typedef {import("./watch.js").HullEvent} HullEvent
- * @typedef {import("./watch.js").FenceEvent} FenceEvent
- * @typedef {import("./watch.js").Hulls} Hulls
  * @typedef {import("./writer.js").AnyKey} AnyKey
  * @typedef {import("./writer.js").Time} Time
- * @typedef {import("./sse.js").Following} Following
+ * @typedef {import("./json.js").Moment} Moment
  * @typedef {import("./past.js").Past} Past
  * @typedef {{signal?: AbortSignal | null}} Abortable
  *
@@ -93,11 +90,15 @@ import { pastOf } from "./past.js"
  * @property {number | null} [pointLimit]
  * @property {boolean} [geographic]
  * @property {Point | null} [center]
- * @property {{maxSpeed?: number, maxGrowth?: number, confirmations?: number} | null} [quarantine]
+ * @property {Quarantine | null} [quarantine]
  * @property {number | null} [shards]
  * @property {boolean | number | string | null} [history]
  * @property {number | null} [historyBytes]
  * @property {boolean} [existOk]
+ *
+ * @typedef {{maxSpeed?: number, maxGrowth?: number, confirmations?: number}} Quarantine
+ * @typedef {{key: Key, [field: string]: any}} HeldPosition
+ * @typedef {{uid: string, times: (bigint | null)[], [column: string]: any}} Series row by row, the oldest first
  *
  * @typedef {object} FenceSettings
  * @property {object} area `{hull}`, `{center, radius}`, `{exterior, holes}`, several of these, or a GeoJSON geometry
@@ -121,8 +122,61 @@ import { pastOf } from "./past.js"
  *   inside: number, subjectCount: number, consumers: Consumer[]}} Fence
  * @typedef {{name: string, acknowledged: bigint, backlog: number, oldest: bigint | null, lost: number}} Consumer
  *
- * @typedef {Following & {keys?: boolean, measures?: boolean, layer?: number, maxVertices?: number, rate?: number,
- *   copy?: HullCopy}} WatchOptions
+ * @typedef {object} NewAlarm
+ * @property {string} [hull] the hull that is watched,
+ * @property {string} [prefix] or what the names of all hulls that are watched begin with
+ * @property {string} when the condition, such as `area > 500 km2`, `silent 5m`, `near fleet/south 3 km`
+ * @property {string} [clear] what clears it; default: its opposite
+ * @property {number | string} [for] how long it must hold before: seconds, or a text such as 30s
+ * @property {number} [maxEvents]
+ * @property {number} [maxEventAge] seconds
+ *
+ * @typedef {object} AlarmStatus an alarm at one hull
+ * @property {string} hull
+ * @property {boolean} raised
+ * @property {bigint} revision
+ * @property {number | null} value
+ * @property {bigint | null} since
+ * @property {bigint | null} acknowledged when somebody has acknowledged it
+ * @property {bigint | null} mutedUntil
+ *
+ * @typedef {object} Alarm
+ * @property {string} name
+ * @property {string | null} hull
+ * @property {string | null} prefix
+ * @property {string} when
+ * @property {string} clear
+ * @property {number | null} for seconds
+ * @property {number} maxEvents
+ * @property {number | null} maxEventAge
+ * @property {bigint} created
+ * @property {string} uid
+ * @property {bigint} lastSequence
+ * @property {bigint} firstSequence
+ * @property {number} hulls
+ * @property {number} raised for how many hulls
+ * @property {Consumer[]} consumers
+ * @property {AlarmStatus[]} statuses empty in lists
+ *
+ * @typedef {object} History what there is of the past of a hull
+ * @property {bigint} firstRevision
+ * @property {bigint | null} firstTime
+ * @property {bigint} lastRevision
+ * @property {bigint | null} lastTime
+ * @property {number} bytes
+ * @property {number} batches
+ * @property {number} moves
+ * @property {number | boolean | null} history seconds; true for ever, null for not at all
+ * @property {number | null} historyBytes
+ * @property {Erasure[]} erasures
+ *
+ * @typedef {{time: bigint, firstRevision: bigint, lastRevision: bigint, keys: number, moves: number}} Erasure
+ *
+ * @typedef {object} Track the way of a key: its place at the beginning, and each after it
+ * @property {bigint[]} times microseconds since 1970
+ * @property {(Point | null)[]} points null where the key left the hull
+ * @property {bigint[]} revisions
+ * @property {(bigint | null)[] | null} eventTimes
  */
 
 /**
@@ -135,7 +189,7 @@ import { pastOf } from "./past.js"
  *
  * Keys of hulls with integers, revisions, sequences and times are bigint. What is refused throws a DynhullError.
  */
-export class Client extends Reads {
+export class Client extends Streams {
   #connection
 
   /**
@@ -144,7 +198,7 @@ export class Client extends Reads {
    */
   constructor(url, options = {}) {
     const connection = new Connection(url, options)
-    super((name, what, call) => connection.ask(path`/hulls/${name}` + what, { repeatable: true, ...call }))
+    super(connection, new Joined(connection, options.silence ?? SILENCE))
     this.#connection = connection
   }
 
@@ -251,61 +305,162 @@ export class Client extends Reads {
     return fromWire(await this.#connection.ask(found, { repeatable: true, ...options })).lastSequence
   }
 
+  // Hulls as a whole
+
+  /**
+   * Move the centre of a geographic hull; null for the mean direction of its points.
+   * @param {string} name
+   * @param {Point | null} [center]
+   * @param {Abortable} [options]
+   * @returns {Promise<HullInfo>}
+   */
+  async recenter(name, center = null, options = {}) {
+    const call = { method: "POST", body: { center }, ...options }
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/recenter`, call))
+  }
+
+  /**
+   * Divide the points of a hull over shards among another number of shards.
+   * @param {string} name
+   * @param {number} shards
+   * @param {Abortable} [options]
+   * @returns {Promise<HullInfo>}
+   */
+  async reshard(name, shards, options = {}) {
+    const call = { method: "POST", body: { shards }, ...options }
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/reshard`, call))
+  }
+
+  /**
+   * Replace the rules that hold bad positions out of a keyed hull.
+   * @param {string} name
+   * @param {Quarantine} rules
+   * @param {Abortable} [options]
+   * @returns {Promise<HullInfo>}
+   */
+  async setQuarantine(name, rules, options = {}) {
+    const call = { method: "PUT", body: toWire(rules), repeatable: true, ...options }
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/quarantine`, call))
+  }
+
+  /**
+   * The positions in quarantine by key. `apply` releases and drops them.
+   * @param {string} name
+   * @param {Abortable} [options]
+   * @returns {AsyncGenerator<HeldPosition, void, undefined>}
+   */
+  async *listHeld(name, options = {}) {
+    yield* this.#pages(path`/hulls/${name}/held`, "held", undefined, options)
+  }
+
+  /**
+   * How counts and measures were over the last hour: a row about every ten seconds in which the hull changed.
+   * @param {string} name
+   * @param {{last?: number} & Abortable} [options] `last`: seconds
+   * @returns {Promise<Series>}
+   */
+  async series(name, { last, signal } = {}) {
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/series`, { query: { last }, repeatable: true, signal }))
+  }
+
+  /**
+   * The distance of two hulls, or the depth of their overlap.
+   * @param {string} name
+   * @param {string} other
+   * @param {Abortable} [options]
+   * @returns {Promise<Record<string, any>>}
+   */
+  async separate(name, other, options = {}) {
+    const call = { query: { other }, repeatable: true, ...options }
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/separation`, call))
+  }
+
+  /**
+   * The hull as a binary phase diagram: its points are compositions from 0 to 1 and energies.
+   * @param {string} name
+   * @param {readonly Point[]} [entries]
+   * @param {Abortable} [options]
+   * @returns {Promise<{revision: bigint, stable: Point[], energiesAboveHull: (number | null)[], phases: [Point, Point][]}>}
+   */
+  async phaseDiagram(name, entries = [], options = {}) {
+    const call = { method: "POST", body: { entries }, repeatable: true, ...options }
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/phase-diagram`, call))
+  }
+
+  /**
+   * The hull as an efficient frontier: its points are risks and returns.
+   * @param {string} name
+   * @param {{points?: readonly Point[], rates?: readonly number[]} & Abortable} [options]
+   * @returns {Promise<Record<string, any>>}
+   */
+  async frontier(name, { points = [], rates = [], signal } = {}) {
+    const call = { method: "POST", body: { points, rates }, repeatable: true, signal }
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/frontier`, call))
+  }
+
   // The past
 
   /**
    * A hull as it was: an object with the reading methods, without the name.
    * @param {string} name
-   * @param {bigint | number | Date | string} when a revision, or a time with its zone: the last revision committed by then
+   * @param {Moment} when
    * @param {Abortable} [options]
    * @returns {Promise<Past>}
    */
   async at(name, when, options = {}) {
-    const at = typeof when === "bigint" || typeof when === "number" ? String(when) : isoTime(when)
+    const at = momentOf(when)
     const ask = (/** @type {string} */ what, /** @type {any} */ call) =>
       this.#connection.ask(path`/hulls/${name}` + what, { repeatable: true, ...call })
     const found = await ask("", { query: { at }, ...options })
     return pastOf(name, fromWire(found.info), ask)
   }
 
-  // Streams
-
   /**
-   * The changes of a hull as they happen, without end; a hull that is not there yet is waited for.
-   *
-   * Connections that end or fall silent are made again, and the stream goes on where it was. Leave the loop, or abort
-   * the signal, to end it.
+   * What there is of the past of a hull.
    * @param {string} name
-   * @param {WatchOptions} [options]
-   * @returns {AsyncGenerator<HullEvent, void, undefined>}
+   * @param {Abortable} [options]
+   * @returns {Promise<History>}
    */
-  async *watch(name, { copy, keys, measures, layer, maxVertices, rate, ...following } = {}) {
-    const query = { keys, measures, layer, max_vertices: maxVertices, rate, wait: true }
-    for await (const { type, data } of follow(this.#connection, path`/hulls/${name}/events`, query, following)) {
-      const event = hullEvent(type, fromWire(data))
-      copy?.update(event)
-      yield event
-    }
+  async history(name, options = {}) {
+    return historyOf(await this.#connection.ask(path`/hulls/${name}/history`, { repeatable: true, ...options }))
   }
 
   /**
-   * All hulls whose names begin with a prefix, or with these names, as they change.
-   * @param {string | readonly string[]} which a prefix, or names
-   * @param {Following & {outlines?: boolean, maxVertices?: number, rate?: number, copies?: HullCopies}} [options]
-   * @returns {AsyncGenerator<Hulls, void, undefined>}
+   * Change how much of its past a hull keeps.
+   * @param {string} name
+   * @param {boolean | number | string | null} history seconds, a text such as 30d, true for ever, null for not at all
+   * @param {{historyBytes?: number | null} & Abortable} [options]
+   * @returns {Promise<HullInfo>}
    */
-  async *watchMany(which, { outlines, maxVertices, rate, copies, ...following } = {}) {
-    const options = { outlines: outlines || undefined, max_vertices: maxVertices, rate }
-    const names = typeof which === "string" ? "" : `?${which.map((name) => `name=${encodeURIComponent(name)}`).join("&")}`
-    const query = typeof which === "string" ? { prefix: which, ...options } : options
-    for await (const { type, data } of follow(this.#connection, `/events${names}`, query, following)) {
-      if (type !== "begin" && type !== "hulls" && type !== "complete") continue
-      const { hulls, gone = [], unchanged = [] } = type === "hulls" ? data : { hulls: [] }
-      /** @type {Hulls} */
-      const event = { type, hulls: hulls.map(hullNow), gone, unchanged }
-      copies?.update(event)
-      yield event
-    }
+  async setHistory(name, history, { historyBytes = null, signal } = {}) {
+    const call = { method: "PUT", body: { history, history_bytes: historyBytes }, repeatable: true, signal }
+    return fromWire(await this.#connection.ask(path`/hulls/${name}/history`, call))
+  }
+
+  /**
+   * Erase keys from the past of a hull. Keys that it has now are refused.
+   * @param {string} name
+   * @param {readonly AnyKey[]} keys
+   * @param {Abortable} [options]
+   * @returns {Promise<Erasure | null>} null if no segment had any of them
+   */
+  async eraseHistory(name, keys, options = {}) {
+    const call = { method: "POST", body: { keys }, ...options }
+    return erasureOf(await this.#connection.ask(path`/hulls/${name}/history/erase`, call))
+  }
+
+  /**
+   * Where keys were between two moments.
+   * @param {string} name
+   * @param {readonly AnyKey[]} keys
+   * @param {{start?: Moment, end?: Moment, every?: number} & Abortable} [options] `every`: of each key the last place in
+   *   each span of so many seconds alone
+   * @returns {Promise<Map<Key, Track>>}
+   */
+  async track(name, keys, { start, end, every, signal } = {}) {
+    const query = { key: keys.map(String), from: momentOf(start), to: momentOf(end), every }
+    const { tracks } = await this.#connection.ask(path`/hulls/${name}/tracks`, { query, repeatable: true, signal })
+    return new Map(tracks.map(trackOf))
   }
 
   // Fences
@@ -372,20 +527,6 @@ export class Client extends Reads {
   }
 
   /**
-   * The events of a fence, each once and in order, without end.
-   * @param {string} name
-   * @param {Following & {consumer?: string, after?: bigint | number, conflate?: boolean}} [options] begin after the last
-   *   event that a consumer has acknowledged, or after a number; default: what happens from now on
-   * @returns {AsyncGenerator<FenceEvent, void, undefined>}
-   */
-  async *watchFence(name, { consumer, after, conflate, ...following } = {}) {
-    const query = { consumer, after, conflate: conflate || undefined }
-    for await (const { data } of follow(this.#connection, path`/fences/${name}/events`, query, following)) {
-      yield fenceEvent(fromWire(data))
-    }
-  }
-
-  /**
    * Acknowledge the events of a fence up to a number: a watch of that consumer begins after it.
    * @param {string} name
    * @param {string} consumer
@@ -408,10 +549,101 @@ export class Client extends Reads {
     await this.#connection.ask(path`/fences/${name}/consumers/${consumer}`, { method: "DELETE", ...options })
   }
 
+  // Alarms
+
+  /**
+   * Create an alarm: it is raised for a hull when a condition about its outline holds, and cleared when not.
+   * @param {string} name
+   * @param {NewAlarm & Abortable} rule
+   * @returns {Promise<Alarm>}
+   */
+  async createAlarm(name, { signal, ...rule }) {
+    const body = toWire({ name, ...rule })
+    return alarmOf(await this.#connection.ask("/alarms", { method: "POST", body, signal }))
+  }
+
+  /**
+   * Delete an alarm with its events.
+   * @param {string} name
+   * @param {Abortable} [options]
+   */
+  async deleteAlarm(name, options = {}) {
+    await this.#connection.ask(path`/alarms/${name}`, { method: "DELETE", ...options })
+  }
+
+  /**
+   * An alarm, and the hulls for which it is raised, waits, or is muted.
+   * @param {string} name
+   * @param {Abortable} [options]
+   * @returns {Promise<Alarm>}
+   */
+  async getAlarm(name, options = {}) {
+    return alarmOf(await this.#connection.ask(path`/alarms/${name}`, { repeatable: true, ...options }))
+  }
+
+  /**
+   * The alarms by name.
+   * @param {string} [prefix]
+   * @param {Abortable} [options]
+   * @returns {AsyncGenerator<Alarm, void, undefined>}
+   */
+  async *listAlarms(prefix = "", options = {}) {
+    yield* this.#pages("/alarms", "alarms", prefix, options)
+  }
+
+  /**
+   * Say that somebody takes care of an alarm that is raised for a hull, until it is cleared.
+   * @param {string} name
+   * @param {string} hull
+   * @param {Abortable} [options]
+   * @returns {Promise<AlarmStatus>}
+   */
+  async acknowledgeAlarm(name, hull, options = {}) {
+    const call = { method: "POST", body: { hull }, repeatable: true, ...options }
+    return statusOf(await this.#connection.ask(path`/alarms/${name}/acknowledge`, call))
+  }
+
+  /**
+   * Mute an alarm for a hull; its events are made and sent as before.
+   * @param {string} name
+   * @param {string} hull
+   * @param {Time | null} until null: no longer
+   * @param {Abortable} [options]
+   * @returns {Promise<AlarmStatus>}
+   */
+  async muteAlarm(name, hull, until, options = {}) {
+    const body = { hull, until: until === null ? null : isoTime(until) }
+    const call = { method: "POST", body, repeatable: true, ...options }
+    return statusOf(await this.#connection.ask(path`/alarms/${name}/mute`, call))
+  }
+
+  /**
+   * Acknowledge the events of an alarm up to a number: a watch of that consumer begins after it.
+   * @param {string} name
+   * @param {string} consumer
+   * @param {bigint | number} sequence
+   * @param {{uid?: string} & Abortable} [options]
+   * @returns {Promise<Consumer>}
+   */
+  async ackAlarm(name, consumer, sequence, { uid = "", signal } = {}) {
+    const call = { method: "PUT", body: { sequence, uid }, repeatable: true, signal }
+    return fromWire(await this.#connection.ask(path`/alarms/${name}/consumers/${consumer}`, call))
+  }
+
+  /**
+   * Forget a consumer of an alarm.
+   * @param {string} name
+   * @param {string} consumer
+   * @param {Abortable} [options]
+   */
+  async deleteAlarmConsumer(name, consumer, options = {}) {
+    await this.#connection.ask(path`/alarms/${name}/consumers/${consumer}`, { method: "DELETE", ...options })
+  }
+
   /**
    * @param {string} at
-   * @param {"hulls" | "fences"} rows
-   * @param {string} prefix
+   * @param {"hulls" | "fences" | "alarms" | "held"} rows
+   * @param {string | undefined} prefix
    * @param {Abortable} options
    * @returns {AsyncGenerator<any, void, undefined>}
    */
@@ -420,20 +652,42 @@ export class Client extends Reads {
     let after = null
     do {
       const page = await this.#connection.ask(at, { query: { prefix, after }, repeatable: true, ...options })
-      yield* page[rows].map(rows === "fences" ? fenceOf : fromWire)
+      yield* page[rows].map({ hulls: fromWire, fences: fenceOf, alarms: alarmOf, held: fromWire }[rows])
       after = page.next
     } while (after !== null)
   }
 }
 
-/** @param {any} hull @returns {import("./watch.js").HullNow} */
-function hullNow(hull) {
-  return { measures: null, changed: null, center: null, vertices: null, error: null, ...fromWire(hull) }
-}
-
 /** A fence; the area is as it was given. @param {any} fence @returns {Fence} */
 function fenceOf(fence) {
   return { ...fromWire(fence), area: fence.area }
+}
+
+/** @param {any} alarm @returns {Alarm} */
+function alarmOf(alarm) {
+  return { ...fromWire({ ...alarm, statuses: [] }), statuses: alarm.statuses.map(statusOf) }
+}
+
+/** @param {any} status @returns {AlarmStatus} */
+function statusOf(status) {
+  return { ...fromWire(status), acknowledged: micros(status.acknowledged) }
+}
+
+/** @param {any} history @returns {History} */
+function historyOf(history) {
+  return { ...fromWire({ ...history, erasures: [] }), erasures: history.erasures.map(erasureOf) }
+}
+
+/** The number of keys is no key. @param {any} erasure */
+function erasureOf(erasure) {
+  return erasure && { ...fromWire(erasure), keys: erasure.keys }
+}
+
+/** @param {any} track @returns {[Key, Track]} */
+function trackOf(track) {
+  const { key, ...way } = fromWire(track)
+  const points = way.points.map((/** @type {Point} */ point) => (point[0] === null ? null : point))
+  return [key, { ...way, points }]
 }
 
 /** @param {string | undefined} producer @param {bigint | number | undefined} sequence @param {boolean | undefined} skip */
@@ -447,12 +701,6 @@ function numbering(producer, sequence, skip) {
 function batchToWire(batch) {
   const times = (/** @type {readonly Time[] | undefined} */ given) => given?.map(isoTime)
   return toWire({ ...batch, times: times(batch.times), expireTimes: times(batch.expireTimes) })
-}
-
-/** Settings with names as servers write them. @param {Record<string, any>} given @returns {Record<string, any>} */
-function toWire(given) {
-  const there = Object.entries(given).filter(([, value]) => value !== undefined)
-  return Object.fromEntries(there.map(([name, value]) => [snake(name), name === "quarantine" && value ? toWire(value) : value]))
 }
 
 /**

@@ -6,11 +6,14 @@ import { fromJson, toJson } from "./json.js"
  * @property {string | null} [token] sent as `Authorization: Bearer`, kept in memory only
  * @property {number} [timeout] seconds that an answer may take
  * @property {number} [retries] how often a read, or a numbered batch, is sent again when nobody answers
+ * @property {number} [silence] seconds without anything, a comment included, after which a stream is connected anew
  * @property {typeof globalThis.fetch} [fetch] another fetch
+ *
+ * @typedef {string | number | bigint | boolean | null | undefined} Value
  *
  * @typedef {object} Call
  * @property {string} [method]
- * @property {Record<string, string | number | bigint | boolean | null | undefined>} [query]
+ * @property {Record<string, Value | readonly Value[]>} [query]
  * @property {unknown} [body]
  * @property {string} [idempotencyKey]
  * @property {boolean} [repeatable] whether it may be sent again if it is not known what became of it
@@ -19,6 +22,8 @@ import { fromJson, toJson } from "./json.js"
 
 /** The first pause before something is tried again, and the longest, in seconds. */
 export const PAUSES = { first: 0.25, last: 15 }
+
+const JSON_TYPE = "application/json"
 
 /** Calls of one gateway. */
 export class Connection {
@@ -62,11 +67,10 @@ export class Connection {
    * Open a stream of events.
    * @param {string} path
    * @param {Call} call
-   * @param {string} lastEventId where to go on; empty for the beginning
    * @returns {Promise<ReadableStream<Uint8Array>>}
    */
-  async open(path, call, lastEventId) {
-    const headers = { Accept: "text/event-stream", ...(lastEventId && { "Last-Event-ID": lastEventId }) }
+  async open(path, call) {
+    const headers = { Accept: "text/event-stream", ...(call.body !== undefined && { "Content-Type": JSON_TYPE }) }
     const response = await this.#send(path, call, headers, call.signal ?? undefined)
     if (!response.ok || response.body === null) throw await problemOf(response)
     return response.body
@@ -77,8 +81,8 @@ export class Connection {
     const late = AbortSignal.timeout(this.#timeout * 1000)
     const signal = call.signal ? AbortSignal.any([call.signal, late]) : late
     const headers = {
-      Accept: "application/json",
-      ...(call.body !== undefined && { "Content-Type": "application/json" }),
+      Accept: JSON_TYPE,
+      ...(call.body !== undefined && { "Content-Type": JSON_TYPE }),
       ...(call.idempotencyKey && { "Idempotency-Key": call.idempotencyKey }),
     }
     try {
@@ -103,11 +107,9 @@ export class Connection {
    * @param {AbortSignal | undefined} signal
    */
   async #send(path, { method = "GET", query = {}, body }, headers, signal) {
-    const given = Object.entries(query).flatMap(([name, value]) => (value == null ? [] : [[name, String(value)]]))
-    const search = given.length ? `?${new URLSearchParams(given)}` : ""
     const all = this.#token === null ? headers : { ...headers, Authorization: `Bearer ${this.#token}` }
     try {
-      return await this.#fetch(this.url + path + search, {
+      return await this.#fetch(this.url + target(path, query), {
         method,
         headers: all,
         ...(body !== undefined && { body: toJson(body) }),
@@ -128,6 +130,17 @@ export class Connection {
  */
 export function path(texts, ...names) {
   return String.raw({ raw: texts }, ...names.map(encodeURIComponent))
+}
+
+/**
+ * A path with its query; what is null is left out.
+ * @param {string} path
+ * @param {Call["query"]} [query]
+ */
+export function target(path, query = {}) {
+  const given = Object.entries(query).flatMap(([name, value]) => [value].flat().map((each) => [name, each]))
+  const search = new URLSearchParams(given.filter(([, value]) => value != null).map(([name, value]) => [String(name), String(value)]))
+  return search.size ? `${path}?${search}` : path
 }
 
 /**

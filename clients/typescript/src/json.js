@@ -33,8 +33,8 @@ export function toJson(value) {
 }
 
 // Fields whose integers may be large, and those that have times.
-const INTEGERS = /(^|_)(revisions?|sequence|keys?)$|^(acknowledged|first|last)$/
-const TIMES = /(^|_)times?$|^(created|changed|clock|oldest|since)$/
+const INTEGERS = /(^|_)(revisions?|sequence|keys?)$|^(acknowledged|commit|first|last)$/
+const TIMES = /(^|_)(times?|until)$|^(created|changed|clock|oldest|since)$/
 
 /**
  * An answer with names as JavaScript writes them: keys, revisions and sequences as bigint, times as microseconds since
@@ -65,8 +65,14 @@ function camel(name) {
   return name.replace(/_([a-z])/g, (_, letter) => letter.toUpperCase())
 }
 
+/** Settings with names as servers write them. @param {Record<string, any>} given @returns {Record<string, any>} */
+export function toWire(given) {
+  const there = Object.entries(given).filter(([, value]) => value !== undefined)
+  return Object.fromEntries(there.map(([name, value]) => [snake(name), name === "quarantine" && value ? toWire(value) : value]))
+}
+
 /** @param {string} name */
-export function snake(name) {
+function snake(name) {
   return name.replace(/[A-Z]/g, (letter) => `_${letter.toLowerCase()}`)
 }
 
@@ -101,4 +107,15 @@ export function isoTime(time) {
   const rest = ((whole % 1_000_000n) + 1_000_000n) % 1_000_000n
   const seconds = new Date(Number((whole - rest) / 1000n)).toISOString().slice(0, -5)
   return `${seconds}.${rest.toString().padStart(6, "0")}Z`
+}
+
+/** @typedef {bigint | number | Date | string} Moment a revision; or a time with its zone: the last revision committed by then */
+
+/**
+ * A moment of the past as servers read it.
+ * @param {Moment | undefined} when
+ */
+export function momentOf(when) {
+  if (when === undefined) return undefined
+  return typeof when === "bigint" || typeof when === "number" ? String(when) : isoTime(when)
 }

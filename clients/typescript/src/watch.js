@@ -1,3 +1,5 @@
+import { fromWire } from "./json.js"
+
 /**
  * @typedef {import("./exact.js").Point} Point
  * @typedef {import("./hull-copy.js").Key} Key
@@ -55,7 +57,7 @@
  * @typedef {Snapshot | Change | Progress | Deleted} HullEvent
  *
  * @typedef {object} FenceEvent
- * @property {string} type enter, exit, cross, dwell, transfer, begin, cease, snapshot, closed, lost or progress
+ * @property {string} type enter, exit, cross, dwell, transfer, begin, cease, snapshot, closed, lost or replaced
  * @property {bigint} sequence
  * @property {string} fence
  * @property {string} uid
@@ -71,6 +73,49 @@
  * @property {bigint | null} time
  * @property {bigint | null} firstTime
  * @property {{hull: string, keys: Key[], revision: bigint}[]} inside
+ *
+ * @typedef {object} AlarmEvent
+ * @property {string} type raised, cleared, snapshot, closed, lost or replaced
+ * @property {bigint} sequence
+ * @property {string} alarm
+ * @property {string} uid
+ * @property {string} hull empty if there is no single one
+ * @property {bigint} revision
+ * @property {number | null} value the measure; of `silent` the seconds, of `near` the distance
+ * @property {number | null} bound what it was compared with
+ * @property {string[]} cause
+ * @property {bigint | null} causeRevision the revision with which the condition began to hold
+ * @property {string} causeHull
+ * @property {bigint | null} causeTime in microseconds since 1970
+ * @property {number | null} previous the measure before
+ * @property {bigint | null} time
+ * @property {Key[]} keys of a condition about vertices
+ * @property {string[]} raised of `snapshot` and `closed`, the hulls for which it was raised
+ * @property {bigint} first of `lost`, the first sequence that was dropped
+ * @property {bigint} last
+ *
+ * @typedef {object} FeedEvent a batch, or what has become of a feed; a batch has those fields that are not empty
+ * @property {string} type batch, lost, deleted, hulls or replaced
+ * @property {string} position the id to go on after; empty for one that belongs together with the next
+ * @property {string} [hull]
+ * @property {bigint} [revision]
+ * @property {string} [uid]
+ * @property {bigint} [commit] revisions with the same number were committed together
+ * @property {bigint} [time] in microseconds since 1970
+ * @property {string} [cause]
+ * @property {Key[]} [keys] keys put
+ * @property {Point[]} [points] their positions
+ * @property {Key[]} [removed]
+ * @property {Point[]} [inserts]
+ * @property {Point[]} [deletes]
+ * @property {(bigint | null)[]} [times]
+ * @property {(bigint | null)[]} [expireTimes]
+ * @property {number} [expired]
+ * @property {bigint} [clock]
+ * @property {object} [held]
+ * @property {bigint} [first] of `lost`
+ * @property {bigint} [last]
+ * @property {Record<string, string>} [hulls] of `hulls`, the uids by name
  *
  * @typedef {object} HullNow the newest state of one of many hulls
  * @property {string} hull
@@ -105,8 +150,21 @@ export function hullEvent(type, data) {
   return { ...ABSENT, ...(type === "change" && UNCHANGED), ...data, type }
 }
 
-/** @param {any} data @returns {FenceEvent} */
-export function fenceEvent(data) {
+/** @param {string} type @param {any} data @returns {FenceEvent} */
+export function fenceEvent(type, data) {
   const absent = { key: null, position: null, previousPosition: null, distance: null, eventTime: null, firstTime: null }
-  return { cause: [], inside: [], hull: "", revision: 0n, areaRevision: 0n, ...absent, ...data }
+  const numbers = { sequence: 0n, revision: 0n, areaRevision: 0n }
+  return { type, cause: [], inside: [], fence: "", uid: "", hull: "", time: null, ...numbers, ...absent, ...data }
+}
+
+/** @param {string} type @param {any} data @returns {AlarmEvent} */
+export function alarmEvent(type, data) {
+  const absent = { value: null, bound: null, causeRevision: null, causeTime: null, previous: null, time: null }
+  const numbers = { sequence: 0n, revision: 0n, first: 0n, last: 0n }
+  return { type, cause: [], keys: [], raised: [], alarm: "", uid: "", hull: "", causeHull: "", ...numbers, ...absent, ...data }
+}
+
+/** The newest state of one of many hulls. @param {any} hull @returns {HullNow} */
+export function hullNow(hull) {
+  return { measures: null, changed: null, center: null, vertices: null, error: null, ...fromWire(hull) }
 }

@@ -96,6 +96,25 @@ test("many hulls are watched by one stream", options, async () => {
   assert.equal(copies.size, 0)
 })
 
+test("the other questions are answered", options, async () => {
+  const [a, b] = [name("questions/a"), name("questions/b")]
+  await client.createHull(a, { keyed: "str", quarantine: { maxGrowth: 2 } })
+  await client.setQuarantine(a, { maxGrowth: 3 })
+  await client.createHull(b)
+  await client.put(a, ["a", "b", "c"], [[0, 0], [1, 0], [0, 1]])
+  await client.apply(b, { insert: [[0.25, 1], [0.5, -1], [1, 3]] })
+  await client.put(a, ["a"], [[99, 99]])
+  const held = []
+  for await (const each of client.listHeld(a)) held.push(each.key)
+  assert.deepEqual(held, ["a"])
+  assert.equal((await client.separate(a, b)).revision, 3n)
+  assert.equal((await client.series(b)).times.length > 0, true)
+  assert.equal((await client.phaseDiagram(b, [[0.25, 0]])).stable.length, 3)
+  assert.equal((await client.frontier(b, { rates: [0.5] })).revision, 1n)
+  await client.createHull(name("questions/globe"), { geographic: true, center: [8, 50] })
+  assert.deepEqual((await client.recenter(name("questions/globe"), [9, 51])).center, [9, 51])
+})
+
 test("fences make events, which a consumer acknowledges", options, async () => {
   const [hull, fence] = [name("fenced"), name("fence")]
   await client.createHull(hull, { keyed: "str" })
@@ -112,6 +131,91 @@ test("fences make events, which a consumer acknowledges", options, async () => {
   assert.equal((await client.ackFence(fence, "page", 2n)).backlog, 0)
   assert.deepEqual((await client.fenceInside(fence)).subjects.flatMap((each) => each.keys), [])
   await client.deleteFence(fence)
+})
+
+test("alarms are raised, acknowledged, muted and cleared", options, async () => {
+  const [hull, alarm] = [name("alarmed"), name("alarm")]
+  await client.createHull(hull, { keyed: "str" })
+  const made = await client.createAlarm(alarm, { hull, when: "area > 5", clear: "area < 2" })
+  assert.deepEqual([made.when, made.raised, made.lastSequence, made.statuses], ["area > 5", 0, 0n, []])
+  const events = client.watchAlarm(alarm, { after: 0 })
+  await client.put(hull, ["a", "b", "c"], [[0, 0], [4, 0], [4, 3]])
+  const raised = /** @type {import("../src/watch.js").AlarmEvent} */ ((await events.next()).value)
+  assert.deepEqual([raised.type, raised.sequence, raised.hull, raised.value, raised.bound], ["raised", 1n, hull, 6, 5])
+  const { acknowledged } = await client.acknowledgeAlarm(alarm, hull)
+  assert.equal(typeof acknowledged, "bigint")
+  const until = 4102444800000000n
+  assert.equal((await client.muteAlarm(alarm, hull, until)).mutedUntil, until)
+  const [status] = (await client.getAlarm(alarm)).statuses
+  assert.deepEqual([status.raised, status.acknowledged, status.mutedUntil], [true, acknowledged, until])
+  assert.equal((await client.muteAlarm(alarm, hull, null)).mutedUntil, null)
+  await client.remove(hull, ["a"])
+  assert.equal((await events.next()).value?.type, "cleared")
+  assert.equal((await client.ackAlarm(alarm, "page", 1n)).backlog, 1)
+  await client.deleteAlarmConsumer(alarm, "page")
+  const names = []
+  for await (const each of client.listAlarms(alarm)) names.push(each.name)
+  assert.deepEqual(names, [alarm])
+  await client.deleteAlarm(alarm)
+  assert.equal((await events.next()).value?.type, "closed")
+  assert.deepEqual(await events.next(), { done: true, value: undefined })
+  await assert.rejects(client.watchAlarm(alarm).next(), { reason: "ALARM_NOT_FOUND" })
+})
+
+test("the past is replayed, followed and asked", options, async () => {
+  const hull = name("past")
+  await client.createHull(hull, { keyed: "int", history: true })
+  const large = 18446744073709551615n
+  await client.put(hull, [1, 2, large], [[0, 0], [4, 0], [4, 3]])
+  await client.put(hull, [large], [[1e-310, 5e-324]])
+  await client.remove(hull, [2])
+  const copy = new HullCopy()
+  const seen = []
+  for await (const event of client.replay(hull, { start: 1, copy, keys: true })) seen.push([event.type, event.revision, copy.vertices.length])
+  assert.deepEqual(seen, [["snapshot", 1n, 3], ["change", 2n, 3], ["change", 3n, 2]])
+  const track = (await client.track(hull, [large, 2], { start: 1 })).get(large)
+  assert.deepEqual([track?.points, track?.revisions], [[[4, 3], [1e-310, 5e-324]], [1n, 2n]])
+  const batches = []
+  for await (const batch of client.feed(hull, { after: 0 })) {
+    batches.push([batch.type, batch.revision, batch.keys, batch.points, batch.removed])
+    if (batch.revision === 3n) break
+  }
+  assert.deepEqual(batches[1], ["batch", 2n, [large], [[1e-310, 5e-324]], undefined])
+  assert.deepEqual(batches[2].at(-1), [2n])
+  const all = []
+  for await (const batch of client.feedMany(hull, { begin: true })) {
+    all.push(batch.revision)
+    if (batch.revision === 3n) break
+  }
+  assert.deepEqual(all, [1n, 2n, 3n])
+  const area = { exterior: [[3, -1], [5, -1], [5, 5], [3, 5]] }
+  const crossed = []
+  for await (const event of client.fenceEventsBetween({ area, subjects: hull, start: 1, initial: "none" })) {
+    crossed.push([event.type, event.key, event.sequence])
+  }
+  assert.deepEqual(crossed, [["exit", large, 1n], ["exit", 2n, 2n]])
+  const kept = await client.history(hull)
+  assert.deepEqual([kept.firstRevision <= 1n, kept.lastRevision, kept.history], [true, 3n, true])
+  assert.equal((await client.setHistory(hull, "30d")).name, hull)
+  assert.equal((await client.history(hull)).history, 2592000)
+  assert.equal(await client.eraseHistory(hull, [5]), null)
+})
+
+test("whatever a client follows takes one connection", options, async () => {
+  const counted = /** @type {string[]} */ ([])
+  const counting = new Client(url, { fetch: (input, init) => (counted.push(`${init?.method} ${input}`), fetch(input, init)) })
+  const hulls = Array.from({ length: 12 }, (_, i) => name(`joined/${i}`))
+  for (const hull of hulls) await counting.createHull(hull)
+  counted.length = 0
+  const watches = hulls.map((hull) => counting.watch(hull))
+  const many = counting.watchMany(hulls, { outlines: true })
+  const first = await Promise.all([...watches, many].map((each) => each.next()))
+  assert.deepEqual(first.map((each) => each.value?.type), [...hulls.map(() => "snapshot"), "begin"])
+  assert.deepEqual(counted, [`POST ${url}/streams`])
+  const later = counting.watch(hulls[0])
+  assert.equal((await later.next()).value?.type, "snapshot")
+  assert.deepEqual(counted.slice(1).map((each) => each.replace(/streams\/[^/]+/, "streams/S")), [`PUT ${url}/streams/S/subscriptions/14`])
+  for (const each of [...watches, many, later]) await each.return()
 })
 
 test("a writer gathers, waits for room, and stops where the server refuses", options, async () => {
