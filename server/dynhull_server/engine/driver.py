@@ -37,8 +37,9 @@ from ..state.limits import Limits
 from ..state.records import CommitStamp, Kept
 from ..state.requests import Birth, Expire, Request, WriteBatch
 from ..state.trip import Trip
-from ..storage.port import NotCommittedError, Storage
+from ..storage.port import Storage
 from .group_commit import GroupCommit
+from .recalls import UNREADABLE
 from .server_time import ServerTime
 from .supervisor import Supervisor
 from .threads import Machine, Pool
@@ -298,7 +299,7 @@ class Driver:
         self._commits.settle(lambda error, _: self._from_thread(partial(_settle, done, error)))
         try:
             await done
-        except NotCommittedError as error:
+        except UNREADABLE as error:
             raise not_stored(error) from error
 
     def commit_from_thread(self, changes: list[Any]) -> None:
