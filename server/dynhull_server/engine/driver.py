@@ -351,7 +351,7 @@ class Driver:
 
     def _committed(self, trip: Trip, commit: CommitStamp) -> None:
         self.published = commit
-        self.dispatch(events.Committed(trip))
+        self.dispatch(events.Committed(trip, commit))
 
     def _compute(self, trip: Trip) -> None:
         def ran(_: "Future[None]") -> None:

@@ -54,7 +54,7 @@ from .hull_state import HullState
 from .leg import Leg
 from .limits import Limits
 from .queues import Queue, Queues, names_of
-from .records import DEFAULT, Append, HullRow, Kept, Record
+from .records import DEFAULT, Append, CommitStamp, HullRow, Kept, Record
 from .registry import Registry
 from .requests import (
     Expire,
@@ -428,15 +428,17 @@ class Core:
 
     def _committed(self, event: Committed, effects: list[Effect]) -> None:
         trip = event.ticket
-        self._keep(trip, effects)
+        self._keep(trip, effects, event.commit)
         self._go_on(trip.queues, effects)
 
-    def _keep(self, trip: Trip, effects: list[Effect]) -> None:
+    def _keep(self, trip: Trip, effects: list[Effect], commit: CommitStamp | None = None) -> None:
         """Publish the changes of the trip, which are committed: those of all its hulls in one step."""
         moved = []
         for leg in trip.legs.values():
             before, after = leg.before, leg.after
+            changed = after is not before
             if after is not None:
+                changed |= after.counts is not after.state.counts
                 after.counts = after.state.counts
                 after.unsaved += leg.unsaved
             if after is not before:
@@ -451,7 +453,8 @@ class Core:
                 if after is not None:
                     self._registry.hulls[leg.name] = after
             hull = after or before
-            if hull is not None:
+            if hull is not None and changed:  # a trip of a fence names hulls that it leaves as they are
+                hull.committed = commit or hull.committed
                 moved.append(hull)
         if trip.fences is not None:
             self._fences.keep(trip, trip.fences, effects)
@@ -593,6 +596,8 @@ class Core:
 
     def _tick(self, event: Tick, effects: list[Effect]) -> None:
         """Update the time, and begin what hulls and fences have planned for it."""
+        if self._own is None:
+            self._fences.begin(event.time)
         self._now, self._own = event.now, event.to
         self._pass_time(event.time, effects)
         for hull in () if self._stopping else self._schedule.take(event.time):

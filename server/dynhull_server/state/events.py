@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .fences.recovery.restored import Restored
     from .hull import Hull
     from .hull_state import HullState
-    from .records import Kept
+    from .records import CommitStamp, Kept
     from .trip import Trip
 
 
@@ -42,9 +42,10 @@ class Computed:
 
 @dataclass(slots=True)
 class Committed:
-    """The storage has kept the changes of a trip."""
+    """The storage has kept the changes of a trip, by that commit if it is known."""
 
     ticket: "Trip"
+    commit: "CommitStamp | None" = None
 
 
 @dataclass(slots=True)

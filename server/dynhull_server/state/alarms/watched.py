@@ -139,7 +139,7 @@ class Watched:
         """Take note of the hull as the storage has it: what it was noted for has not been committed."""
         self._look()
         if self.hull.committed is not None:
-            self.moved = self.hull.committed.time
+            self.moved = min(self.moved, self.hull.committed.time)
 
     def holds(self, condition: Condition) -> bool:
         """Whether a condition of the rule holds for the hull as it was last looked at."""
@@ -199,10 +199,10 @@ class WatchedHulls:
     def __len__(self) -> int:
         return len(self.of)
 
-    def add(self, hull: "Hull", moved: int | None = None) -> Watched:
-        """Watch a hull that has changed at that time last; None for its last commit."""
-        if moved is None:
-            moved = self._created if hull.committed is None else hull.committed.time
+    def add(self, hull: "Hull", now: int | None = None) -> Watched:
+        """Watch a hull that has changed by its last commit, or `now` if that is earlier: commits have another clock."""
+        moved = self._created if hull.committed is None else hull.committed.time
+        moved = moved if now is None else min(moved, now)
         watched = self.of[hull.name] = Watched(self._rule, hull, moved, self.other)
         return watched
 
@@ -234,8 +234,14 @@ class WatchedHulls:
         found = WatchedHulls(self._rule, self._created)
         found.other = other
         for each in self.of.values():
-            found.add(each.hull, None if each.hull.committed is not None else each.moved)
+            found.add(each.hull, each.moved)
         return found
+
+    def begin(self, now: int) -> None:
+        """Take up the hulls at a start: what was committed by a clock that was ahead counts from now on."""
+        for watched in self.of.values():
+            watched.moved = min(watched.moved, now)
+            self.plan(watched)
 
     def restore(self, raised: Collection[str], standings: "Mapping[Subject, Delay]") -> None:
         """Take over for which hulls the alarm is raised, and what is known there."""

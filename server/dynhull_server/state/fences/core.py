@@ -176,6 +176,13 @@ class FenceCore:
 
     # Time
 
+    def begin(self, now: int) -> None:
+        """Hear what time it is at the start."""
+        for fence in self._registry.alarms.values():
+            if fence.watched is not None:
+                fence.watched.begin(now)
+                self._schedule.plan_fence(fence)
+
     def due(self, fence: Fence, time: int, to: Any) -> PassTime | None:
         """The request for the events of those who have been inside of a fence for long enough; None if nobody has."""
         due = fence.next_due

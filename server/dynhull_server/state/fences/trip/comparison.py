@@ -125,7 +125,7 @@ class Comparison:
                     self.cross(subjects, crossings, areas, swap, now, changed.get(name), origins, doubting)
                 for fence, pair, causes in line.paired(hulls):
                     self.leg(fence).paired(pair, causes, now)
-                names = {hull.name for hull in hulls}
+                names = dict.fromkeys(hull.name for hull in hulls)
                 for fence, watched in line.watching(names) if line.alarms else ():
                     if watched.touched(now):
                         own, other = (each is not None and each.name in names for each in (watched.hull, watched.other))

@@ -111,7 +111,7 @@ class Definition:
             raise LimitExceededError("max_alarm_hulls", self._ground.limits.max_alarm_hulls)
         for hull in hulls:
             _require_area(hull, rule)
-            look(leg, watching.add(hull), Cause.CREATED, request.time)
+            look(leg, watching.add(hull, request.time), Cause.CREATED, request.time)
         self._comparison.legs[number] = leg
         return fence
 
