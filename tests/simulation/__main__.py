@@ -30,6 +30,7 @@ def main() -> int:
     run.add_argument("--seed", type=int, default=1)
     run.add_argument("--layer", choices=(*LAYERS, "all"), default="all")
     run.add_argument("--lives", type=int, default=None, help="end after this number of lives")
+    run.add_argument("--alarms", action="store_true", help="only plans with alarms")
     run.add_argument("--keep", action="store_true", help="shrink what is found, and keep its plan")
     replay = commands.add_parser("replay", help="a plan that was kept")
     replay.add_argument("file", type=Path)
@@ -76,8 +77,12 @@ def _search(arguments: argparse.Namespace) -> int:
     seed, reported = arguments.seed * ROOM, 0
     while time.monotonic() - begun < arguments.seconds:
         layer = min(layers, key=lambda each: seconds[each])
+        plan = random_plan(seed, layer)
+        if arguments.alarms and "alarms" not in plan:
+            seed += 1
+            continue
         plan_begun = time.monotonic()
-        outcome = play(random_plan(seed, layer))
+        outcome = play(plan)
         seconds[layer] += time.monotonic() - plan_begun
         lives[layer] += outcome.lives
         if outcome.finding is not None:

@@ -14,9 +14,12 @@ from dynhull.arrays import Points
 from dynhull.keys import as_keys
 from dynhull_server.engine.batch_stream import BatchStream
 from dynhull_server.engine.watch_fence import Sent
+from dynhull_server.state.alarms.rule import AlarmRule
+from dynhull_server.state.alarms.status import AlarmStatus
 from dynhull_server.state.batch import Applied, Batch, KeyedBatch, Write
 from dynhull_server.state.contents.live import AnyKeyedHull
 from dynhull_server.state.errors import (
+    AlarmNotRaisedError,
     ConsumerNotFoundError,
     FenceExistsError,
     FenceNotFoundError,
@@ -43,7 +46,7 @@ from dynhull_server.state.fences.model.config import Area, CircleArea, FenceConf
 from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, Inside
 from dynhull_server.state.hull_state import Counts, HullState
-from dynhull_server.state.records import Center, HullSettings, Identity, QuarantineRules, Times, Window
+from dynhull_server.state.records import NO_TIME, Center, HullSettings, Identity, QuarantineRules, Times, Window
 
 from .cluster_plan import Operation
 from .entities import Key
@@ -120,6 +123,12 @@ class Server(Protocol):
 
     async def who_is_inside(self, name: str, rows: int) -> tuple[Fence, Inside]:
         """Who is inside of a fence."""
+
+    async def acknowledge_alarm(self, name: str, hull: str) -> AlarmStatus:
+        """Take note that an alarm is raised for a hull."""
+
+    async def mute_alarm(self, name: str, hull: str, until: int) -> AlarmStatus:
+        """Mute an alarm for a hull."""
 
     async def follow(self, client: "Client", op: Operation, after: int) -> None:
         """Read the events of a fence after a sequence."""
@@ -210,7 +219,7 @@ class Client:
                 await self.request(op)
             case "last":
                 await self.last(op["name"])
-            case "fence" | "refence" | "unfence" | "follow" | "ack" | "unack" | "inside":
+            case "fence" | "refence" | "unfence" | "follow" | "ack" | "unack" | "inside" | "take" | "mute":
                 await self.of_fence(op)
             case _:
                 await self.server.special(self, op)
@@ -400,6 +409,7 @@ class Client:
 
     def _batch(self, op: Operation, producer: str, sequence: int) -> tuple[int, Write]:
         attempt = self.model.attempt()
+        self.model.sends(attempt, self.server.time())
         batch: Any
         match TIMED.get(op["name"]):
             case None:
@@ -561,11 +571,25 @@ class Client:
                 self.model.fences.acked(fence.number, consumer, sequence)
             case "unack":
                 await server.drop_consumer(name, op["consumer"])
+            case "take":
+                self.model.asks_alarm(name, op["hull"], None)
+                self._taken(name, await server.acknowledge_alarm(name, op["hull"]))
+            case "mute":
+                until = server.time() + op["until"]
+                self.model.asks_alarm(name, op["hull"], until if op["until"] > 0 else NO_TIME)
+                self._taken(name, await server.mute_alarm(name, op["hull"], until))
             case "inside":
                 fence, inside = await server.who_is_inside(name, op["rows"])
                 self.model.fences.held(fence.number, inside.sequence, inside.members)
         if fence is not None:
             self.model.answered_fence(asked, fence.number, fence.last)
+
+    def _taken(self, name: str, status: AlarmStatus) -> None:
+        """An alarm was acknowledged or muted."""
+        known = [fence.taken for fence in self.model.fences.ever.values() if fence.row.name == name]
+        for time in (status.acknowledged, status.muted):
+            if time != NO_TIME and not any((status.hull, time) in taken for taken in known):
+                raise self.model.finds(f"{status} of {name} was answered, and is not kept")
 
     def followed(self, asked: Asked, fence: Fence, after: int, sent: Sent, *, complete: bool) -> None:
         """Events of a fence were sent; with `complete` all that there were."""
@@ -586,6 +610,10 @@ class Client:
                 reasons = [FenceNotFoundError, FenceReplacedError, LimitExceededError]
             case "unack":
                 reasons = [FenceNotFoundError, ConsumerNotFoundError]
+            case "take" | "mute":
+                reasons = [FenceNotFoundError, HullNotFoundError, AlarmNotRaisedError]
+                if isinstance(error, AlarmNotRaisedError):
+                    self.model.not_raised(asked, op["hull"])
             case _:
                 reasons = [FenceNotFoundError]
         if isinstance(error, SequenceAheadError):
@@ -670,6 +698,8 @@ def config_of(op: Operation) -> FenceConfig:
             area = _strips(width, holes=holes)
         case {"circle": x, "radius": radius}:
             area = CircleArea(float(x), float(x * x), float(radius))
+        case {"when": when, "clear": clear, "hold": hold}:
+            area = AlarmRule(when, clear, hold)
     return FenceConfig(area, **{key: value for key, value in config.items() if key != "area"})
 
 

@@ -19,6 +19,8 @@ from dynhull_server.engine.server_time import ServerTime
 from dynhull_server.engine.threads import Clock, Threads
 from dynhull_server.engine.watch_fence import Sent, following
 from dynhull_server.state.admission import TICK
+from dynhull_server.state.alarms.status import AlarmStatus
+from dynhull_server.state.alarms.watched import WatchedHulls
 from dynhull_server.state.batch import Applied, Write
 from dynhull_server.state.core import Core
 from dynhull_server.state.errors import (
@@ -52,16 +54,18 @@ from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, FenceEvent, Inside
 from dynhull_server.state.fences.model.requests import (
     Acknowledge,
+    AcknowledgeAlarm,
     CreateFence,
     DeleteConsumer,
     DeleteFence,
+    MuteAlarm,
     ReadFence,
     ReplaceFence,
     TrimEvents,
 )
 from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import NO_TIME, Center, HullSettings, QuarantineRules
+from dynhull_server.state.records import NO_TIME, Center, CommitStamp, HullSettings, QuarantineRules
 from dynhull_server.state.requests import (
     Birth,
     CreateHull,
@@ -76,10 +80,12 @@ from dynhull_server.state.schedule import LOOK_AGAIN
 from dynhull_server.state.trip import Trip
 from dynhull_server.storage.port import Storage
 
+from .alarm_model import alike
+from .alarm_model import kept as kept_of_alarm
 from .clients import Client, Outline, content, outline
 from .cluster_plan import Operation
 from .entities import loaded
-from .fence_model import PREFIX
+from .fence_model import PREFIX, FenceTruth
 from .globe import points
 from .model import SKIPS, Model, Truth
 from .quarantine_model import waiting_of
@@ -174,12 +180,16 @@ class CoreServer:
         self.core.restore_fences([each for each in fences if each is not None])
         turns: Any = NoThreads()
         self._commits = GroupCommit(
-            storage, threads or turns, Clock(), lambda: self._time.now(), lambda _: None, lambda _: None
+            storage, threads or turns, Clock(), lambda: self._commit_time.now(), lambda _: None, lambda _: None
         )
         self._events: deque[Event] = deque()
         self._stepping = False
+        self._published: CommitStamp | None = None
         self._clock = StoppedClock(schedule.random.uniform(0, 10))
-        self._time = ServerTime(self._clock, self.core.latest_time)
+        latest = self.core.latest_time
+        self._time = ServerTime(self._clock, latest)
+        self._commit_time = ServerTime(self._clock, max(latest or 0, contents.committed))
+        model.clock = lambda: self.time()
         self._news: deque[Callable[[], None]] = deque()
         self._examining: deque[Examine] = deque()
         self._computing: deque[Trip] = deque()
@@ -209,6 +219,7 @@ class CoreServer:
         match effect:
             case Reply():
                 for hull in effect.moved:
+                    hull.committed = self._published
                     self.schedule.note((hull.uid, hull.counts.revision))
                 for request in effect.requests:
                     self.schedule.note((type(request).__name__, str(request.error)))
@@ -229,14 +240,19 @@ class CoreServer:
 
     def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
         if trip is None:
-            self._storage.commit(changes)
+            self._published = self._storage.commit(changes, self._commit_time.now())
             return
 
         def done(error: Exception | None, unknown: bool) -> None:
-            event = Committed(trip) if error is None else Failed(trip, error, unknown)
-            self._news.append(partial(self.dispatch, event))
+            event = Committed(trip, self._commits.latest) if error is None else Failed(trip, error, unknown)
+            self._news.append(partial(self._hear, event, self._commits.latest))
 
         self._commits.submit(changes, done)
+
+    def _hear(self, event: Event, commit: CommitStamp | None) -> None:
+        """The core hears of a commit, which what it publishes now belongs to."""
+        self._published = commit or self._published
+        self.dispatch(event)
 
     def _compute(self) -> None:
         trip = self._computing.popleft()
@@ -288,7 +304,7 @@ class CoreServer:
         return self._time.now()
 
     async def create(self, name: str, settings: HullSettings) -> str:
-        uid: str = (await self._ask(CreateHull(Answer(), name, self.birth(), settings))).uid
+        uid: str = (await self._ask(CreateHull(Answer(), name, self.birth(), settings, self.time()))).uid
         return uid
 
     async def delete(self, name: str) -> None:
@@ -344,7 +360,11 @@ class CoreServer:
         return self.core.fence(name)
 
     async def create_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:
-        found: Fence = await self._ask(CreateFence(Answer(), name, self.time(), config, self.birth(), rows=rows))
+        birth = self.birth()
+        if config.rule is not None:
+            birth = Birth(birth.uid, self._time.now() / 1e6)
+            self._pass(0.0)  # the engine looks at the clock when it starts
+        found: Fence = await self._ask(CreateFence(Answer(), name, self.time(), config, birth, rows=rows))
         return found
 
     async def replace_fence(self, name: str, config: FenceConfig, rows: int) -> Fence:
@@ -366,6 +386,14 @@ class CoreServer:
             return fence, who_waits(fence, events)
 
         found: tuple[Fence, Inside] = await self._ask(ReadFence(Answer(), name, self.time(), read, rows=rows))
+        return found
+
+    async def acknowledge_alarm(self, name: str, hull: str) -> AlarmStatus:
+        found: AlarmStatus = await self._ask(AcknowledgeAlarm(Answer(), name, self.time(), hull))
+        return found
+
+    async def mute_alarm(self, name: str, hull: str, until: int) -> AlarmStatus:
+        found: AlarmStatus = await self._ask(MuteAlarm(Answer(), name, self.time(), hull, until))
         return found
 
     async def follow(self, client: Client, op: Operation, after: int) -> None:
@@ -433,6 +461,11 @@ class CoreServer:
                 return
 
     # Its life
+
+    def begin(self) -> None:
+        """Look at the clock, as the engine does when it starts."""
+        if self.model.fences.alarmed:
+            self._pass(0.0)
 
     def client(self, client: Client, operations: list[Operation]) -> None:
         """Add a client."""
@@ -546,8 +579,22 @@ def compare_fences(core: Core, model: Model) -> None:
         if fence.dwelling is None:
             kept = dict.fromkeys(kept)
         count, near = fence.inside, fence.pair is not None and fence.pair.near
-        if (inside, count, near) != (kept, len(kept) + truth.near, truth.near):
+        raised = sum(each.raised for each in truth.known.values())
+        if (inside, count, near) != (kept, len(kept) + truth.near + raised, truth.near):
             raise model.finds(f"inside of {name} are {inside, count, near}, kept is {kept, truth.near}")
+        if fence.watched is not None:
+            _compare_alarm(name, fence.watched, truth, model)
+
+
+def _compare_alarm(name: str, hulls: WatchedHulls, truth: FenceTruth, model: Model) -> None:
+    if hulls.of.keys() != truth.known.keys():
+        raise model.finds(f"{name} watches {list(hulls.of)}, known are {list(truth.known)}")
+    for hull, watched in hulls.of.items():
+        known = truth.known[hull]
+        if watched.raised != known.raised or not alike(watched.standing, kept_of_alarm(known)):
+            raise model.finds(f"{name} at {hull} is {watched.raised, watched.standing} in memory, kept is {known}")
+        if watched.raised != (hull in hulls.raised):
+            raise model.finds(f"{name} is raised for {list(hulls.raised)}, and {hull} is {watched.raised}")
 
 
 def _compare_entities(name: str, state: HullState, truth: Truth, model: Model) -> None:

@@ -4,9 +4,11 @@ The storage reports the revisions of a commit hull by hull. In which order they 
 not promised: there must be one order from which all events of the commit follow.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,13 +16,16 @@ from support.sides import Disk, Point, Rings, Shape, apart, shape_of_hull
 
 from dynhull.keys import as_keys, key_list
 from dynhull_server.engine.watch_fence import Sent
+from dynhull_server.state.alarms.rule import AlarmRule
 from dynhull_server.state.fences.events.block import AppendEvents
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.model.records import (
     AddFence,
+    AlarmStanding,
     Cause,
     ChangeFence,
     Consumer,
+    Delay,
     DropConsumer,
     DropEvents,
     DropFence,
@@ -30,16 +35,20 @@ from dynhull_server.state.fences.model.records import (
     Members,
     Origin,
     PutConsumer,
+    PutDelays,
 )
 from dynhull_server.state.limits import FenceLimits
 from dynhull_server.state.records import NO_TIME
 
+from .alarm_model import AlarmJudge, Known, kept, same_event
+from .alarm_model import Change as AlarmChange
+from .alarm_model import alike as known_alike
 from .entities import Entity, Key
 
 if TYPE_CHECKING:
     from .model import Model, Truth
 
-FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | DropEvents | PutConsumer | DropConsumer
+FENCE_CHANGES = AddFence | ChangeFence | DropFence | AppendEvents | DropEvents | PutConsumer | DropConsumer | PutDelays
 # Fences have names beside those of hulls.
 PREFIX = "fence:"
 # Coordinates and lengths are multiples of 1 / 64.
@@ -68,6 +77,10 @@ class FenceTruth:
         ever: the names of the hulls that it has ever depended on, other than by a prefix.
         droppable: the first event that may be kept as the oldest one.
         deleted: the number of commits when it was deleted, None before.
+        known: of an alarm, what is known of each hull that it watches.
+        latest: the latest time that its events or what is known have.
+        begun: when it was made, or the server has begun, by the server's clock.
+        taken: for which hull it was acknowledged when, or muted until when.
     """
 
     row: FenceRow
@@ -80,6 +93,10 @@ class FenceTruth:
     ever: set[str] = field(default_factory=set)
     droppable: int = 1
     deleted: int | None = None
+    known: dict[str, Known] = field(default_factory=dict)
+    latest: int = NO_TIME
+    begun: float = 0
+    taken: set[tuple[str, int]] = field(default_factory=set)
 
     @property
     def config(self) -> FenceConfig:
@@ -102,18 +119,27 @@ class FenceTruth:
 
 
 class State(NamedTuple):
-    """A fence in the middle of a commit: who is inside, and which of its new events have been explained."""
+    """A fence in the middle of a commit: who is inside, and which of its new events have been explained.
+
+    Of an alarm, what is known of each hull, and the latest time.
+    """
 
     inside: dict[Subject, int | None]
     near: bool
     explained: int
+    known: Mapping[str, Known] = MappingProxyType({})
+    latest: int = NO_TIME
 
 
 class Step(NamedTuple):
-    """Revisions that came at once, by the name of the hull: the last one before, and the last one of them."""
+    """Revisions that came at once, by the name of the hull: the last one before, and the last one of them.
+
+    Or a new hull `appears`, which is empty.
+    """
 
     to: dict[str, tuple[int, int]]
     together: bool
+    appears: str = ""
 
 
 class FenceModel:
@@ -125,6 +151,7 @@ class FenceModel:
     Attributes:
         alive: the fences there are, by name.
         ever: all fences.
+        asked: until when callers have asked to mute an alarm for a hull, by its name; None to acknowledge it.
     """
 
     def __init__(self, model: "Model") -> None:
@@ -132,19 +159,32 @@ class FenceModel:
         self.alive: dict[str, FenceTruth] = {}
         self.ever: dict[int, FenceTruth] = {}
         self._told: dict[tuple[int, int], list[tuple[FenceTruth, int]]] = {}
+        self.asked: defaultdict[str, set[tuple[str, int | None]]] = defaultdict(set)
+        self._judge = AlarmJudge(model, self._corners)
 
     def belong_to(self, model: "Model") -> None:
         """Go on beside another model of the hulls."""
         self._model = model
+        self._judge = AlarmJudge(model, self._corners)
+
+    def new_life(self) -> None:
+        """A server starts on what has been kept."""
+        for fence in self.alive.values():
+            fence.begun = self._model.clock()
+            since = [known.since or NO_TIME for known in fence.known.values()]
+            fence.latest = max([NO_TIME, *since, *(event.time for event in fence.events[-1:])])
 
     # What is kept
 
-    def landed(self, changes: Sequence[Any], before: "dict[str, tuple[Truth, int]]") -> None:
+    def landed(
+        self, changes: Sequence[Any], before: "dict[str, tuple[Truth, int]]", created: Sequence[str] = ()
+    ) -> None:
         """The storage has kept these changes of fences, and new revisions of hulls.
 
         Args:
             changes: the changes of fences.
             before: the hulls that have changed, by name, with their revisions before.
+            created: the names of the hulls that are new.
         """
         by_fence: dict[int, list[Any]] = {}
         made: dict[int, list[FenceEvent]] = {}
@@ -158,7 +198,7 @@ class FenceModel:
             by_fence.setdefault(number, []).append(change)
         for number, of_fence in by_fence.items():
             made[number] = self._numbered(number, of_fence, made.get(number, []))
-        self._revised(before, made)
+        self._revised(before, made, created, by_fence)
         for number, of_fence in by_fence.items():
             fence = self.ever[number]
             fence.events += made[number]
@@ -170,6 +210,11 @@ class FenceModel:
                 if fence.config.concerns(name):
                     for each in range(revision + 1, truth.revision + 1):
                         self._told.setdefault((truth.row.number, each), []).append((fence, fence.last))
+
+    @property
+    def alarmed(self) -> bool:
+        """Whether there are alarms."""
+        return any(fence.config.rule is not None for fence in self.alive.values())
 
     def told(self, number: int, revision: int) -> list[tuple[FenceTruth, int]]:
         """The fences that a revision concerned, and their events when it was committed."""
@@ -190,7 +235,7 @@ class FenceModel:
         if times != sorted(times):
             raise self._model.finds(f"the times of events of {fence.row.name} go back: {times}")
         if isinstance(first, AddFence):
-            self._began(fence, first, events)
+            self._began(fence, changes, events)
         elif isinstance(first, ChangeFence):
             self._replaced(fence, first.row, events)
         return events
@@ -200,7 +245,7 @@ class FenceModel:
             raise self._model.finds(f"the number {row.number} is given to another fence")
         if row.name in self.alive:
             raise self._model.finds(f"a second fence {row.name} is made beside the first")
-        self.alive[row.name] = self.ever[row.number] = fence = FenceTruth(row)
+        self.alive[row.name] = self.ever[row.number] = fence = FenceTruth(row, begun=self._model.clock())
         self._model.numbers.add(row.number)
         fence.reads(row)
 
@@ -214,8 +259,12 @@ class FenceModel:
 
     # Settings
 
-    def _began(self, fence: FenceTruth, added: AddFence, events: list[FenceEvent]) -> None:
+    def _began(self, fence: FenceTruth, changes: list[Any], events: list[FenceEvent]) -> None:
         """A new fence begins with these events."""
+        if fence.config.rule is not None:
+            self._alarm_began(fence, fence.config.rule, events, changes)
+            return
+        added = changes[0]
         config, since = fence.config, fence.row.waits.time or None
         now = self._now()
         expected = []
@@ -265,27 +314,188 @@ class FenceModel:
         for event in events:
             self.follow(config, fence.inside, event)
 
+    # Alarms
+
+    def _watches(self, config: FenceConfig, name: str) -> bool:
+        """Whether an alarm watches a hull."""
+        rule, alive = config.rule, self._model.alive
+        if rule is None or not (config.compares(name) or (config.kind == "other" and name == config.subjects)):
+            return False
+        return rule.suits(alive[name].row.settings, None if rule.other is None else alive[rule.other].row.settings)
+
+    def _watched(self, config: FenceConfig) -> list[str]:
+        return [name for name in sorted(self._model.alive) if self._watches(config, name)]
+
+    def _alarm_began(self, fence: FenceTruth, rule: AlarmRule, events: list[FenceEvent], stored: Sequence[Any]) -> None:
+        """A new alarm begins with these events."""
+        state = State({}, False, 0)
+        now = self._now()
+        changes = [self._judge.looked(rule, {}, name, Cause.CREATED, now) for name in self._watched(fence.config)]
+        after = self.after_changes(state, changes, events)
+        if isinstance(after, str) or after.explained != len(events):
+            raise self._model.finds(f"{fence.row.name} begins with {events}, and should with {changes}: {after}")
+        fence.known, fence.latest = dict(after.known), after.latest
+        self._adopt(fence, {}, _stored({fence.row.number: stored}).get(fence.row.number, {}))
+
+    def _adopt(self, fence: FenceTruth, was: Mapping[str, Known], stored: Mapping[str, Delay | None]) -> None:
+        """Take over what only the storage says of an alarm, if the rest is as it should be."""
+        known, problem = self.kept_of_alarm(fence, was, fence.known, stored)
+        if problem:
+            raise self._model.finds(problem)
+        fence.known = known
+        fence.latest = max(fence.latest, *(each.since for each in stored.values() if each is not None), NO_TIME)
+
+    def after_changes(self, state: State, changes: Iterable[AlarmChange], events: list[FenceEvent]) -> State | str:
+        """The state after some changes at hulls, if the next events are those that they make; or what is wrong."""
+        known, latest = dict(state.known), state.latest
+        expected = []
+        for change in changes:
+            if change.known is None:
+                known.pop(change.hull, None)
+            else:
+                known[change.hull] = change.known
+            if change.event is not None:
+                expected.append(change.event)
+        made = events[state.explained : state.explained + len(expected)]
+        if len(made) < len(expected):
+            return f"there are {made}, and should be {expected}"
+        for real, one in zip(sorted(made, key=lambda event: event.hull), expected, strict=True):
+            if not same_event(real, one):
+                return f"there is {real}, and should be {one}"
+            latest = max(latest, real.time)
+            if real.type is EventType.BEGIN:
+                known[real.hull] = known[real.hull]._replace(since=real.event_time)
+        return State({}, False, state.explained + len(expected), known, latest)
+
+    def alarm_after(
+        self, fence: FenceTruth, state: State, step: Step, at: dict[str, int], events: list[FenceEvent]
+    ) -> State | str:
+        """The state of an alarm after a step, if its next events follow; or what is wrong."""
+        rule = fence.config.rule
+        assert rule is not None  # the caller asks for alarms
+        now = at | {name: last for name, (_, last) in step.to.items()}
+        if late := self._too_late(fence, rule, state, step, at):
+            return late
+        if step.appears:
+            watched = self._watches(fence.config, step.appears)
+            changes = [self._judge.looked(rule, state.known, step.appears, Cause.APPEARED, now)] if watched else []
+            return self.after_changes(state, changes, events)
+        hulls = {*state.known, *(name for name in step.to if self._watches(fence.config, name))}
+        return self.after_changes(state, self._judge.after(rule, state.known, hulls, step.to, at, now), events)
+
+    def _too_late(self, fence: FenceTruth, rule: AlarmRule, state: State, step: Step, at: dict[str, int]) -> str:
+        """What time should have made before a batch of a step that came later; empty for nothing."""
+        if self._model.faulty or self._model.stopping:
+            return ""
+        for name, (_, last) in step.to.items():
+            sent = self._model.sent(self._model.alive[name].attempts[last])
+            if sent is None or sent[1].get(PREFIX + fence.row.name, (0, 0))[0] != fence.row.number:
+                continue
+            for hull, known in state.known.items():
+                due = self._judge.late(rule, known, hull, at, fence.begun)
+                if due is not None and due <= sent[0] and self._was_seen((hull, rule.other), sent[1], at):
+                    return f"{hull} should have been raised at {due}, before a batch at {sent[0]}"
+        return ""
+
+    def _was_seen(self, hulls: Iterable[str | None], seen: Mapping[str, tuple[int, int]], at: dict[str, int]) -> bool:
+        """Whether these revisions of hulls had been seen."""
+        alive = self._model.alive
+        return all(seen.get(name, (0, 0)) >= (alive[name].row.number, at[name]) for name in hulls if name is not None)
+
+    def by_time(self, fence: FenceTruth, state: State, events: list[FenceEvent], at: dict[str, int]) -> State | str:
+        """The state of an alarm after the next event, if time has made it; or why not."""
+        rule = fence.config.rule
+        assert rule is not None  # the caller asks for alarms
+        event = events[state.explained]
+        known = state.known.get(event.hull)
+        change = self._judge.by_time(rule, known, event, at, (fence.begun, state.latest))
+        if change is None:
+            return f"time does not make {event} of {known} at {state.latest}"
+        return self.after_changes(state, [change], events)
+
+    def kept_of_alarm(
+        self,
+        fence: FenceTruth,
+        was: Mapping[str, Known],
+        known: Mapping[str, Known],
+        stored: Mapping[str, Delay | None],
+    ) -> tuple[dict[str, Known], str]:
+        """What is known of an alarm after a commit, with what only the storage says; and what is wrong there."""
+        found = dict(known)
+        for hull in sorted({*was, *known, *stored}):
+            now, before = found.get(hull), was.get(hull, Known())
+            if hull in stored:
+                delay = stored[hull]
+                if now is not None:
+                    now = found[hull] = self._adopted(fence, hull, now, delay)
+                if not known_alike(delay, kept(now or Known())):
+                    return found, f"of {fence.row.name} at {hull} {delay} is kept, known is {now}"
+            elif kept(before) != kept(now or Known()):
+                return found, f"of {fence.row.name} at {hull} nothing is kept: {now} was {before}"
+        return found, ""
+
+    def _adopted(self, fence: FenceTruth, hull: str, now: Known, delay: Delay | None) -> Known:
+        """What is known, with what only the storage says: since when, who has taken note, and what is muted."""
+        standing = AlarmStanding() if delay is None or delay.standing is None else delay.standing
+        if now.since is None and delay is not None and delay.since != NO_TIME:
+            now = now._replace(since=delay.since)
+        since = now.since or 0
+        if now.raised and (hull, None) in self.asked[fence.row.name] and standing.acknowledged >= since:
+            now = now._replace(acknowledged=standing.acknowledged)
+        if (hull, standing.muted) in self.asked[fence.row.name]:
+            now = now._replace(muted=standing.muted)
+        return now
+
+    def overdue_alarms(self, time: int) -> list[tuple[str, str]]:
+        """The alarms that time should have raised by a time, each with its hull."""
+        now = self._now()
+        return [
+            (name, hull)
+            for name, fence in self.alive.items()
+            if fence.config.rule is not None
+            for hull, known in fence.known.items()
+            if (due := self._judge.late(fence.config.rule, known, hull, now, fence.begun)) is not None and due <= time
+        ]
+
     # Revisions
 
-    def _revised(self, before: "dict[str, tuple[Truth, int]]", made: dict[int, list[FenceEvent]]) -> None:
-        """Explain the events of a commit by the new revisions of hulls."""
+    def _revised(
+        self,
+        before: "dict[str, tuple[Truth, int]]",
+        made: dict[int, list[FenceEvent]],
+        created: Sequence[str],
+        by_fence: Mapping[int, Sequence[Any]],
+    ) -> None:
+        """Explain the events of a commit, and what it has stored of alarms, by the new revisions of hulls."""
+        stored = _stored(by_fence)
+        begun = {number for number, changes in by_fence.items() if changes and isinstance(changes[0], AddFence)}
         fences = [
             fence
             for fence in self.alive.values()
-            if (any(fence.config.concerns(name) for name in before) or made.get(fence.row.number))
+            if (
+                any(fence.config.concerns(name) for name in (*before, *created))
+                or made.get(fence.row.number)
+                or fence.row.number in stored
+            )
             and not _of_settings(made.get(fence.row.number))
+            and fence.row.number not in begun
         ]
         if not fences:
             return
         names = {name for name in before if any(fence.config.concerns(name) for fence in fences)}
         lanes = {name: before[name] for name in names}
-        search = _Search(self, fences, lanes, made)
+        search = _Search(self, fences, lanes, (made, stored), created)
         found = search.run()
         if found is None:
             raise self._model.finds(f"no order of {sorted(names)} explains the events: {search.problem}")
         for fence in fences:
             state = found[fence.row.number]
             fence.inside, fence.near = state.inside, state.near
+            if fence.config.rule is not None:
+                was, fence.known, fence.latest = fence.known, dict(state.known), state.latest
+                self._adopt(fence, was, stored.get(fence.row.number, {}))
+                for hull, known in fence.known.items():
+                    fence.taken |= {(hull, known.acknowledged), (hull, known.muted)}
 
     def expected(self, fence: FenceTruth, state: State, step: Step, at: dict[str, int]) -> "Iterator[FenceEvent]":
         """The events of a fence that a step makes. `at` are the revisions before it."""
@@ -478,9 +688,9 @@ class FenceModel:
             if {hull: keys for hull, (keys, _) in found.items()} != {hull: keys for hull, (keys, _) in kept.items()}:
                 raise self._model.finds(f"inside of {fence.row.name} are {kept}, answered was {found}")
 
-    def overdue(self, time: int) -> list[tuple[str, Subject]]:
-        """Who should have made its dwell event at a time by the server's clock."""
-        return [
+    def overdue(self, time: int) -> list[tuple[str, Subject | str]]:
+        """Who should have made its dwell event at a time by the server's clock, or which alarms should be raised."""
+        return self.overdue_alarms(time) + [
             (name, subject)
             for name, fence in self.alive.items()
             if fence.config.dwell
@@ -490,8 +700,13 @@ class FenceModel:
 
     def full(self, name: str, limit: str, limits: FenceLimits) -> bool:
         """Whether a limit leaves no room for one more fence, or for one more consumer of this one."""
+        alarms = [fence.config for fence in self.alive.values() if fence.config.rule is not None]
         if limit == "max_fences":
-            return len(self.alive) >= limits.max_fences
+            return len(self.alive) - len(alarms) >= limits.max_fences
+        if limit == "max_alarms":
+            return len(alarms) >= limits.max_alarms
+        if limit == "max_alarm_hulls":
+            return sum(len(self._watched(config)) for config in alarms) + len(alarms) > limits.max_alarm_hulls
         return name in self.alive and len(self.alive[name].consumers) >= limits.max_fence_consumers
 
     def needed(self, name: str) -> bool:
@@ -545,6 +760,8 @@ class FenceModel:
 
     def _members(self, fence: FenceTruth) -> Iterator[Members]:
         now = self._now()
+        for name in sorted(hull for hull, known in fence.known.items() if known.raised):
+            yield Members(name, np.empty(0, np.uint64), now[name])
         if fence.near:
             yield Members(fence.config.subjects, np.empty(0, np.uint64), now[fence.config.subjects])
         for name in sorted({hull for hull, _ in fence.inside}):
@@ -607,19 +824,28 @@ class _Search:
         model: FenceModel,
         fences: list[FenceTruth],
         lanes: "dict[str, tuple[Truth, int]]",
-        made: dict[int, list[FenceEvent]],
+        changes: tuple[dict[int, list[FenceEvent]], Mapping[int, Mapping[str, Delay | None]]],
+        created: Sequence[str],
     ) -> None:
         self._model = model
         self._fences = fences
+        self._created = [
+            name
+            for name in created
+            if any(model._watches(fence.config, name) for fence in fences if fence.config.rule is not None)
+        ]
         self._lanes = {name: lane for name, lane in lanes.items() if not lane[0].deleted}
         self._deleted = {name: lane for name, lane in lanes.items() if lane[0].deleted}
-        self._made = made
+        self._made, self._stored = changes
         self._explained = -1
         self.problem = ""
 
     def run(self) -> dict[int, State] | None:
         at = self._model._now() | {name: revision for name, (_, revision) in self._lanes.items()}
-        states = {fence.row.number: State(dict(fence.inside), fence.near, 0) for fence in self._fences}
+        states = {
+            fence.row.number: State(dict(fence.inside), fence.near, 0, fence.known, fence.latest)
+            for fence in self._fences
+        }
         gone = self._hulls_gone(states, at)
         return None if gone is None else self._from(self._wait(gone, at), at)
 
@@ -628,6 +854,14 @@ class _Search:
         for name, (truth, revision) in self._deleted.items():
             for fence in self._fences:
                 state = states[fence.row.number]
+                if fence.config.rule is not None:
+                    change = self._model._judge.gone(state.known.get(name), name, revision)
+                    left = self._model.after_changes(state, [change], self._events(fence))
+                    if isinstance(left, str):
+                        self._note(states, f"{fence.row.name}: {left}")
+                        return None
+                    states = states | {fence.row.number: left}
+                    continue
                 keys = sorted(key for hull, key in state.inside if hull == name)
                 expected = [
                     Expected(fence.config, at | {name: revision}, name, key, truth.held[revision][key], None).event(
@@ -642,14 +876,23 @@ class _Search:
         return states
 
     def _from(self, states: dict[int, State], at: dict[str, int]) -> dict[int, State] | None:
-        if all(at[name] == truth.revision for name, (truth, _) in self._lanes.items()):
+        done = all(at[name] == truth.revision for name, (truth, _) in self._lanes.items())
+        if done and not self._unseen(states):
             for fence in self._fences:
                 left = self._events(fence)[states[fence.row.number].explained :]
                 if left:
                     self._note(states, f"nothing explains {left[0]} of {fence.row.name}")
                     return None
+                number = fence.row.number
+                if fence.config.rule is not None and (
+                    wrong := self._model.kept_of_alarm(
+                        fence, fence.known, states[number].known, self._stored.get(number, {})
+                    )[1]
+                ):
+                    self._note(states, wrong)
+                    return None
             return states
-        for step in self._steps(at):
+        for step in self._steps(at, states):
             after = self._take(states, step, at)
             if after is not None:
                 found = self._from(after, at | {name: last for name, (_, last) in step.to.items()})
@@ -657,9 +900,23 @@ class _Search:
                     return found
         return None
 
-    def _steps(self, at: dict[str, int]) -> list[Step]:
+    def _unseen(self, states: dict[int, State]) -> list[str]:
+        """The new hulls that alarms have not seen."""
+        alarms = [fence for fence in self._fences if fence.config.rule is not None]
+        return [
+            name
+            for name in self._created
+            if any(
+                name not in states[fence.row.number].known and self._model._watches(fence.config, name)
+                for fence in alarms
+            )
+        ]
+
+    def _steps(self, at: dict[str, int], states: dict[int, State]) -> list[Step]:
         """What may have come next, the most probable first."""
-        steps: list[tuple[int, Step]] = []
+        steps: list[tuple[int, Step]] = [
+            (0, Step({}, together=False, appears=name)) for name in self._unseen(states) if at[name] == 0
+        ]
         for name, (truth, _) in self._lanes.items():
             revision = at[name] + 1
             if revision > truth.revision:
@@ -701,8 +958,14 @@ class _Search:
         now = at | {name: last for name, (_, last) in step.to.items()}
         after = dict(states)
         for fence in self._fences:
-            if any(fence.config.concerns(name) for name in step.to):
-                number = fence.row.number
+            number = fence.row.number
+            if fence.config.rule is not None:
+                alarmed = self._model.alarm_after(fence, states[number], step, at, self._events(fence))
+                if isinstance(alarmed, str):
+                    self._note(states, f"{fence.row.name}: {alarmed}")
+                    return None
+                after[number] = alarmed
+            elif any(fence.config.concerns(name) for name in step.to):
                 expected = list(self._model.expected(fence, states[number], step, at))
                 state = self._explain(fence, states[number], expected, together=step.together)
                 if state is None:
@@ -733,9 +996,16 @@ class _Search:
     def _wait(self, states: dict[int, State], at: dict[str, int]) -> dict[int, State]:
         """The states after the dwell events that come at these revisions."""
         for fence in self._fences:
+            state, events = states[fence.row.number], self._events(fence)
+            while fence.config.rule is not None and state.explained < len(events):
+                raised = self._model.by_time(fence, state, events, at)
+                if isinstance(raised, str):
+                    self._note({0: state}, f"{fence.row.name}: {raised}")
+                    break
+                state = raised
+            states = states | {fence.row.number: state}
             if not fence.config.dwell:
                 continue
-            state, events = states[fence.row.number], self._events(fence)
             while state.explained < len(events):
                 event = events[state.explained]
                 if event.type is not EventType.DWELL or not self._model.dwells(fence, state, event, at):
@@ -755,9 +1025,24 @@ class _Search:
             self._explained, self.problem = explained, problem
 
 
+def _stored(by_fence: Mapping[int, Sequence[Any]]) -> dict[int, dict[str, Delay | None]]:
+    """What changes store of alarms at hulls."""
+    return {
+        number: {
+            hull: delay
+            for change in changes
+            if isinstance(change, PutDelays)
+            for (hull, _), delay in change.delays.items()
+        }
+        for number, changes in by_fence.items()
+        if any(isinstance(change, PutDelays) for change in changes)
+    }
+
+
 def _of_settings(events: list[FenceEvent] | None) -> bool:
     """Whether events follow from the settings of a fence, not from revisions."""
-    return bool(events) and events[0].causes & (Cause.CREATED | Cause.CHANGED) != 0
+    settings = Cause.CREATED | Cause.CHANGED
+    return bool(events) and events[0].causes & settings != 0 and not events[0].causes & Cause.TIME
 
 
 def same(real: FenceEvent, expected: FenceEvent, *, together: bool = False) -> bool:

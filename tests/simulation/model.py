@@ -17,8 +17,9 @@ its x, and all points of a parabola are vertices: so an answer names the batches
 """
 
 from collections import Counter, defaultdict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from support.sides import Rings, hull
 
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import RestoredError
-from dynhull_server.state.fences.model.records import Cause
+from dynhull_server.state.fences.model.records import Cause, EventType
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import (
@@ -58,6 +59,8 @@ FIRST_TAG = 1_000
 SKIPS = "-skips"
 
 DELETED = 2**62
+# Limits that are about fences and alarms.
+OF_FENCES = "max_fences", "max_fence_consumers", "max_alarms", "max_alarm_hulls"
 
 
 class Finding(BaseException):
@@ -77,6 +80,8 @@ class Truth:
     `bonds` are the revisions that nobody has seen and that came together with batches of other hulls.
     `restored` is whether a backup has brought it back.
     `past` is what must be read of earlier revisions.
+    `expiries` are the revisions in which points only left. `moved` is between which times of the server's clock each
+    revision was made, and the time of its commit.
     """
 
     row: HullRow
@@ -96,6 +101,8 @@ class Truth:
     since: int = 0
     entities: Entities = field(init=False)
     past: PastTruth = field(init=False)
+    expiries: set[int] = field(default_factory=set)
+    moved: list[tuple[float, float, int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.past = past_of(self.row)
@@ -161,12 +168,14 @@ class Model:
         stopping: whether the server has begun to stop.
         repeats: whether numbered batches that have no answer are sent again, before their callers.
         days: whether producers may have been forgotten.
+        immediate: whether commits take no time.
         forgets: whether the past of all hulls together is limited, so that of each any part may go.
         fences: the fences.
         numbers: the numbers of all hulls and fences.
         commits: how many there have been.
         latest: the time of the last one.
         wall: what the clock on the wall has when a life begins.
+        clock: the server's clock, once it has begun.
         uids_ever: the uids that there were before a restore.
         finding: the first promise that was broken.
     """
@@ -174,12 +183,13 @@ class Model:
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self.alive: dict[str, Truth] = {}
+        self.clock: Callable[[], float] = lambda: inf
         self.fences = FenceModel(self)
         self.numbers: set[int] = set()
         self.uids_ever: set[str] = set()
-        self.commits = self.latest = 0
+        self.commits = self.latest = self._now = 0
         self.wall = 1e9
-        self.faulty = self.stopping = self.days = self.repeats = self.forgets = False
+        self.faulty = self.stopping = self.days = self.repeats = self.forgets = self.immediate = False
         self.finding: str | None = None
         self._hulls: dict[int, Truth] = {}
         self._uids: dict[str, Truth] = {}
@@ -189,6 +199,7 @@ class Model:
         self._effects: dict[int, tuple[Effect, int, Verdict | None]] = {}
         self._floor: dict[str, tuple[int, int]] = {}
         self._attempts = self._uids_given = 0
+        self._sent: dict[int, tuple[int, dict[str, tuple[int, int]]]] = {}
         self._centers_asked: dict[str, set[Center | None]] = defaultdict(set)
         self._rules_asked: dict[str, set[QuarantineRules]] = defaultdict(set)
         self._open: Counter[tuple[str, str]] = Counter()
@@ -197,7 +208,7 @@ class Model:
 
     def full(self, name: str, limit: str) -> bool:
         """Whether a limit leaves no room for one more hull or fence, or for one more point or consumer of this one."""
-        if limit in ("max_fences", "max_fence_consumers"):
+        if limit in OF_FENCES:
             return self.fences.full(name.removeprefix(PREFIX), limit, self._limits.fences)
         if limit == "max_hulls":
             return len(self.alive) >= self._limits.max_hulls
@@ -212,8 +223,15 @@ class Model:
         return Finding(what)
 
     def new_life(self) -> None:
-        """A server starts on what has been kept: the outcome of every pending commit is decided."""
+        """A server starts on what has been kept: the outcome of every pending commit is decided.
+
+        Hulls have changed by their last commit, or at the start, if the clock was set back.
+        """
+        for truth in self.alive.values():
+            first, last, commit = truth.moved[-1]
+            truth.moved[-1] = min(first, self.clock()), min(max(last, commit), self.clock()), commit
         self.faulty = self.stopping = False
+        self.fences.new_life()
         self._open.clear()
         for truth in self._hulls.values():
             self._see(truth.row.name, (truth.row.number, DELETED if truth.deleted else truth.revision))
@@ -233,10 +251,13 @@ class Model:
         appended: list[int | None] = []
         of_fences: list[Any] = []
         before: dict[str, tuple[Truth, int]] = {}
+        created: list[str] = []
+        self._now = now
         for change in changes:
             match change:
                 case Create():
                     self._create(change.row)
+                    created.append(change.row.name)
                 case Append():
                     truth = self._hulls[change.number]
                     before[truth.row.name] = truth, truth.revision
@@ -260,7 +281,7 @@ class Model:
                 truth, revision = self._places[attempt]
                 truth.bonds.append((revision, together))
         if of_fences or self.fences.alive:
-            self.fences.landed(of_fences, before)
+            self.fences.landed(of_fences, before, created)
 
     def _create(self, row: HullRow) -> None:
         if row.number in self.numbers:
@@ -270,6 +291,7 @@ class Model:
         self.numbers.add(row.number)
         self.alive[row.name] = self._hulls[row.number] = self._uids[row.uid] = Truth(row)
         self.alive[row.name].since = self.commits
+        self.alive[row.name].moved = [(-inf, self.clock(), self._now)]
         self.alive[row.name].past.whole &= not self.forgets
 
     def _keep_past(self, truth: Truth, change: SetHistory) -> None:
@@ -284,6 +306,10 @@ class Model:
     def _append(self, truth: Truth, record: Record) -> int | None:
         """Take a revision into the truth, and into its past."""
         attempt = self._revised(truth, record)
+        if isinstance(record.rows, Expiry):
+            truth.expiries.add(record.revision)
+        first = truth.moved[-1][0] if attempt is None or self.immediate else self._sent[attempt][0]
+        truth.moved.append((first, self.clock(), self._now))
         truth.past.add(record, self.latest, dict(truth.entities.quarantine.waiting))
         return attempt
 
@@ -409,6 +435,14 @@ class Model:
         """The x of a new batch."""
         self._attempts += 1
         return self._attempts
+
+    def sends(self, attempt: int, time: int) -> None:
+        """A batch is about to be sent, at a time by the server's clock."""
+        self._sent[attempt] = time, dict(self._floor) if self.fences.alarmed else {}
+
+    def sent(self, attempt: int | None) -> tuple[int, dict[str, tuple[int, int]]] | None:
+        """When a batch was sent, and what had been seen then, by name; None for what is no batch."""
+        return None if attempt is None else self._sent[attempt]
 
     def bind(self, attempts: list[int]) -> None:
         """These batches are applied together or not at all."""
@@ -558,6 +592,19 @@ class Model:
         """An answer about a fence comes from after the event `last`."""
         self._answered(asked, (number, last))
 
+    def asks_alarm(self, name: str, hull: str, until: int | None) -> None:
+        """Somebody is about to mute an alarm for a hull until a time, or with None to acknowledge it."""
+        self.fences.asked[name].add((hull, until))
+
+    def not_raised(self, asked: Asked, hull: str) -> None:
+        """An alarm is said not to be raised for a hull: there must have been a time when it was not."""
+        fence = self.fences.alive.get(asked.name.removeprefix(PREFIX))
+        if fence is None or asked.floor[0] != fence.row.number or hull not in fence.known:
+            return
+        raises = [each.sequence for each in fence.events if each.hull == hull and each.type is EventType.BEGIN]
+        if fence.known[hull].raised and raises and raises[-1] <= asked.floor[1]:
+            raise self.finds(f"{asked.name} is raised for {hull}, and is said not to be")
+
     def removed_fence(self, asked: Asked) -> None:
         """A fence has been deleted."""
         name = asked.name.removeprefix(PREFIX)
@@ -583,7 +630,9 @@ class Model:
 
     def unsure(self, name: str, asked: Asked) -> None:
         """A request about a fence did not find a hull: there must have been a time without it."""
-        truth = self.alive.get(name)
+        truth, fence = self.alive.get(name), self.fences.alive.get(asked.name.removeprefix(PREFIX))
+        if fence is not None and fence.config.rule is not None and name not in fence.known:
+            return  # what alarms do not watch is not there for them
         if truth is not None and truth.since <= asked.commits and not self._open[name, "delete"]:
             raise self.finds(f"{name} is there, and was not found for {asked.name}")
 

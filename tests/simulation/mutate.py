@@ -62,6 +62,8 @@ def hunt(patch: Path, lives: int = MOST_LIVES) -> Hunt:
         # coverage would look for the lines of the copy when it is gone.
         environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")}
         command = ["--package", folder, "run", "--layer", layer[1], "--lives", str(lives), "--seconds", "600"]
+        if patch.stem.startswith("alarm_"):
+            command.append("--alarms")
         run = subprocess.run(
             [sys.executable, "-m", "simulation", *command, "--seed", str(SEED)],
             cwd=HERE.parent,

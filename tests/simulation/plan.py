@@ -14,6 +14,7 @@ An operation names what to do and to which hull; with `leave` its caller disconn
 import random
 from typing import Any
 
+from .alarm_plan import WITH_ALARMS, add_alarms
 from .cluster_plan import Plan, random_cluster_plan
 from .link_plan import random_link_plan
 from .operations import (
@@ -211,6 +212,9 @@ def random_plan(seed: int, layer: str) -> Plan:
     keeping = may_keep((*names, *timed))
     if keeping and past.random() < WITH_PAST.get(layer, 0.0) and not immediate:
         add_past(past, plan, keeping)
+    alarms = random.Random(f"alarms {seed}")
+    if alarms.random() < WITH_ALARMS:
+        add_alarms(alarms, plan, (*names, *timed))
     return plan
 
 

@@ -67,6 +67,7 @@ def _play(plan: Plan) -> Outcome:
 def _play_lives(plan: Plan) -> Outcome:
     limits = Limits(**plan["limits"], fences=FenceLimits(**plan.get("fences", {})))
     model, schedule = Model(limits), Schedule(plan["seed"])
+    model.immediate = plan["storage"] == "immediate"
     model.forgets = plan.get("history_bytes", 0) > 0
     storage = _storage(plan, model)
     lives = 0
@@ -126,6 +127,7 @@ def _live(
     model.wall += life.get("clock", 0)
     server.check()
     storage.calm = False
+    server.begin()
     clients = [Client(number, server, model) for number in range(len(life["clients"]))]
     for client, operations in zip(clients, life["clients"], strict=True):
         server.client(client, operations)

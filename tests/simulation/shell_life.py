@@ -2,8 +2,8 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Coroutine, Sequence
-from contextlib import aclosing
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from contextlib import aclosing, contextmanager
 from typing import Any
 
 from dynhull.arrays import Points
@@ -15,8 +15,10 @@ from dynhull_server.engine.watch import watch
 from dynhull_server.engine.watch_fence import watch_fence
 from dynhull_server.rpc.writing import gap_explained, require_present
 from dynhull_server.state.admission import TICK
+from dynhull_server.state.alarms.rule import marked, unmarked
+from dynhull_server.state.alarms.status import AlarmStatus
 from dynhull_server.state.batch import Applied, Write
-from dynhull_server.state.errors import HullNotFoundError, PartRefusedError
+from dynhull_server.state.errors import AlarmNotFoundError, FenceNotFoundError, HullNotFoundError, PartRefusedError
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.fences.model.records import Consumer, Inside
@@ -72,6 +74,15 @@ class WatchedSupervisor(Supervisor):
         return [name for name, health in self.works.items() if health.failing_since is not None]
 
 
+@contextmanager
+def calling_them_fences() -> Iterator[None]:
+    """Have refusals speak of fences, as the model does."""
+    try:
+        yield
+    except AlarmNotFoundError as error:
+        raise FenceNotFoundError(marked(error.name)) from None
+
+
 class ShellServer:
     """Drives an Engine."""
 
@@ -92,6 +103,7 @@ class ShellServer:
         self._news: dict[BatchStream, asyncio.Event] = {}
         self._closed = False
         self._drive(self._start(), "the start")
+        model.clock = lambda: self.time()
 
     async def _start(self) -> None:
         await self._engine.start(lambda *_: None)
@@ -197,6 +209,14 @@ class ShellServer:
         live = self._engine.fences.get(name)
         return live.fence, await live.waiting()
 
+    async def acknowledge_alarm(self, name: str, hull: str) -> AlarmStatus:
+        with calling_them_fences():
+            return await self._engine.alarms.acknowledge(unmarked(name), hull)
+
+    async def mute_alarm(self, name: str, hull: str, until: int) -> AlarmStatus:
+        with calling_them_fences():
+            return await self._engine.alarms.mute(unmarked(name), hull, until)
+
     async def follow(self, client: Client, op: Operation, after: int) -> None:
         """Watch a fence for a few responses."""
         live = self._engine.fences.get(op["name"])
@@ -249,6 +269,9 @@ class ShellServer:
                 client.saw(asked, hull.uid, event.counts.revision, (*held, event.counts.center))
 
     # Its life
+
+    def begin(self) -> None:
+        """Do nothing: the engine has looked at the clock."""
 
     def client(self, client: Client, operations: list[Operation]) -> None:
         """Add a client."""
