@@ -219,7 +219,8 @@ class CoreServer:
         match effect:
             case Reply():
                 for hull in effect.moved:
-                    hull.committed = self._published
+                    if self._published is not None:
+                        hull.committed = max(hull.committed or self._published, self._published)
                     self.schedule.note((hull.uid, hull.counts.revision))
                 for request in effect.requests:
                     self.schedule.note((type(request).__name__, str(request.error)))

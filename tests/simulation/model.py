@@ -44,6 +44,7 @@ from dynhull_server.state.records import (
 )
 from dynhull_server.storage.rows.group import EraseKeys, SetHistory
 
+from .alarm_model import is_alarm
 from .entities import Effect, Entities, Entity, Key
 from .fence_model import FENCE_CHANGES, PREFIX, UNIT, FenceModel
 from .globe import FAR, GLOBE, mean, points
@@ -631,8 +632,9 @@ class Model:
     def unsure(self, name: str, asked: Asked) -> None:
         """A request about a fence did not find a hull: there must have been a time without it."""
         truth, fence = self.alive.get(name), self.fences.alive.get(asked.name.removeprefix(PREFIX))
-        if fence is not None and fence.config.rule is not None and name not in fence.known:
-            return  # what alarms do not watch is not there for them
+        known = fence is not None and fence.row.number == asked.floor[0] and name in fence.known
+        if is_alarm(asked.name.removeprefix(PREFIX)) and not asked.makes and not known:
+            return  # what an alarm does not watch is not there for it
         if truth is not None and truth.since <= asked.commits and not self._open[name, "delete"]:
             raise self.finds(f"{name} is there, and was not found for {asked.name}")
 

@@ -273,7 +273,8 @@ class Hulls:
         published = self._driver.published
         self._newest = published.number
         for hull in hulls:
-            hull.committed = published
+            if hull.committed is None or hull.committed < published:  # one that has just been examined is later
+                hull.committed = published
             if hull.divided and self._divisions is not None:
                 if hull.ended:
                     self._divisions.end(hull)

@@ -537,7 +537,8 @@ class Core:
             return
         found = list(zip(trip.legs.values(), event.states, strict=True))
         if trip.unknown and trip.landed(event.states, event.fences):
-            self._keep(trip, effects)
+            commits = [state.committed for state in event.states if state is not None and state.committed is not None]
+            self._keep(trip, effects, max(commits, default=None))
         elif any(leg.before is not None and state is None for leg, state in found):
             self._not_examined(NotExamined(trip, LookupError("the hull is not in the storage")), effects)
         else:
