@@ -573,23 +573,16 @@ class Client:
                 await server.drop_consumer(name, op["consumer"])
             case "take":
                 self.model.asks_alarm(name, op["hull"], None)
-                self._taken(name, await server.acknowledge_alarm(name, op["hull"]))
+                self.model.fences.taken(name, await server.acknowledge_alarm(name, op["hull"]))
             case "mute":
                 until = server.time() + op["until"]
                 self.model.asks_alarm(name, op["hull"], until if op["until"] > 0 else NO_TIME)
-                self._taken(name, await server.mute_alarm(name, op["hull"], until))
+                self.model.fences.taken(name, await server.mute_alarm(name, op["hull"], until))
             case "inside":
                 fence, inside = await server.who_is_inside(name, op["rows"])
                 self.model.fences.held(fence.number, inside.sequence, inside.members)
         if fence is not None:
             self.model.answered_fence(asked, fence.number, fence.last)
-
-    def _taken(self, name: str, status: AlarmStatus) -> None:
-        """An alarm was acknowledged or muted."""
-        known = [fence.taken for fence in self.model.fences.ever.values() if fence.row.name == name]
-        for time in (status.acknowledged, status.muted):
-            if time != NO_TIME and not any((status.hull, time) in taken for taken in known):
-                raise self.model.finds(f"{status} of {name} was answered, and is not kept")
 
     def followed(self, asked: Asked, fence: Fence, after: int, sent: Sent, *, complete: bool) -> None:
         """Events of a fence were sent; with `complete` all that there were."""

@@ -17,6 +17,7 @@ from support.sides import Disk, Point, Rings, Shape, apart, shape_of_hull
 from dynhull.keys import as_keys, key_list
 from dynhull_server.engine.watch_fence import Sent
 from dynhull_server.state.alarms.rule import AlarmRule
+from dynhull_server.state.alarms.status import AlarmStatus
 from dynhull_server.state.fences.events.block import AppendEvents
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
 from dynhull_server.state.fences.model.records import (
@@ -80,7 +81,6 @@ class FenceTruth:
         known: of an alarm, what is known of each hull that it watches.
         latest: the latest time that its events or what is known have.
         begun: when it was made, or the server has begun, by the server's clock.
-        taken: for which hull it was acknowledged when, or muted until when.
     """
 
     row: FenceRow
@@ -96,7 +96,6 @@ class FenceTruth:
     known: dict[str, Known] = field(default_factory=dict)
     latest: int = NO_TIME
     begun: float = 0
-    taken: set[tuple[str, int]] = field(default_factory=set)
 
     @property
     def config(self) -> FenceConfig:
@@ -446,6 +445,18 @@ class FenceModel:
             now = now._replace(muted=standing.muted)
         return now
 
+    def taken(self, name: str, status: AlarmStatus) -> None:
+        """An alarm was acknowledged or muted for a hull: that is kept until it is cleared, or somebody else does."""
+        fence = self.alive.get(name)
+        known = None if fence is None else fence.known.get(status.hull)
+        if known is None:
+            return
+        same = known.raised and status.raised and known.since == status.since
+        forgotten = same and status.acknowledged != NO_TIME == known.acknowledged
+        muted = status.muted != NO_TIME == known.muted and (status.hull, NO_TIME) not in self.asked[name]
+        if forgotten or (same and muted):
+            raise self._model.finds(f"{status} of {name} was answered, kept is {known}")
+
     def overdue_alarms(self, time: int) -> list[tuple[str, str]]:
         """The alarms that time should have raised by a time, each with its hull."""
         now = self._now()
@@ -494,8 +505,6 @@ class FenceModel:
             if fence.config.rule is not None:
                 was, fence.known, fence.latest = fence.known, dict(state.known), state.latest
                 self._adopt(fence, was, stored.get(fence.row.number, {}))
-                for hull, known in fence.known.items():
-                    fence.taken |= {(hull, known.acknowledged), (hull, known.muted)}
 
     def expected(self, fence: FenceTruth, state: State, step: Step, at: dict[str, int]) -> "Iterator[FenceEvent]":
         """The events of a fence that a step makes. `at` are the revisions before it."""

@@ -87,7 +87,7 @@ def _begin_anew(model: "Model", before: FenceTruth, kept: KeptFence) -> None:
     begun = FenceTruth(row, [*before.events, kept.events[0]._replace(sequence=lost), *kept.events], lost + 1, consumers)
     begun.acknowledged, begun.inside, begun.near = before.acknowledged, before.inside, before.near
     begun.droppable = begun.first
-    begun.known, begun.latest, begun.taken = before.known, before.latest, before.taken
+    begun.known, begun.latest = before.known, before.latest
     begun.reads(row)
     before.deleted = model.commits
     model.numbers.add(row.number)

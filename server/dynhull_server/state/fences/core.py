@@ -128,9 +128,10 @@ class FenceCore:
         if part.creates:
             self._queues.end_creation(trip, part)
             self._registry.give_back(0, part.creates)
-        for leg in part.legs.values():
-            if self._registry.fences.get(leg.fence.name) is leg.fence:
-                self._schedule.plan_fence(leg.fence)
+        looked_at = [request.fence for request in trip.requests if isinstance(request, PassTime)]  # perhaps too early
+        for fence in (*(leg.fence for leg in part.legs.values()), *looked_at):
+            if self._registry.fences.get(fence.name) is fence:
+                self._schedule.plan_fence(fence)
 
     # Commits
 
