@@ -282,15 +282,23 @@ class Driver:
     ) -> None:
         """Commit steps one after another, each made by `run` after the commit of the one before.
 
-        Batches have priority: a pause follows each step, so many times as long as that took.
+        Batches have priority: a pause follows each step, so many times as long as that took. While the outcome of an
+        earlier commit is not known, steps cannot be made: so that is decided first, or NotStoredError raised.
         """
         clock = self.machine.clock
+        if self._commits.undecided:
+            await self.settled()
         while True:
             begun = clock.monotonic()
             step = await run(partial(next, steps, None))
             if step is None:
                 return
-            await self.commit([step])
+            try:
+                await self.commit([step])
+            except Exception:
+                # Now, not when its memory is freed: it takes note of what it has begun in vain.
+                steps.close()  # type: ignore[attr-defined]  # all are generators
+                raise
             await clock.sleep(pause * (clock.monotonic() - begun))
 
     async def settled(self) -> None:

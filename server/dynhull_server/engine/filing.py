@@ -1,6 +1,7 @@
 """What the journal drops becomes segments; and what is erased from them."""
 
 import asyncio
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..state.errors import (
     OutcomeUnknownError,
     words_for_callers,
 )
+from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.records import Kept, Keys
 from ..storage.past import Erasure
@@ -39,6 +41,9 @@ class Filing:
         driver: has the threads, and commits.
         storage: keeps them.
         pasts: reads them.
+
+    Attributes:
+        unsure: hulls of which it is not known whether their settings have been changed as was asked.
     """
 
     SECONDS = 1.0
@@ -49,12 +54,24 @@ class Filing:
         self._pasts = pasts
         self._turn = asyncio.Lock()
         self._erasing: set[asyncio.Task[Erasure | None]] = set()
+        self.unsure: set[Hull] = set()
 
     async def round(self) -> None:
         """Make segments of what the journal need not have any longer, and remove those that are not to be kept."""
         async with self._turn:
             steps = self._storage.file_history(self._driver.time())
             await self._driver.commit_steps(steps, self._driver.in_history, PAUSE)
+        for hull in list(self.unsure):
+            with suppress(KeyError):
+                await self.take_settings(hull)
+            self.unsure.discard(hull)
+
+    async def take_settings(self, hull: Hull) -> None:
+        """Take the settings of a hull from the storage, or raise KeyError: it was deleted meanwhile."""
+        row = await self._driver.on_disk(partial(self._storage.row, hull.row.number))
+        if row is None:
+            raise KeyError(hull.name)
+        hull.row = row
 
     async def erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
         """Erase keys from the past of a hull, even if the caller goes away. None if it has none of them.
@@ -95,6 +112,8 @@ class Filing:
                 after = await self._erasures(hull)
         except KeyError:
             raise HullNotFoundError(hull.name) from None
+        except NotStoredError:
+            raise
         except NotCommittedError as error:
             raise not_stored(error) from error
         except (*UNREADABLE, OSError) as error:

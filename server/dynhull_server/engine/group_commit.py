@@ -75,6 +75,7 @@ class GroupCommit:
     Attributes:
         since: the time by the clock when the commit in progress began; None while there is none.
         latest: the last commit that has taken place, set before `done` is called for it; None before the first.
+        undecided: whether the outcome of the last commit is unknown.
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class GroupCommit:
         self._report = report
         self._clock = clock
         self._time = time
-        self._undecided = False
+        self.undecided = False
         self.since: float | None = None
         self.latest: CommitStamp | None = None
         self._inbox: Inbox[_Waiting] = threads.inbox()
@@ -140,7 +141,7 @@ class GroupCommit:
 
     def _decided(self, group: list[_Waiting]) -> bool:
         """Whether the outcomes of all earlier commits are known; if not, the group has been refused."""
-        if not self._undecided:
+        if not self.undecided:
             return True
         try:
             self._storage.settle()
@@ -155,7 +156,7 @@ class GroupCommit:
                 each.done(refusal, False)
             self._report(error)
             return False
-        self._undecided = False
+        self.undecided = False
         return True
 
     def _commit(self, group: list[_Waiting]) -> None:
@@ -172,7 +173,7 @@ class GroupCommit:
         except TakenOverError as error:
             self._end(group, error)
         except Exception as error:  # after any error, such as a MemoryError, the changes may be stored
-            self._undecided = True
+            self.undecided = True
             for each in group:
                 each.done(error, True)
             self._report(error)

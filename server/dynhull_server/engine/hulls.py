@@ -184,18 +184,17 @@ class Hulls:
         return self._live_hull(hull)
 
     async def _set_history(self, hull: Hull, max_age: int, max_bytes: int) -> None:
-        number = hull.row.number
         async with self._turn_of_settings:
             try:
-                await self._driver.commit([self._storage.set_history(number, max_age, max_bytes)])
+                await self._driver.commit([self._storage.set_history(hull.row.number, max_age, max_bytes)])
+                await self.filing.take_settings(hull)
+            except KeyError:
+                raise HullNotFoundError(hull.name) from None
             except NotCommittedError as error:
                 raise not_stored(error) from error
             except Exception as error:
+                self.filing.unsure.add(hull)
                 raise OutcomeUnknownError(words_for_callers(error)) from error
-            row = await self._driver.on_disk(partial(self._storage.row, number))
-        if row is None:
-            raise HullNotFoundError(hull.name)
-        hull.row = row
 
     def _require_history(self, name: str, settings: HullSettings) -> None:
         """Raise HullUnsuitableError if a hull with these settings can have no history."""
