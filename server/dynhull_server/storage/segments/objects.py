@@ -64,6 +64,7 @@ class ObjectArchive(Archive):
         self._seconds = seconds
         self._places = BoundedSemaphore(CALLS)
         self._making = Lock()
+        self._given_up: set[str] = set()  # segments that the store may still take, though nobody waits for them
         self._made: FileSystem | None = None
 
     def write(self, file: str, content: bytes) -> Written:
@@ -78,7 +79,11 @@ class ObjectArchive(Archive):
             with self._store().open_output_stream(key) as stream:
                 stream.write(content)
 
-        self._ask(file, put, len(content))
+        try:
+            self._ask(file, put, len(content))
+        except OSError:
+            self._given_up.add(file.partition(".")[0])
+            raise
         if self.content(file, len(content)) != content:
             raise OSError(errno.EIO, "the object store does not keep what it is sent", file)
         return written(content)
@@ -115,7 +120,9 @@ class ObjectArchive(Archive):
             yield file + STATE
 
     def orphans(self, uid: str, epoch: int) -> list[str]:
-        """Segments that owners before an epoch have written, older than a day, whether a hull has them or not.
+        """Segments older than a day that owners before an epoch have written, or that this archive has given up.
+
+        A hull may have those of owners before.
 
         Raises:
             OSError: the store refuses, or does not answer.
@@ -133,7 +140,8 @@ class ObjectArchive(Archive):
                 if each.type == FileType.File and each.mtime is not None and each.mtime.timestamp() < before
             }
 
-        return sorted(f"{uid}/{name}" for name in self._ask(uid, look) if _epoch(name) < epoch)
+        found = sorted(f"{uid}/{name}" for name in self._ask(uid, look))
+        return [file for file in found if _epoch(file) < epoch or file in self._given_up]
 
     def sync(self) -> None:
         """Nothing is left to do: a store that has taken an object keeps it."""
@@ -197,7 +205,7 @@ class ObjectArchive(Archive):
             self._places.release()
 
 
-def _epoch(name: str) -> int:
+def _epoch(file: str) -> int:
     """The epoch in the name of a segment; that of one without it is that of nobody."""
-    parts = name.split("-")
+    parts = file.rpartition("/")[2].split("-")
     return int(parts[2]) if len(parts) == 4 and parts[2].isdigit() else 0
