@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-LAYERS = "core", "shell", "sqlite", "cluster", "links"
+LAYERS = "core", "shell", "sqlite", "past", "cluster", "links"
 FINDINGS = Path(__file__).parent / "findings"
 
 # Plans from one collection of garbage to the next, and lives from one line of progress to the next.

@@ -11,6 +11,7 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from contextlib import suppress
 from contextvars import Context
+from functools import partial
 from typing import Any
 
 from greenlet import GreenletExit, getcurrent, greenlet
@@ -22,6 +23,8 @@ from .schedule import Schedule
 
 # Pauses are as long as the work before them, in which other pauses may pass here: they would grow without end.
 LONGEST_PAUSE = 60.0
+# As many as are asked for.
+MANY_THREADS = 1_000
 
 
 class Loop(asyncio.AbstractEventLoop):
@@ -169,6 +172,7 @@ class SimulatedThreads(Threads):
         self._hub = getcurrent()
         self._all: list[Thread] = []
         self._pools: list[_Pool] = []
+        self._ahead: _Pool | None = None
 
     def current(self) -> Thread | None:
         """The thread that runs, None for the event loop's."""
@@ -230,6 +234,12 @@ class SimulatedThreads(Threads):
         self._schedule.actor(name, thread.ready, thread.act)
         return _Spawned(self, thread)
 
+    def ahead(self) -> "_Pool":
+        """The threads that read ahead; they are made with the first of them."""
+        if self._ahead is None:
+            self._ahead = self.pool("ahead", MANY_THREADS)
+        return self._ahead
+
     def kill(self) -> None:
         """End all threads."""
         for thread in self._all:
@@ -286,7 +296,9 @@ class _Pool:
         self._threads.wait(lambda: not self._jobs and not self._running)
 
     def ready(self) -> object:
-        return (self._jobs and len(self._running) < self._size) or any(thread.ready() for thread in self._running)
+        if self._jobs and len(self._running) < self._size:
+            return True
+        return self._running and any(thread.ready() for thread in self._running)
 
     def act(self) -> None:
         ready = [thread for thread in self._running if thread.ready()]
@@ -316,6 +328,29 @@ class _Pool:
         thread = self._threads.start(job)
         self._running.append(thread)
         return thread
+
+
+def reading_ahead(threads: Callable[[], SimulatedThreads]) -> tuple[type, type]:
+    """What takes the place of `Thread` and `Future` where one thread reads what others wait for."""
+
+    class Ahead:
+        def __init__(self, target: Callable[..., None], args: tuple[Any, ...], name: str) -> None:
+            del name
+            self._run = partial(target, *args)
+            self._done: Future[None] | None = None
+
+        def start(self) -> None:
+            self._done = threads().ahead().submit(self._run)
+
+        def is_alive(self) -> bool:
+            return self._done is not None and not self._done.done()
+
+    class Read(Future[Any]):
+        def result(self, timeout: float | None = None) -> Any:
+            threads().wait(self.done)
+            return super().result(timeout)
+
+    return Ahead, Read
 
 
 class SimulatedClock(Clock):

@@ -1,14 +1,46 @@
-"""The files of the past on a disk that fails when the plan says so, and between whose steps a server may be killed."""
+"""The files of the past on a disk or in an object store that fail when the plan says so, and between whose steps a
+server may be killed."""
 
-from collections.abc import Callable
+import errno
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from io import BytesIO, IOBase
+from itertools import count
 from pathlib import Path
+from time import time
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
 
 from dynhull_server.storage.durable import TEMPORARY
+from dynhull_server.storage.rows import filed
+from dynhull_server.storage.rows import storage as rows_storage
+from dynhull_server.storage.segments import archive, objects
 from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive, Written
+
+from .machine import SimulatedThreads, reading_ahead
 
 # Where the disk may fail, or the server be killed: before a file is written, where a part of it is there, and where it
 # is there, and nobody knows; before a file is read; before the files of a segment are removed, and between them.
 FILE_PLACES = ("file", "part", "filed", "fetch", "unlink", "unlinked")
+# Where the store may: before it has a call, and where it has carried it out, and nobody knows.
+STORE_PLACES = ("call", "call", "answer")
+
+# What may have become of a file: a bit of it is another one, half of it is there, it is away, or another file is in its
+# place.
+DAMAGE = ("flip", "half", "gone", "other")
+# How a call of a store ends late: it is carried out when nobody waits for it any more, or never, or after a while.
+LATE = ("late", "hung", "slow")
+
+# Calls of the store after which one that was late is carried out, and turns of others while one is slow.
+LATER, SLOW = 7, 20
+# Seconds, which are calls here, after which files in a store that belong to nobody are removed; microseconds from one
+# look for them to the next.
+OLD, LOOK = 5.0, 2_000_000
+
+At = Callable[[str], str | None]
 
 
 class FaultyArchive(Archive):
@@ -17,12 +49,13 @@ class FaultyArchive(Archive):
     Args:
         path: the folder.
         most_bytes: how many bytes are kept at most; 0 for any number.
-        at: called at each of `FILE_PLACES`.
+        at: called at each of `FILE_PLACES`; returns what has become of a file that is read.
     """
 
-    def __init__(self, path: Path, most_bytes: int, at: Callable[[str], None]) -> None:
+    def __init__(self, path: Path, most_bytes: int, at: At) -> None:
         super().__init__(path, most_bytes)
         self._at = at
+        self._damaged = 0
 
     def write(self, file: str, content: bytes) -> Written:
         """Write a file."""
@@ -37,8 +70,32 @@ class FaultyArchive(Archive):
 
     def content(self, file: str, size: int = 0) -> bytes:
         """Read a file."""
-        self._at("fetch")
-        return super().content(file, size)
+        with self._damage(file, self._at("fetch")):
+            return super().content(file, size)
+
+    @contextmanager
+    def parts(self, file: str, wrote: Written) -> Iterator[IOBase]:
+        """Read a file in parts."""
+        with self._damage(file, self._at("fetch")), super().parts(file, wrote) as parts:
+            yield parts
+
+    @contextmanager
+    def _damage(self, file: str, kind: str | None) -> Iterator[None]:
+        """Have a file damaged while it is read. Other folders may have it as a link: it is not touched itself."""
+        path = self.path / file
+        aside = path.with_name(path.name + ".aside")
+        if kind not in DAMAGE or not path.exists():
+            yield
+            return
+        path.rename(aside)
+        try:
+            content = damaged(aside.read_bytes(), kind, self._damaged)
+            self._damaged += 1
+            if content is not None:
+                path.write_bytes(content)
+            yield
+        finally:
+            aside.replace(path)
 
     def remove(self, file: str) -> None:
         """Remove the files of a segment."""
@@ -49,5 +106,153 @@ class FaultyArchive(Archive):
 
     def names(self) -> set[str]:
         """The names of the segments of which there is any file, also a part of one."""
-        found = (path.relative_to(self.path).as_posix() for path in self.path.glob("*/*"))
-        return {name.removesuffix(TEMPORARY).removesuffix(BATCHES).removesuffix(STATE) for name in found}
+        return names_in(self.path)
+
+
+@dataclass
+class Store:
+    """What is in an object store: it outlives the servers, as do calls that they have given up.
+
+    Attributes:
+        folder: has the objects as files.
+        times: the number of calls that had come when each of them was written; a second is a call here.
+        late: calls that are carried out later: after how many calls, and what they do.
+        calls: how many there were.
+    """
+
+    folder: Path
+    times: dict[str, int] = field(default_factory=dict)
+    late: list[tuple[int, Callable[[], Any]]] = field(default_factory=list)
+    calls: int = 0
+
+    def called(self) -> None:
+        """One more call comes; what was late may be carried out now."""
+        self.calls += 1
+        due = [call for after, call in self.late if after <= self.calls]
+        self.late = [each for each in self.late if each[0] > self.calls]
+        for call in due:
+            call()
+
+
+class FaultyStore(objects.ObjectArchive):
+    """A store of segments: the calls of the real archive come to it one after the other.
+
+    Args:
+        store: what is in it.
+        most_bytes: how many bytes are kept at most; 0 for any number.
+        at: called at each of `STORE_PLACES`; returns what becomes of the call.
+        give_way: lets others go on.
+    """
+
+    def __init__(self, store: Store, most_bytes: int, at: At, give_way: Callable[[], None]) -> None:
+        super().__init__("s3://bucket", most_bytes)
+        self._kept, self._at, self._give_way = store, at, give_way
+        self._made = _FileSystem(store, self.path)  # type: ignore[assignment]
+        self._damaged = 0
+
+    def _ask(self, what: str, function: Callable[[], Any], size: int = 0) -> Any:
+        del size
+        kind = self._at("call")
+        self._kept.called()
+        if kind == "late":
+            self._kept.late.append((self._kept.calls + LATER, lambda: _forgotten(function)))
+        for _ in range(SLOW if kind in LATE else 0):
+            self._give_way()
+        if kind in ("late", "hung"):
+            raise OSError(errno.ETIMEDOUT, "the store does not answer, as planned", what)
+        found = function()
+        self._at("answer")
+        if kind in DAMAGE and isinstance(found, bytes):
+            found = damaged(found, kind, self._damaged)
+            self._damaged += 1
+            if found is None:
+                raise FileNotFoundError(what)
+        return found
+
+    def names(self) -> set[str]:
+        """The names of the segments of which there is any object."""
+        return names_in(self._kept.folder)
+
+
+class _FileSystem:
+    """What an `ObjectArchive` needs of pyarrow's file systems."""
+
+    def __init__(self, store: Store, root: Path) -> None:
+        self._store, self._root = store, root
+
+    def _file(self, key: str) -> Path:
+        return self._store.folder / Path(key).relative_to(self._root)
+
+    @contextmanager
+    def open_output_stream(self, key: str) -> Iterator[BytesIO]:
+        content = BytesIO()
+        yield content
+        path = self._file(key)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content.getvalue())
+        self._store.times[path.name] = self._store.calls
+
+    def open_input_file(self, key: str) -> BytesIO:
+        return BytesIO(self._file(key).read_bytes())
+
+    def delete_file(self, key: str) -> None:
+        self._file(key).unlink()
+
+    def get_file_info(self, asked: Any) -> Any:
+        """About one object, or all below a folder."""
+        from pyarrow.fs import FileType
+
+        if isinstance(asked, str):
+            return SimpleNamespace(type=FileType.File if self._file(asked).exists() else FileType.NotFound)
+        folder, now = self._file(asked.base_dir), time()
+        return [
+            SimpleNamespace(type=FileType.File, base_name=each.name, mtime=datetime.fromtimestamp(now - age, UTC))
+            for each in (sorted(folder.iterdir()) if folder.is_dir() else ())
+            if (age := self._store.calls - self._store.times[each.name]) >= 0
+        ]
+
+
+def _forgotten(function: Callable[[], Any]) -> None:
+    """Carry out a call that nobody waits for."""
+    try:
+        function()
+    except OSError:
+        return
+
+
+def damaged(content: bytes, kind: str, nth: int) -> bytes | None:
+    """What has become of a file; None if it is away."""
+    match kind:
+        case "flip":
+            changed = bytearray(content)
+            bit = nth * 7919 % (8 * len(content))
+            changed[bit // 8] ^= 1 << bit % 8
+            return bytes(changed)
+        case "half":
+            return content[: len(content) // 2]
+        case "other":
+            return content[::-1]
+        case _:
+            return None
+
+
+def names_in(folder: Path) -> set[str]:
+    """The names of the segments of which there is any file."""
+    folders = folder.iterdir() if folder.is_dir() else ()
+    found = (f"{each.name}/{file.name}" for each in folders for file in each.iterdir())
+    return {name.removesuffix(TEMPORARY).removesuffix(BATCHES).removesuffix(STATE) for name in found}
+
+
+@contextmanager
+def simulated_reading(threads: Callable[[], SimulatedThreads]) -> Iterator[None]:
+    """Have segments read ahead by simulated threads, named by numbers, and stores cleared within seconds."""
+    thread, future = reading_ahead(threads)
+    numbers = count()
+    with (
+        patch.object(archive, "token_hex", lambda size: f"{next(numbers):0{2 * size}}"),
+        patch.object(filed, "Thread", thread),
+        patch.object(filed, "Future", future),
+        patch.object(objects, "ORPHAN_SECONDS", OLD),
+        patch.object(rows_storage, "LOOK", LOOK),
+    ):
+        yield

@@ -11,7 +11,7 @@ from dynhull_server.storage.rows import filing, past_rows
 from .cluster_plan import Operation, Plan
 from .globe import GLOBE
 from .operations import TIMED
-from .past_archive import FILE_PLACES
+from .past_archive import DAMAGE, FILE_PLACES, LATE, STORE_PLACES
 from .past_model import ERASED
 
 # What clients ask of the past.
@@ -25,12 +25,21 @@ SERVER_BYTES = (0, 0, 0, 0, 15_000)
 # Points and keys after which a segment ends, and of which reads have some at a time; None for as many as usual.
 SEGMENT_ROWS = (None, 1, 3)
 
+# The share of lives in which time waits for slow threads: most, or they would be twice as long.
+PATIENT = 0.7
+
 # Seconds after which a hull may have a snapshot, and a segment be closed.
 ROUND = 1.1
 JUMPS = (-3600.0, -2.0, 2.0, 3600.0)
 
-# How the files of the past fail.
-FILE_FAULTS = ("os", "os", "memory", "kill", "kill", "kill")
+# The share of the plans without backups in which the past is in an object store.
+IN_STORE = 0.3
+
+# How the files of the past fail, where they are read too; how calls of a store do; and commits of steps of filing.
+FILE_FAULTS = ("os", "disk full", "memory", "kill", "kill", "kill")
+READ_FAULTS = ("os", "memory", "kill", *DAMAGE)
+CALL_FAULTS = ("os", "os", "kill", "kill", *LATE, *LATE, *DAMAGE)
+STEP_FAULTS = ("kill", "kill", "ghost kill", "ghost kill", "full", "lost", "ghost", "memory", "ghost memory")
 
 
 def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
@@ -39,8 +48,11 @@ def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
     plan["history_bytes"] = draw.choice(SERVER_BYTES)
     plan["segment_rows"] = draw.choice(SEGMENT_ROWS)
     files = plan["storage"] == "sqlite"
+    backed_up = any(op["do"] == "backup" for life in plan["lives"] for client in life["clients"] for op in client)
+    plan["store"] = files and not backed_up and draw.random() < IN_STORE
     for life in plan["lives"]:
         life["clock"] = draw.choice((0, 0, *JUMPS))
+        life["patient"] = draw.random() < PATIENT
         if "after" in life:
             life["after"] = int(draw.expovariate(1 / 400))
         for client in life["clients"]:
@@ -51,7 +63,7 @@ def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
                 client.insert(draw.randint(0, len(client)), _of_past(draw, draw.choice(names), files=files))
         life["clients"].append(_written_until_filed(draw, draw.choice(names), files=files))
     if files and draw.random() < 0.6:
-        plan["faults"] += [_fault(draw) for _ in range(draw.choice((1, 1, 2, 3)))]
+        plan["faults"] += [_fault(draw, in_store=plan["store"]) for _ in range(draw.choice((1, 1, 2, 3)))]
 
 
 def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list[Operation]:
@@ -98,10 +110,27 @@ def _kept(draw: random.Random) -> Operation:
     return {"history": history, "history_bytes": most_bytes}
 
 
-def _fault(draw: random.Random) -> dict[str, Any]:
-    at = draw.choice((*FILE_PLACES, "history", "past"))
-    kind = draw.choice(FILE_FAULTS if at in FILE_PLACES else ("os", "memory"))
-    return {"at": at, "nth": 1 + int(draw.expovariate(1 / 4)), "kind": kind, "calls": draw.choice((1, 1, 1, 2, 5, 20))}
+def _fault(draw: random.Random, *, in_store: bool) -> dict[str, Any]:
+    at = draw.choice((*(STORE_PLACES if in_store else FILE_PLACES), "step", "step", "history", "past"))
+    match at:
+        case "fetch":
+            kinds: tuple[str, ...] = READ_FAULTS
+        case "call":
+            kinds = CALL_FAULTS
+        case "step":
+            kinds = STEP_FAULTS
+        case "past":
+            kinds = ("os", "memory")
+        case "history" | "answer":
+            kinds = ("os", "memory", "kill")
+        case _:
+            kinds = FILE_FAULTS
+    more = {
+        "nth": 1 + int(draw.expovariate(1 / 4)),
+        "kind": draw.choice(kinds),
+        "calls": draw.choice((1, 1, 1, 2, 5, 20)),
+    }
+    return {"at": at} | more
 
 
 def may_keep(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -95,7 +95,9 @@ WITH_DELETED_FENCES = 0.3
 WITH_REFUSED_STREAMS = 0.3
 
 # The share of the engine's plans in which the past is read: on SQLite, where hulls keep it, and in memory.
-WITH_PAST = {"sqlite": 0.4, "shell": 0.15}
+WITH_PAST = {"past": 1.0, "sqlite": 0.1, "shell": 0.15}
+# A layer of plans that are like those of another one.
+LIKE = {"past": "sqlite"}
 
 SWARM = (0, 1, 1, 5)
 
@@ -125,6 +127,8 @@ def random_plan(seed: int, layer: str) -> Plan:
         return random_cluster_plan(seed)
     if layer == "links":
         return random_link_plan(seed)
+    with_past = WITH_PAST.get(layer, 0.0)
+    layer = LIKE.get(layer, layer)
     draw = random.Random(seed)
     with_fences = draw.random() < WITH_FENCES
     with_times = with_fences or draw.random() < 0.5
@@ -210,7 +214,7 @@ def random_plan(seed: int, layer: str) -> Plan:
             client.insert(queries.randint(0, len(client)), query(queries, (*names, *timed)))
     past = random.Random(f"past {seed}")
     keeping = may_keep((*names, *timed))
-    if keeping and past.random() < WITH_PAST.get(layer, 0.0) and not immediate:
+    if keeping and past.random() < with_past and not immediate:
         add_past(past, plan, keeping)
     alarms = random.Random(f"alarms {seed}")
     if alarms.random() < WITH_ALARMS:

@@ -104,7 +104,7 @@ def _play_cluster(plan: Plan) -> Outcome:
 
 def _storage(plan: Plan, model: Model) -> FaultyStorage:
     if plan["storage"] == "sqlite":
-        return SQLiteLives(model, plan["faults"], plan.get("history_bytes", 0))
+        return SQLiteLives(model, plan["faults"], plan.get("history_bytes", 0), in_store=plan.get("store", False))
     return FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=plan["storage"] == "immediate")
 
 
@@ -119,6 +119,7 @@ def _live(
 ) -> list[Client]:
     """One life. The clients of a life that begins with a restore are those of the life before."""
     schedule.clear()
+    schedule.patient = life.get("patient", False)
     storage.calm = True
     if life.get("restored"):
         storage.restore()
@@ -163,6 +164,7 @@ def _look(server: CoreServer | ShellServer, model: Model, schedule: Schedule, st
     if server.waiting():
         raise model.finds(f"these wait for ever: {server.waiting()}")
     storage.calm = True
+    schedule.patient = True
     server.check()
     names = sorted({*model.alive, "a"})
     anew = schedule.random.choice(names)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 # Turns after which a life that goes on without end is given up.
 LONGEST = 20_000
+# The actor that lets time pass.
+TIME = b"time"
 
 
 class Schedule:
@@ -14,12 +16,15 @@ class Schedule:
     Attributes:
         turns: how many turns there have been.
         trace: a hash of all turns and of what was noted in them.
+        patient: whether time passes only when nothing else is left to do; else much may pass while a slow actor does
+            little, and most turns are those of periodic work.
     """
 
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
         self.turns = 0
         self.trace = 0
+        self.patient = False
         self._actors: list[tuple[Callable[[], object], float, Callable[[], None], bytes]] = []
 
     def actor(self, name: str, ready: Callable[[], object], act: Callable[[], None]) -> None:
@@ -39,6 +44,8 @@ class Schedule:
         ready = [actor for actor in self._actors if actor[0]()]
         if not ready:
             return False
+        if self.patient and len(ready) > 1:
+            ready = [each for each in ready if each[3] != TIME]
         actor = ready[-1]
         if len(ready) > 1:
             drawn = self.random.random() * sum([each[1] for each in ready])

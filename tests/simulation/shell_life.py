@@ -95,7 +95,7 @@ class ShellServer:
         self.loop = self.loop_type(model, schedule)
         self._threads = SimulatedThreads(model, schedule)
         self.loop.executor(self._threads.pool("to_thread", 4).submit)
-        storage.give_way = self._threads.give_way
+        storage.give_way, storage.threads = self._threads.give_way, self._threads
         self._supervisor = WatchedSupervisor(model, self.loop)
         machine = simulated_machine(self.loop, self._threads, model)
         self._engine = Engine(limits, storage, self._supervisor, machine)
@@ -295,7 +295,7 @@ class ShellServer:
 
     def look_at_past(self) -> None:
         """The past of each hull is as it was, and has the files that it needs, and no others."""
-        self._until(self._storage.files_are_needed, "what is to be filed")
+        self._until(lambda: self._storage.files_are_needed(self.time()), "what is to be filed")
         for name in sorted(self.model.alive):
             self.probe(PastReader(self._engine, self.model).probe(name))
 
@@ -308,6 +308,8 @@ class ShellServer:
     def check(self) -> None:
         """Compare what is in memory with the truth, and let background work succeed again."""
         self._until(lambda: not self._engine.driver.core.busy, "the core")  # points may just be leaving
+        hulls = self._engine.hulls
+        self._until(lambda: not (hulls._changing or hulls.filing.unsure), "settings that are changed")
         compare(self._engine.driver.core, self.model)
         # Of a commit that failed the supervisor hears when the next one succeeds.
         self._until(lambda: not set(self._supervisor.failing()) - {"commits", "examination"}, "the background work")

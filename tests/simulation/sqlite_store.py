@@ -9,26 +9,33 @@ import shutil
 import sqlite3
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NoReturn
 
 from dynhull_server.state.fences.model.records import KeptFence
 from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import Progress, StoredContents
+from dynhull_server.storage.rows.group import CloseSegment, DropDeadSegment, EraseKeys, NameFile, RetireSegment
+from dynhull_server.storage.rows.ledger import HullRows
 from dynhull_server.storage.segments.archive import HISTORY
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.sqlite.disk import Disk, OpenMode
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 from .incarnation import Backup
+from .machine import SimulatedThreads
 from .model import Model
-from .past_archive import FaultyArchive
+from .past_archive import FaultyArchive, FaultyStore, Store, simulated_reading
+from .past_retention import all_may_stay, may_go
 from .store import ERRORS, FaultyStorage
 
 FAILED = {"full": sqlite3.SQLITE_FULL, "lost": sqlite3.SQLITE_IOERR, "ghost": sqlite3.SQLITE_IOERR_FSYNC}
+# The steps of filing: the commits in which segments become part of the past, or leave it.
+FILING = (NameFile, CloseSegment, EraseKeys, RetireSegment, DropDeadSegment)
 # Where the folders of the lives are: in memory, where there is such a place.
 SHARED_MEMORY = Path("/dev/shm")
 # More events than a fence has.
@@ -38,14 +45,19 @@ MANY = 10**6
 class SQLiteLives(FaultyStorage):
     """A folder with a database; each life has a storage of its own on it.
 
-    `most_bytes` of the past of all hulls are kept at most; 0 for any number.
+    `most_bytes` of the past of all hulls are kept at most, 0 for any number; `in_store`, not in the folder.
     """
 
-    def __init__(self, model: Model, faults: Sequence[dict[str, Any]], most_bytes: int = 0) -> None:
+    def __init__(
+        self, model: Model, faults: Sequence[dict[str, Any]], most_bytes: int = 0, *, in_store: bool = False
+    ) -> None:
         super().__init__(MemoryStorage(), model, faults, immediate=False)
         self._home = tempfile.TemporaryDirectory(dir=SHARED_MEMORY if SHARED_MEMORY.is_dir() else None)
         self._folders = 1
-        self._disk = _FaultyDisk(self.fault, self._landed)
+        self._disk = _FaultyDisk(self._fault_of_disk, self._landed, self.kill)
+        self._store = Store(Path(self._home.name) / "store") if in_store else None
+        self._patches = ExitStack()
+        self._patches.enter_context(simulated_reading(self._threads_of_life))
         self._pending: tuple[Sequence[Any], int] = (), 0
         self._most_bytes = most_bytes
         self._backup: tuple[Path, Backup] | None = None
@@ -55,9 +67,16 @@ class SQLiteLives(FaultyStorage):
     def _folder(self) -> Path:
         return Path(self._home.name) / str(self._folders)
 
-    def fault(self, place: str) -> str | None:
+    def _fault_of_disk(self, place: str) -> str | None:
         """What fails at this call of a method of the disk."""
-        return self._fault(place)
+        kind = self._fault(place)
+        if place == "commit" and any(isinstance(each, FILING) for each in self._pending[0]):
+            kind = self._fault("step") or kind
+        return kind
+
+    def _threads_of_life(self) -> SimulatedThreads:
+        assert self.threads is not None
+        return self.threads
 
     def open(self, progress: Progress) -> StoredContents:
         """Take up what the life before has left."""
@@ -68,9 +87,10 @@ class SQLiteLives(FaultyStorage):
             self._follow(left)
             self._disk.drop()
             shutil.rmtree(left)
-        self._archive = FaultyArchive(self._folder / HISTORY, self._most_bytes, self._at_file)
+        self._archive = self._new_archive()
         self._inner = SQLiteStorage(self._folder, Durability.SYNC, self._disk, archive=self._archive)
         contents = super().open(progress)
+        self._inner.epoch = self._folders  # as where each life is another owner
         if self._restores and self._backup is not None:
             self._backup[1].restore(self._model, contents, self._fences(contents))
         self._restores = False
@@ -87,18 +107,24 @@ class SQLiteLives(FaultyStorage):
             elif not file.name.endswith("-shm"):
                 shutil.copy(file, self._folder)
 
-    def _at_file(self, place: str) -> None:
-        self.give_way()
-        kind = self.fault(place)
-        if kind is not None:
-            raise ERRORS[kind](f"a file of the past fails at {place}, as planned")
+    def _new_archive(self) -> FaultyArchive | FaultyStore:
+        if self._store is None:
+            return FaultyArchive(self._folder / HISTORY, self._most_bytes, self._at_file)
+        return FaultyStore(self._store, self._most_bytes, self._at_file, lambda: self.give_way())
 
-    def files_are_needed(self) -> bool:
-        """Whether each file of the past is one of a segment, and nothing is to be filed."""
-        assert isinstance(self._inner, SQLiteStorage)
-        hulls = self._inner._ledger.hulls.values()
-        named = {each.file for hull in hulls for each in hull.segments}
-        return self._archive.names() == named and all(hull.due == hull.filed for hull in hulls)
+    def _at_file(self, place: str) -> str | None:
+        self.give_way()
+        kind = self._fault(place)
+        if kind in ERRORS:
+            raise ERRORS[kind](f"a file of the past fails at {place}, as planned")
+        return kind
+
+    def files_are_needed(self, now: int) -> bool:
+        """Whether each file of the past is one of a segment, and nothing is to be filed or removed."""
+        hulls = self._hulls().values()
+        if any(hull.due != hull.filed for hull in hulls) or not all_may_stay(hulls, now, self._most_bytes):
+            return False
+        return self._archive.names() == {each.file for hull in hulls for each in hull.segments}
 
     def _fences(self, contents: StoredContents) -> list[KeptFence]:
         """The fences in the folder, each with all of its events."""
@@ -129,7 +155,18 @@ class SQLiteLives(FaultyStorage):
         return commit
 
     def _landed(self) -> None:
-        self._model.landed(*self._pending)
+        changes, now = self._pending
+        self._model.landed(changes, now)
+        for step in changes:
+            hull = self._hulls().get(step.number) if isinstance(step, RetireSegment) else None
+            if hull is None or step.segment not in hull.segments:
+                continue
+            if not may_go(self._hulls().values(), hull, step.segment, now, self._most_bytes):
+                raise self._model.finds(f"a segment of {hull.row.name} goes, and should stay: {step.segment}")
+
+    def _hulls(self) -> dict[int, HullRows]:
+        assert isinstance(self._inner, SQLiteStorage)
+        return self._inner._ledger.hulls
 
     def close(self) -> None:
         """The server ends."""
@@ -139,6 +176,7 @@ class SQLiteLives(FaultyStorage):
     def remove(self) -> None:
         """Nothing of it is needed any more."""
         self._disk.drop()
+        self._patches.close()
         self._home.cleanup()
 
 
@@ -156,11 +194,13 @@ class _Connection(sqlite3.Connection):
         return super().execute(sql, *values)
 
     def _commit(self, kind: str | None) -> sqlite3.Cursor:
-        if kind in (None, "ghost", "ghost memory"):
+        if kind is None or kind.startswith("ghost"):
             cursor = super().execute("COMMIT")
             self.disk.landed()
             if kind is None:
                 return cursor
+        if kind == "ghost kill":
+            self.disk.kill()
         if kind in ("memory", "ghost memory"):
             raise MemoryError("no memory for a commit, as planned")
         assert kind is not None
@@ -170,9 +210,12 @@ class _Connection(sqlite3.Connection):
 
 
 class _FaultyDisk(Disk):
-    def __init__(self, fault: Callable[[str], str | None], landed: Callable[[], None]) -> None:
+    def __init__(
+        self, fault: Callable[[str], str | None], landed: Callable[[], None], kill: Callable[[], NoReturn]
+    ) -> None:
         self.fault = fault
         self.landed = landed
+        self.kill = kill
         self.writing: sqlite3.Connection | None = None
         self._opened: list[Any] = []
 

@@ -1,9 +1,11 @@
 """A storage that fails when the plan says so, and reports to the model what it has kept."""
 
+import errno
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from typing import Any, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
 from dynhull_server.state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
@@ -13,7 +15,14 @@ from dynhull_server.storage.port import NEWEST, NotCommittedError, Progress, Sto
 
 from .model import Model
 
-ERRORS: dict[str, type[Exception]] = {"os": OSError, "memory": MemoryError}
+if TYPE_CHECKING:
+    from .machine import SimulatedThreads
+
+ERRORS: dict[str, Callable[[str], Exception]] = {
+    "os": OSError,
+    "memory": MemoryError,
+    "disk full": partial(OSError, errno.ENOSPC),
+}
 
 Found = TypeVar("Found")
 
@@ -36,6 +45,7 @@ class FaultyStorage:
         dead: whether the server has been killed: its remains cannot touch the storage.
         killing: whether it is to be killed now, where a thread has come to.
         give_way: called where another thread may go on: before a commit or read, and after it.
+        threads: those of the server, if it has any.
     """
 
     def __init__(self, inner: Storage, model: Model, faults: Sequence[dict[str, Any]], *, immediate: bool) -> None:
@@ -44,6 +54,7 @@ class FaultyStorage:
         self.epoch = 0
         self.calm = self.dead = self.killing = False
         self.give_way: Callable[[], None] = lambda: None
+        self.threads: SimulatedThreads | None = None
         self._inner = inner
         self._model = model
         self._faults = {
@@ -58,12 +69,16 @@ class FaultyStorage:
         self._calls[place] += 1
         kind = None if self.calm else self._faults.get((place, self._calls[place]))
         if kind == "kill":
-            self.killing = True
-            self.give_way()
-            raise SystemExit("a thread goes on after a kill")
+            self.kill()
         if kind is not None:
             self._model.faulty = True
         return kind
+
+    def kill(self) -> NoReturn:
+        """Kill the server, in the middle of what one of its threads does."""
+        self.killing = True
+        self.give_way()
+        raise SystemExit("a thread goes on after a kill")
 
     def _fail(self, place: str) -> None:
         kind = self._fault(place)
@@ -228,8 +243,9 @@ class FaultyStorage:
         """Whether what is before the newest snapshots is kept."""
         return not self.immediate
 
-    def files_are_needed(self) -> bool:
-        """Whether each file of the past is one of a segment, and nothing is to be filed."""
+    def files_are_needed(self, now: int) -> bool:
+        """Whether each file of the past is one of a segment, and nothing is to be filed or removed at that time."""
+        del now
         return True
 
     def erasures(self, number: int) -> tuple[Erasure, ...]:
