@@ -40,8 +40,12 @@ def all_may_stay(hulls: Iterable[HullRows], now: int, most_bytes: int) -> bool:
 
 
 def _must_go(hull: HullRows, place: int, now: int) -> bool:
+    """Whether a segment is not to be kept: by age, by bytes, or since it does not lead to what is there now."""
     settings = hull.row.settings
-    if not settings.history:
+    firsts = [each.first for each in hull.segments[place + 1 :]]
+    firsts.append(hull.firsts[0] if hull.firsts else hull.last + 1)
+    lasts = [each.last for each in hull.segments[place:]]
+    if not settings.history or any(first > last + 1 for first, last in zip(firsts, lasts, strict=True)):
         return True
     too_old = settings.history != FOREVER and hull.segments[place].facts.last_time < now - settings.history
     return too_old or bool(settings.history_bytes and _bytes(hull.segments[place:]) > settings.history_bytes)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filed_fleet import BEGIN, KEYS, SECOND, SETTINGS, Fleet, read_back
+from filed_fleet import BEGIN, KEYS, SECOND, SETTINGS, Fleet, move, read_back
 from folders import no_progress, same
 
 from dynhull.keys import PackedKeys
@@ -16,6 +16,7 @@ from dynhull_server.state.contents import replayed
 from dynhull_server.state.records import (
     FOREVER,
     NO_TIME,
+    Append,
     CommitStamp,
     Contents,
     Create,
@@ -31,7 +32,7 @@ from dynhull_server.state.records import (
     Record,
 )
 from dynhull_server.storage.port import NEWEST, DamagedError
-from dynhull_server.storage.rows import filed, filing, past_rows
+from dynhull_server.storage.rows import filed, filing, past_rows, storage
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments import archive
 from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive
@@ -479,3 +480,42 @@ def test_history_begins_where_the_journal_does_when_it_is_set(tmp_path):
     same(fleet.storage.read(1, NEWEST).records, fleet.records[fleet.storage.read(1).revision :])
     assert isinstance(fleet.storage.state(1, begin).contents, Contents)
     fleet.storage.close()
+
+
+def test_a_history_that_was_off_for_a_moment_begins_anew(fleet):
+    """While nothing was removed, as with a store that was away: what lies before the gap leads nowhere."""
+    fleet.fill(2)
+    fleet.storage.commit([fleet.storage.set_history(1, 0, 0)])
+    for _ in range(3):
+        fleet.put(4)
+        fleet.snapshot()
+    fleet.storage.commit([fleet.storage.set_history(1, FOREVER, 0)])
+    fleet.fill(3)
+    first = fleet.storage.oldest_moment(1).revision
+    assert 2 * 8 < first < len(fleet.records)
+    same(read_back(fleet.storage, len(fleet.records)), fleet.records[first:])
+    assert all(first < int(each.split("/")[1][:19]) for each in fleet.files)
+    fleet.storage.close()
+    again = fleet.make()
+    assert again.open(no_progress).notes == []
+    again.close()
+
+
+def test_a_hull_whose_journal_is_damaged_does_not_keep_others_from_being_filed(fleet, monkeypatch):
+    fleet.storage.commit([Create(HullRow(2, "other", "9876", 12.5, fleet.settings))])
+    for last in (0, 2, 4):
+        fleet.put(4)
+        fleet.snapshot()
+        fleet.storage.commit([Append(2, [move(last + 1), move(last + 2)])])
+        fleet.carry_out(fleet.storage.snapshot(2, Kept(last + 2, Contents(np.empty((0, 2)), PackedKeys.pack([])))))
+    read_due = filing.read_due
+
+    def damaged(reader, hull):
+        if hull.row.number == 1:
+            raise DamagedError("revision 1 is missing")
+        return read_due(reader, hull)
+
+    monkeypatch.setattr(storage, "read_due", damaged)
+    with pytest.raises(DamagedError, match="revision 1 is missing"):
+        fleet.file()
+    assert {each.split("/")[0] for each in fleet.files} == {"9876"}

@@ -105,7 +105,7 @@ def _about(row: HullRow, columns: SegmentColumns) -> dict[str, str]:
 
 
 def outdated(hull: HullRows, now: int, archive: Archive) -> list[StoredSegment]:
-    """The segments of a hull that are kept for too long, or are too many bytes.
+    """The segments of a hull that are kept for too long, are too many bytes, or lead nowhere.
 
     Those that are kept begin with a state, so what follows one goes with it.
     """
@@ -115,12 +115,14 @@ def outdated(hull: HullRows, now: int, archive: Archive) -> list[StoredSegment]:
     age = min(settings.history, archive.most_age or FOREVER)
     oldest = 0 if age == FOREVER else now - age
     room = settings.history_bytes or FOREVER
-    for place in range(len(hull.segments) - 1, -1, -1):
+    gone = hull.apart
+    for place in range(len(hull.segments) - 1, gone - 1, -1):
         segment = hull.segments[place]
         room -= segment.size
         if room < 0 or segment.facts.last_time < oldest:
-            return hull.segments[: run_from_start(hull, place + 1)]
-    return []
+            gone = place + 1
+            break
+    return hull.segments[: run_from_start(hull, gone)]
 
 
 def past_erasures(hull: HullRows) -> list[StoredErasure]:

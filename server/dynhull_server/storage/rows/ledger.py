@@ -89,7 +89,7 @@ class HullRows:
         """The oldest revision that the rows of the journal lead to."""
         if not self.snapshots or (len(self.firsts) > 0 and self.firsts[0] == 1):
             return 0
-        first = self.firsts[0] if self.firsts else self.last + 1
+        first = self._first
         return next(
             (each.revision for each in self.snapshots if each.revision + 1 >= first), self.snapshots[-1].revision
         )
@@ -97,7 +97,23 @@ class HullRows:
     @property
     def filed(self) -> int:
         """The revision up to which segments have all batches that they are to have."""
-        return self.segments[-1].last if self.segments else self.beginning
+        leads = self.segments and self.segments[-1].last + 1 >= self._first
+        return self.segments[-1].last if leads else self.beginning
+
+    @property
+    def _first(self) -> int:
+        """The first revision of the journal, or the next one."""
+        return self.firsts[0] if self.firsts else self.last + 1
+
+    @property
+    def apart(self) -> int:
+        """The number of segments that do not lead to the journal: for a while no past was kept after them."""
+        first = self._first
+        for place in range(len(self.segments), 0, -1):
+            if self.segments[place - 1].last + 1 < first:
+                return place
+            first = self.segments[place - 1].first
+        return 0
 
     @property
     def due(self) -> int:

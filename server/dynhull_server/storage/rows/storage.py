@@ -418,14 +418,12 @@ class RowStorage(ABC):
         if numbers:
             load()  # before there are batches to wait for it
         yield from self._remove_files(archive)
+        damage: DamagedError | None = None
         for number in numbers:
-            while (hull := self._ledger.hulls.get(number)) and hull.due > hull.filed:
-                yield from self._close_segment(number, archive)
-            yield from self._trim(number)
-            for segment in outdated(hull, now, archive) if hull else ():
-                yield RetireSegment(number, segment)
-            for stored in past_erasures(hull) if hull else ():
-                yield DropErasure(number, stored)
+            try:
+                yield from self._file_hull(number, now, archive)
+            except DamagedError as error:  # the others go on
+                damage = damage or error
         if archive.most_bytes:
             with self._visible:
                 gone = list(oldest_of_all(self._settled().hulls, archive.most_bytes))
@@ -439,6 +437,17 @@ class RowStorage(ABC):
         if now - self._looked >= LOOK:
             self._looked = now
             self._remove_orphans(archive)
+        if damage is not None:
+            raise damage
+
+    def _file_hull(self, number: int, now: int, archive: Archive) -> Iterator[StorageStep]:
+        while (hull := self._ledger.hulls.get(number)) and hull.due > hull.filed:
+            yield from self._close_segment(number, archive)
+        yield from self._trim(number)
+        for segment in outdated(hull, now, archive) if hull else ():
+            yield RetireSegment(number, segment)
+        for stored in past_erasures(hull) if hull else ():
+            yield DropErasure(number, stored)
 
     def _remove_orphans(self, archive: Archive) -> None:
         """Remove the files that owners before this one have written after it became the owner."""
