@@ -81,7 +81,8 @@ class Filing:
 
         Raises:
             HullNotFoundError: the hull was deleted meanwhile.
-            HullUnsuitableError: the hull has one of the keys at present, or nothing is kept of its past.
+            HullUnsuitableError: the hull has one of the keys at present, or keeps its newest ones, or nothing of its
+                past is kept.
             NotStoredError: the storage has failed, and the past has the keys, as before.
             OutcomeUnknownError: it has failed, and perhaps they are erased.
         """
@@ -89,6 +90,10 @@ class Filing:
             raise HullUnsuitableError(hull.name, "has no past: this server keeps no batches")
         if hull.settings.divided:
             raise HullUnsuitableError(hull.name, "is divided among shards, and has no past")
+        window = hull.settings.window
+        if window is not None and window.max_points:
+            reason = f"keeps its {window.max_points} newest: those that a key has pushed out would seem to have stayed"
+            raise HullUnsuitableError(hull.name, f"{reason}. Shorten its history instead", field="keys")
         erasing = asyncio.get_running_loop().create_task(self._erase(hull, keys))
         self._erasing.add(erasing)
         erasing.add_done_callback(self._erasing.discard)

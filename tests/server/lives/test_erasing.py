@@ -47,6 +47,10 @@ def test_a_key_is_erased_from_what_can_be_read_of_the_past(tmp_path):
             client.erase_history("fleet", [KEYS[1], KEYS[0]][::-1])
         assert client.at("fleet", 12).positions(KEYS[:1]).present.all()
 
+        client.create_hull("newest", keyed="str", max_points=2, history=True)
+        with pytest.raises(HullUnsuitableError, match=r"keeps its 2 newest: .* Shorten its history instead"):
+            client.erase_history("newest", KEYS[:1])
+
         client.remove("fleet", KEYS[:1])
         found = client.erase_history("fleet", KEYS[:1])
         assert (found.first_revision, found.last_revision, found.keys, found.moves) == (1, 31, 1, 31)
