@@ -7,8 +7,8 @@ IEEE 754 defines to the last bit. Measures that are reported and decide nothing,
 The ellipsoid is the image of the globe of normals: a direction D of the globe has the place S D / sqrt(D S D) on it,
 with S = diag(1, 1, 1 - e²), in radii of the equator. In the plane of a gnomonic projection D is linear, also along
 edges. So the nearest place of an edge takes two steps of Gauss and Newton from the nearest one of the globe. A chord
-becomes an arc by the curvature of the ellipsoid in its direction: that in the middle four times, and a half at each end,
-which is right up to the fourth power of the arc.
+becomes an arc by the curvature of the ellipsoid in its direction: that in the middle, weighted eight times as much as
+each of the ends, is right up to the fourth power of the arc.
 """
 
 from __future__ import annotations

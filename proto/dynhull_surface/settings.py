@@ -112,7 +112,10 @@ class FenceSettings:
         "closed", "boundary", "Whether a subject on the boundary is inside (closed) or outside (open)."
     )
     margin: float = setting(
-        0.0, "margin", "How far outside of the area a subject that is inside has to be to leave.", least=0
+        0.0,
+        "margin",
+        "How far outside of the area a subject that is inside has to be to leave. On the globe metres, at most 250000.",
+        least=0,
     )
     initial: Initial = setting(
         "snapshot",

@@ -10,6 +10,7 @@ import grpc
 import numpy as np
 import pytest
 from patience import until
+from pyproj import Geod
 
 from dynhull_client import AsyncHullClient, Circle, Fence, FenceEvent, HullClient, Polygon, Series
 from dynhull_dashboard.advice import about_fences
@@ -161,6 +162,16 @@ def test_the_margin_of_a_polygon_is_narrower_in_its_hole() -> None:
 def test_a_circle_has_its_radius_and_its_margin() -> None:
     drawn = area_of("yard", fence(Circle(1, 2, 3), margin=1))
     assert drawn.bounds == pytest.approx((-3, -2, 5, 6), abs=0.001)
+
+
+@pytest.mark.parametrize("place", [(180, -17), (10, 89.5), (13.4, 52.5)])
+def test_a_margin_on_the_globe_has_its_metres(place: tuple[float, float]) -> None:
+    drawn = area_of("yard", fence(Circle(*place, 100_000), margin=50_000), place)
+    [[outer]] = json.loads(drawn.message)["around"]
+    lon, lat = np.array(outer).T
+    *_, metres = Geod(ellps="sphere").inv(np.full_like(lon, place[0]), np.full_like(lat, place[1]), lon, lat)
+    assert metres == pytest.approx(150_000, rel=1e-3)
+    assert (abs(lon - place[0]) <= 180).all()
 
 
 def test_the_list_has_the_newest_events() -> None:

@@ -1,4 +1,4 @@
-"""Metres between places and great circles: a micrometre of error, the same bits everywhere, and fences with margins."""
+"""Metres between places and great circles: a micrometre of error, the same bits everywhere; and fences with margins."""
 
 import numpy as np
 import pytest

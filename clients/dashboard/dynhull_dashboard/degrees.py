@@ -4,7 +4,7 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from dynhull.globe import geojson
+from dynhull.globe import Gnomonic, geojson
 from dynhull_client import Circle
 
 from .drawing import Points
@@ -18,6 +18,7 @@ CORNERS_OF_CIRCLE = 180
 # Neighbours in an outline are at most this far apart, in metres, so that great circles are drawn as they are.
 SEGMENT = 100_000.0
 POLE = 90.0
+RIM = 1.55  # radians from the middle of a plane of metres
 
 
 def axes(center: Center | None) -> tuple[str, str]:
@@ -67,6 +68,35 @@ def poles(rings: list[Points]) -> list[str]:
     """The poles in an outline."""
     lat = np.concatenate([ring[:, 1] for ring in rings])
     return [name for name, pole in (("north", POLE), ("south", -POLE)) if (lat == pole).any()]
+
+
+class Flat:
+    """A plane of metres around some places: true from their middle, and for the eye elsewhere.
+
+    Args:
+        places: (k, 2) longitudes and latitudes.
+    """
+
+    def __init__(self, places: Points) -> None:
+        self._frame = Gnomonic.about(places)
+
+    def flat(self, places: Points) -> Points | None:
+        """The places in the plane; None if one is too far from the middle."""
+        xy, near = self._frame.project(places)
+        away = np.hypot(*xy.T)[:, None]
+        return (
+            MEAN_RADIUS * xy * np.divide(np.arctan(away), away, out=np.ones_like(away), where=away > 0)
+            if near.all()
+            else None
+        )
+
+    def places(self, xy: Points) -> Points:
+        """The places of points of the plane, which is cut off a little before its border."""
+        away = np.hypot(*xy.T)[:, None] / MEAN_RADIUS
+        angles = np.minimum(away, RIM)
+        return self._frame.unproject(
+            xy / MEAN_RADIUS * np.divide(np.tan(angles), away, out=np.ones_like(away), where=away > 0)
+        )
 
 
 def circle(area: Circle, *, on_globe: bool) -> Points:

@@ -9,7 +9,7 @@ import shapely
 
 from dynhull_client import Circle, Fence, Points, Prefix
 
-from .degrees import Center, circle, shown
+from .degrees import Center, Flat, circle, shown
 from .outline import MOST_DRAWN, Box, box_around
 
 LEAST_CORNERS = 3
@@ -45,7 +45,7 @@ def area_of(name: str, fence: Fence | None, center: Center | None = None) -> Are
         return Area(_area_message(name))
     margin = fence.margin if fence.other_hull is None else fence.near
     polygons = [[shown(ring, center) for ring in rings] for rings in _polygons(fence, on_globe=center is not None)]
-    around = _around(polygons, margin) if center is None else []
+    around = _around(polygons, margin) if center is None else _around_on_globe(polygons, margin, center)
     message = _area_message(name, area_hulls(fence), margin, polygons, around, globe=center is not None)
     if not polygons:
         return Area(message)
@@ -115,3 +115,15 @@ def _around(polygons: list[Rings], margin: float) -> list[Rings]:
         for part in shapely.get_parts(wider)
         if not part.is_empty
     ]
+
+
+def _around_on_globe(polygons: list[Rings], margin: float, center: Center) -> list[Rings]:
+    """The same in degrees, for a margin in metres; none where an area is nearly a hemisphere."""
+    if not polygons or not margin:
+        return []
+    plane = Flat(np.concatenate([rings[0] for rings in polygons]))
+    flat = [[plane.flat(ring) for ring in rings] for rings in polygons]
+    if any(ring is None for rings in flat for ring in rings):
+        return []
+    wider = _around([[ring for ring in rings if ring is not None] for rings in flat], margin)
+    return [[shown(plane.places(ring), center) for ring in rings] for rings in wider]

@@ -255,15 +255,26 @@ REQUESTS: dict[str, tuple[tuple[str, Any], grpc.StatusCode, str, str]] = {
         "config.circle_area",
         "center (180.0, -17.0), radius 0.0",
     ),
-    "a margin in metres": (
-        create(**ships(179.5, -17.5, -179.5, -17.5, -179.5, -16.5), margin=1),
+    "a margin of more than 250 km": (
+        create(**ships(179.5, -17.5, -179.5, -17.5, -179.5, -16.5), margin=250_001),
         INVALID,
         "config.margin",
-        "1.0",
+        "250001.0",
+    ),
+    "without self on the globe": (
+        create(subject_hull="odd/ships", hull_area={"name": "odd/ships", "without_self": True}, margin=1),
+        INVALID,
+        "config.hull_area.without_self",
+        "true",
     ),
     "no centre": (create(subject_hull="odd/ships", hull_area={"name": "odd/nowhere"}), FAILED, "", "odd/nowhere"),
     "a prefix of both": (create(subject_prefix="odd/"), FAILED, "", "odd/fleet"),
-    "a margin over a prefix": (create(subject_prefix="odd/ship", margin=1), INVALID, "config.margin", "1.0"),
+    "a wide margin over a prefix": (
+        create(subject_prefix="odd/ship", margin=3e5),
+        INVALID,
+        "config.margin",
+        "300000.0",
+    ),
     "another centre": (create(subject_hull="odd/ships", hull_area={"name": "odd/atlantic"}), FAILED, "", "odd/ships"),
     "an area of the plane": (
         create(subject_hull="odd/ships", hull_area={"name": "odd/points"}),

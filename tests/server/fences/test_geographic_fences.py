@@ -178,8 +178,8 @@ def test_fences_on_the_globe_that_cannot_be_are_refused(client, fleet, name):
         client.create_fence(f"{name}/fence", area=far, subjects=fleet)
     with pytest.raises(InvalidRequestError, match=r"has the corner \(179\.0, -91\.0\): a latitude is from -90 to 90"):
         client.create_fence(f"{name}/fence", area=nowhere, subjects=fleet)
-    with pytest.raises(InvalidRequestError, match="a fence on the globe has no margin"):
-        client.create_fence(f"{name}/fence", area=ZONE, subjects=fleet, margin=5)
+    with pytest.raises(InvalidRequestError, match=r"margin is 250001\.0: at most 250000 metres on the globe"):
+        client.create_fence(f"{name}/fence", area=ZONE, subjects=fleet, margin=250_001)
     client.create_fence(f"{name}/fence", area=ZONE, subjects=fleet)
     with pytest.raises(HullFencedError):
         client.recenter(fleet, (179, -17))
@@ -250,7 +250,7 @@ def test_a_fence_that_is_refused_gives_no_centre(client, name):
         (Polygon([(179, -91), (180, 0), (178, 1)]), {}, r"exterior is 3 corners: has the corner \(179\.0, -91\.0\)"),
         (Polygon([(0, 0), (1, 0), (179, 0)]), {}, "degrees from the centre"),
         (Polygon([(0, 0), (2, 2), (2, 0), (0, 2)]), {}, "edges 0 and 2 cross"),
-        (ZONE, {"margin": 5}, "a fence on the globe has no margin"),
+        (ZONE, {"margin": 3e5}, "at most 250000 metres on the globe"),
     ):
         with pytest.raises(InvalidRequestError, match=words):
             client.create_fence(fence, area=area, subjects=name, **options)

@@ -149,7 +149,7 @@ def test_a_fence_that_is_refused_by_one_hull_gives_no_other_one_a_centre(client,
     for area, prefix, options, error in (
         (ZONE, f"{name}/", {}, HullUnsuitableError),
         (vast, f"{name}-far/", {}, InvalidRequestError),
-        (ZONE, f"{name}-far/", {"margin": 1}, InvalidRequestError),
+        (ZONE, f"{name}-far/", {"margin": 3e5}, InvalidRequestError),
     ):
         with pytest.raises(error):
             client.create_fence(f"{name}/fence", area=area, subjects=Prefix(prefix), **options)
@@ -163,15 +163,15 @@ def test_hulls_of_one_prefix_have_frames_of_one_kind(client, name):
     client.create_hull(f"{name}/globe", keyed="str", geographic=True)
     with pytest.raises(HullUnsuitableError, match="is geographic; the hull is a plane"):
         client.create_hull(f"{name}/plane", keyed="str")
-    with pytest.raises(InvalidRequestError, match="a fence on the globe has no margin"):
-        client.replace_fence(fence, area=ZONE, subjects=Prefix(f"{name}/"), margin=1)
+    with pytest.raises(InvalidRequestError, match="at most 250000 metres on the globe"):
+        client.replace_fence(fence, area=ZONE, subjects=Prefix(f"{name}/"), margin=3e5)
     client.delete_hull(f"{name}/globe")
     client.create_hull(f"{name}/plane", keyed="str")
     with pytest.raises(HullUnsuitableError, match="is a plane; the hull is geographic"):
         client.create_hull(f"{name}/globe", keyed="str", geographic=True)
     client.delete_hull(f"{name}/plane")
-    client.replace_fence(fence, area=ZONE, subjects=Prefix(f"{name}/"), margin=1)
-    with pytest.raises(HullUnsuitableError, match="has a margin"):
+    client.replace_fence(fence, area=ZONE, subjects=Prefix(f"{name}/"), margin=3e5)
+    with pytest.raises(HullUnsuitableError, match="has a margin of more than 250000 metres"):
         client.create_hull(f"{name}/globe", keyed="str", geographic=True)
     client.create_fence(f"{name}-far", area=Polygon([(0, 0), (1000, 0), (0, 1000)]), subjects=Prefix(f"{name}-far/"))
     with pytest.raises(HullUnsuitableError, match=r"has an area that is not on the globe: .* a longitude is from -360"):

@@ -46,6 +46,7 @@ FENCES = {
     "accurate": {"area": "all/b", "subjects": "all/accurate", "by_accuracy": True, "margin": 0.5},
     "globe-accurate": {"area": Circle(13.4, 52.4, 60_000), "subjects": "all/globe", "by_accuracy": True},
     "globe": {"area": [[13, 52], [13.8, 52], [13.8, 52.7]], "subjects": "all/globe"},
+    "metres": {"area": [[13, 52], [13.8, 52], [13.8, 52.7]], "subjects": "all/globe", "margin": 20_000},
     "globes": {"area": "all/globe", "subjects": "all/globe", "boundary": "open"},
     "held": {"area": TRIANGLE, "subjects": "all/held", "initial": "events"},
     "leaving": {"area": Circle(0, 0, 8), "subjects": "all/leaving", "confirmations": 2},

@@ -8,19 +8,19 @@ import numpy as np
 from dynhull.arrays import Points
 from dynhull.convex import Cloud
 from dynhull.gjk import intersect
-from dynhull.globe import REACH, Gnomonic, distance, project_far
+from dynhull.globe import MOST_METRES, REACH, Gnomonic, distance, project_far
 
 from ...errors import HullUnsuitableError, InvalidFenceError
 from ...frames import off_globe, out_of_reach
 from ...hull import Hull
 from ...records import Center
-from ..model.config import Area, CircleArea, FenceConfig, PolygonArea, Ring
+from ..model.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea, Ring
 
 # A circle is a polygon with this many corners, every half degree of azimuth, each at the radius on WGS 84: its edges
 # are at most 1e-5 of the radius inside of the circle.
 CIRCLE_CORNERS = 720
-# Metres between places that are as far from each other as possible.
-HALF_ROUND = 20_003_931.5
+# Metres between places that are as far from each other as possible; and for each radian, at least.
+HALF_ROUND, LEAST_RADIUS = 20_003_931.5, 6_335_439
 
 PAIR = 2
 POLE, ROUND = 90, 360  # degrees
@@ -65,9 +65,11 @@ def require_centers(hulls: Sequence[Hull], rule: str, lacking: Collection[Hull] 
 
 
 def require_margin(config: FenceConfig) -> None:
-    """Raise InvalidFenceError if a fence on the globe has a margin."""
-    if config.margin:
-        raise InvalidFenceError("margin", config.margin, "a fence on the globe has no margin")  # nor without_self
+    """Raise InvalidFenceError if a fence on the globe has too wide a margin, or `without_self`."""
+    if isinstance(config.area, HullArea) and config.area.without_self:
+        raise InvalidFenceError("hull_area.without_self", "true", "is for hulls in the plane")
+    if config.margin > MOST_METRES:
+        raise InvalidFenceError("margin", config.margin, f"at most {MOST_METRES:.0f} metres on the globe")
 
 
 def lacks_center(config: FenceConfig, area: Hull | None, subjects: Hull) -> bool:
@@ -130,14 +132,15 @@ def projected(frame: Gnomonic, rings: Rings) -> list[list[Points]]:
     ]
 
 
-def laid_polygons(frame: Gnomonic, area: Area, *, anywhere: bool) -> Rings:
+def laid_polygons(frame: Gnomonic, area: Area, margin: float, *, anywhere: bool) -> Rings:
     """The polygons of a circle or polygons in the plane of a hull; ValueError if they do not fit into it.
 
     Args:
         frame: the projection of the hull.
         area: the area.
-        anywhere: whether the hull has to reach it. Otherwise an area that is surely beyond its reach has no polygons,
-            and another one has to end before the plane does.
+        margin: that of the fence, in metres.
+        anywhere: whether the hull has to reach it. Otherwise an area that, with its margin, is surely beyond its reach
+            has no polygons, and another one has to end before the plane does.
     """
     rings = rings_of(area, None)
     if not anywhere:
@@ -148,7 +151,7 @@ def laid_polygons(frame: Gnomonic, area: Area, *, anywhere: bool) -> Rings:
     places = [[project_far(frame, ring) for ring in polygon] for polygon in polygons]
     if any(np.isnan(xy).any() for flat in places for xy in flat):
         center, radius = _cap(area)
-        if frame.angle(center) - radius > REACH + SURELY:
+        if frame.angle(center) - radius > REACH + SURELY + np.degrees(margin / LEAST_RADIUS):
             return []
     for number, (polygon, flat) in enumerate(zip(polygons, places, strict=True)):
         for ring, xy in zip(polygon, flat, strict=True):

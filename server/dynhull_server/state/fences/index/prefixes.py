@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Sequence
 
+from dynhull.globe import MOST_METRES
+
 from ...errors import HullUnsuitableError, InvalidFenceError
 from ...hull import Hull
 from ...records import Center, HullSettings
@@ -43,8 +45,8 @@ def require_prefix(
 def require_admissible(fence: Fence, name: str, settings: HullSettings) -> None:
     """Raise HullUnsuitableError if a fence over the prefix of a new hull cannot compare it, whatever its centre."""
     this = settings.geographic
-    if this and fence.row.config.margin:
-        raise _unsuitable(fence, name, "has a margin, which fences on the globe do not have")
+    if this and fence.row.config.margin > MOST_METRES:
+        raise _unsuitable(fence, name, f"has a margin of more than {MOST_METRES:.0f} metres, the most on the globe")
     others = [*([] if fence.area is None else [fence.area]), *(each.hull for each in fence.subjects.values())]
     for other in others[:1]:  # they are alike
         if other.row.settings.geographic != this:

@@ -50,10 +50,10 @@ class Subjects:
 
     def __init__(self, hull: Hull) -> None:
         self.hull = hull
-        self.index = FenceIndex(indexed(hull.state))
+        self.index = FenceIndex(indexed(hull.state), frame_of(hull.state))
         self.fences: dict[int, Fence] = {}
         self.delaying: set[Fence] = set()
-        self._boundaries: dict[int, tuple[Area, Boundary]] = {}  # of areas on the globe that somebody has left
+        self._boundaries: dict[int, tuple[Area, Boundary]] = {}  # of areas on the globe, for who is far away
         self.follow_state()
 
     def follow_state(self) -> None:
@@ -111,7 +111,7 @@ class Subjects:
             fence = self.fences[number]
             config = fence.row.config if replaced is None else replaced
             hull = fence.area if replaced is None else area
-            away = (crossings.fences == number) & (distances > 0)
+            away = (crossings.fences == number) & (distances == np.inf)
             if away.any():
                 distances[away] = self._metres(number, config, hull, points[away])
         return replace(crossings, points=points, previous=before, distances=distances)
@@ -175,9 +175,12 @@ class Subjects:
         if not config.margin and not outside.any():
             return [0.0] * len(keys)
         distances: list[float]
-        if self.hull.state.center is not None:  # there are no margins
-            found = np.zeros(len(keys))
-            found[outside] = self._metres(leg.row.number, config, leg.area, points[outside])
+        frame = frame_of(self.hull.state)
+        if frame is not None:
+            found = self.index.distances(leg.row.number, frame.project_all(points))
+            away = found == np.inf
+            if away.any():
+                found[away] = self._metres(leg.row.number, config, leg.area, points[away])
             distances = found.tolist()
         elif isinstance(config.area, HullArea) and config.area.without_self:
             distances = self._distances_to_others(config, keys)
@@ -197,7 +200,7 @@ class Subjects:
         return [far.get(key, 0.0) for key in key_list(keys)]
 
     def _metres(self, number: int, config: FenceConfig, area: Hull | None, places: Points) -> npt.NDArray[np.float64]:
-        """The distances of places to the boundary of the area of a fence on the globe."""
+        """The distances of places to the area of a fence on the globe, which is farther than the index measures."""
         known, boundary = self._boundaries.get(number, (None, None))
         if boundary is None or known is not config.area or isinstance(known, HullArea):
             boundary = Boundary(chain.from_iterable(rings_of(config.area, area_vertices(config, area))))
@@ -258,7 +261,7 @@ def lay(
         polygons = checked.polygons()
         index.set_polygons(number, polygons, closed=closed, margin=margin, cross=cross, inside=inside)
     elif frame is not None:
-        rings = laid_polygons(frame, area, anywhere=config.kind == "prefix")
+        rings = laid_polygons(frame, area, margin, anywhere=config.kind == "prefix")
         if rings:
             index.set_polygons(number, rings, closed=closed, margin=margin, cross=cross, inside=inside)
         else:

@@ -54,7 +54,7 @@ def restore(subjects: Iterable[Subjects], states: Mapping[str, HullState], kept:
         if state is None:  # the hull itself stays
             each.index.detach()
             state = each.hull.state
-        index = indexes[each.hull.name] = FenceIndex(indexed(state))
+        index = indexes[each.hull.name] = FenceIndex(indexed(state), frame_of(state))
         for number, fence in each.fences.items():
             config = kept[number].row.config
             vertices = None

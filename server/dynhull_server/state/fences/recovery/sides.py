@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
 from dynhull import convex_hull, orient2d
 from dynhull.arrays import Points
-from dynhull.globe import Gnomonic, project_hull
+from dynhull.globe import Boundary, Gnomonic, project_hull
 from dynhull.keys import Keys, key_list
 from dynhull.range_search import RangeSearch
 
@@ -27,6 +28,7 @@ from ..model.records import Delay, Key
 Rows = npt.NDArray[np.intp]
 NO_ROW = -1
 CORNERS_OF_A_POLYGON = 3
+ERRORS = 2e-6  # metres: of what decides by the margin, and of what it is compared with
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +165,8 @@ def wrong_sides(found: Sides) -> Iterator[FenceFault]:
         for place in np.flatnonzero(inside == NO_ROW).tolist():
             yield FenceFault(side.fence, found.hull, _key(side.keys, place), 0, "no such key", "inside")
         inside = inside[inside != NO_ROW]
+        if frame is not None and side.config.margin:
+            may = np.union1d(must, _in_margin(side, found.contents.points, np.setdiff1d(inside, must)))
         for row in np.setdiff1d(inside, may).tolist():
             yield FenceFault(side.fence, found.hull, _key(keys, row), 0, "outside", "inside")
         for row in np.setdiff1d(must, inside).tolist():
@@ -183,7 +187,7 @@ def _wrong_delays(hull: str, side: Side, inside: set[int], rows: Mapping[Key, in
 
 
 def _allowed(search: RangeSearch, points: Points, side: Side, frame: Gnomonic | None) -> tuple[Rows, Rows]:
-    """The rows of the points that must be inside, and of those that may be."""
+    """The rows of the points that must be inside, and of those that may be; on the globe without the margin."""
     config, area = side.config, side.config.area
     if isinstance(area, HullArea) and area.without_self:
         return _of_the_others(points, config.margin)
@@ -196,13 +200,21 @@ def _allowed(search: RangeSearch, points: Points, side: Side, frame: Gnomonic | 
         if isinstance(area, CircleArea) and frame is None:
             return search.disk(area.x, area.y, area.radius, closed=config.closed, margin=margin)
         anywhere = config.kind == "prefix"
-        polygons = rings_of(area, None) if frame is None else laid_polygons(frame, area, anywhere=anywhere)
+        polygons = (
+            rings_of(area, None) if frame is None else laid_polygons(frame, area, config.margin, anywhere=anywhere)
+        )
         if not polygons:
             return np.empty(0, np.intp)
         return search.polygons(polygons, closed=config.closed, margin=margin)
 
     must = select(0.0)
-    return must, select(config.margin) if config.margin else must
+    return must, select(config.margin) if config.margin and frame is None else must
+
+
+def _in_margin(side: Side, places: Points, rows: Rows) -> Rows:
+    """Those of the rows, outside of the area, whose places are within the margin in metres, but for errors."""
+    boundary = Boundary(chain.from_iterable(rings_of(side.config.area, side.vertices)))
+    return rows[boundary.distance(places[rows]) <= side.config.margin + ERRORS]
 
 
 def _of_the_others(points: Points, margin: float) -> tuple[Rows, Rows]:
