@@ -200,7 +200,7 @@ def test_answers_are_values(client: HullClient, name: str) -> None:
 def test_answers_print_on_a_line(client: HullClient, name: str, address: str) -> None:
     shown = (
         "Snapshot(revision=1, points=2, vertices=[[0.0, 1.0]], measures=None, uid='u', "
-        "vertex_keys=None, cause='batch', clock=None, center=None, changed=None)"
+        "vertex_keys=None, cause='batch', clock=None, center=None, changed=None, erased=False)"
     )
     assert repr(Snapshot(1, 2, np.array([[0.0, 1.0]]), None, "u")) == shown
     client.apply(name, insert=[[i, i * i] for i in range(100)])

@@ -205,6 +205,7 @@ def _json(event: Event, corners: Corners | None) -> str:
         snapshot=isinstance(event, Snapshot),
         **vertices,
         changed=_changed(event),
+        **({"erased": True} if not isinstance(event, Deleted) and event.erased else {}),
         **({} if measures is None else members(measures)),
         **({} if corners is None else {"joined": corners.joined, "left": corners.left}),
     )

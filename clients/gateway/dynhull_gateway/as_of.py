@@ -1,13 +1,15 @@
 """The present of a hull, or how it was: `?at=` of reads."""
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from fastapi import Query
+import grpc
+from fastapi import Depends, Query
 
-from dynhull_client import AsyncHullClient
+from dynhull_client import AsyncHullClient, HullReplacedError
 from dynhull_surface.as_of import Present, moment_of
 
-At = Annotated[
+AtMoment = Annotated[
     str | None,
     Query(
         description="In place of the present: a revision, all digits; or a time of RFC 3339, for the last revision "
@@ -15,10 +17,41 @@ At = Annotated[
         examples=["2026-11-24T16:00:00Z"],
     ),
 ]
+AtUid = Annotated[
+    str,
+    Query(
+        max_length=200,
+        description="With `at`, the uid of the hull that is meant, to notice that another one has its name now.",
+    ),
+]
 
 
-async def as_of(client: AsyncHullClient, name: str, at: str | None) -> Any:
+@dataclass(frozen=True, slots=True)
+class AskedAt:
+    """A moment of the past of a hull; the uid is empty for any hull of the name."""
+
+    moment: str
+    uid: str
+
+
+def _asked(at: AtMoment = None, at_uid: AtUid = "") -> AskedAt | None:
+    if at is None:
+        if at_uid:
+            raise ValueError("at_uid: is given with at")
+        return None
+    return AskedAt(at, at_uid)
+
+
+At = Annotated[AskedAt | None, Depends(_asked)]
+
+
+async def as_of(client: AsyncHullClient, name: str, at: AskedAt | None) -> Any:
     """What reads a hull: as it is, or as it was."""
     if at is None:
         return Present(client, name)
-    return await client.at(name, moment_of(at))
+    past = await client.at(name, moment_of(at.moment))
+    if at.uid not in ("", past.uid):
+        problem = f"the hull {name!r} was created again, or restored from a backup: its uid is now {past.uid}"
+        metadata = {"field": "at_uid", "value": name, "uid": past.uid}
+        raise HullReplacedError(problem, grpc.StatusCode.OUT_OF_RANGE, "HULL_REPLACED", metadata)
+    return past

@@ -307,7 +307,8 @@ class Snapshot(Value, Shown):
 
     This and the other events have the cause of their revision, "batch", "expiry" or "recenter"; the hull's clock at
     that revision, None for a hull without one; the centre of a geographic hull; and when the hull `changed` last, as in
-    `HullInfo`. Keys are None unless requested.
+    `HullInfo`. In a replay `erased` says whether the hull may lack keys that it had at that revision, as in `HullInfo`.
+    Keys are None unless requested.
     """
 
     revision: int
@@ -320,6 +321,7 @@ class Snapshot(Value, Shown):
     clock: datetime | None = None
     center: tuple[float, float] | None = None
     changed: datetime | None = None
+    erased: bool = False
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
@@ -356,6 +358,7 @@ class Change(Value):
     clock: datetime | None = None
     center: tuple[float, float] | None = None
     changed: datetime | None = None
+    erased: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -377,6 +380,7 @@ class Sketch(Value):
     error: float = 0.0
     uid: str = ""
     changed: datetime | None = None
+    erased: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -389,6 +393,7 @@ class Progress:
     clock: datetime | None = None
     center: tuple[float, float] | None = None
     changed: datetime | None = None
+    erased: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -624,17 +629,17 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
     measures = decode_measures(message.measures) if message.HasField("measures") else None
     head = message.revision, message.point_count
     cause, clock, center = CAUSES.get(message.cause, BATCH), _clock(message), decode_center(message)
-    changed = _changed(message)
+    last = _changed(message), message.erased
     if message.HasField("snapshot"):
         snapshot = message.snapshot
         named = decode_names(snapshot.vertex_keys) if keys else None
         vertices = decode_points(snapshot.vertices)
-        return Snapshot(*head, vertices, measures, snapshot.uid, named, cause, clock, center, changed)
+        return Snapshot(*head, vertices, measures, snapshot.uid, named, cause, clock, center, *last)
     if message.HasField("sketch"):
         named = decode_names(message.sketch.keys) if keys else None
         sketch = message.sketch
         vertices = decode_points(sketch.vertices)
-        return Sketch(*head, vertices, measures, named, cause, clock, center, sketch.error, sketch.uid, changed)
+        return Sketch(*head, vertices, measures, named, cause, clock, center, sketch.error, sketch.uid, *last)
     if message.HasField("change"):
         change = message.change
         return Change(
@@ -651,10 +656,10 @@ def decode_event(message: hull_service_pb2.WatchResponse, *, keys: bool = False)
             cause,
             clock,
             center,
-            changed,
+            *last,
         )
     if message.HasField("progress"):
-        return Progress(*head, cause, clock, center, changed)
+        return Progress(*head, cause, clock, center, *last)
     return None
 
 

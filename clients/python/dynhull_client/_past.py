@@ -70,6 +70,7 @@ class AsOf:
         revision: the revision.
         time: when it was committed; of revision 0, when the hull was created; None where that is not known.
         erased: whether the hull may lack keys that it had then, because `erase_history` has erased them.
+        uid: the uid of the hull.
     """
 
     def __init__(self, connection: Any, info: HullInfo) -> None:
@@ -78,7 +79,7 @@ class AsOf:
         self.revision = info.revision
         self.time = info.changed
         self.erased = info.erased
-        self._uid = info.uid
+        self.uid = info.uid
 
     def __repr__(self) -> str:
         return f"<{self.name} at revision {self.revision}{'' if self.time is None else f', {self.time.isoformat()}'}>"
@@ -91,7 +92,7 @@ class AsOf:
         """A call, asked about this revision."""
         request: Any = call.request
         request.at_revision = self.revision
-        request.at_uid = self._uid
+        request.at_uid = self.uid
         return call
 
 

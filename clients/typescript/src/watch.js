@@ -21,6 +21,7 @@ import { fromWire } from "./json.js"
  * @property {Point | null} center of a geographic hull
  * @property {Measures | null} measures with `measures: true`
  * @property {bigint | null} changed when its newest batch was committed, in microseconds since 1970
+ * @property {boolean} [erased] in a replay, whether the hull may lack keys that it had then, since they were erased
  * @property {number | null} error with `maxVertices`, by how far the hull reaches beyond these vertices
  *
  * @typedef {object} Change the difference to the event before
@@ -40,6 +41,7 @@ import { fromWire } from "./json.js"
  * @property {bigint | null} clock
  * @property {Point | null} center
  * @property {bigint | null} changed
+ * @property {boolean} [erased]
  *
  * @typedef {object} Progress a later revision with the same vertices
  * @property {"progress"} type
@@ -49,6 +51,7 @@ import { fromWire } from "./json.js"
  * @property {bigint | null} clock
  * @property {Point | null} center
  * @property {bigint | null} changed
+ * @property {boolean} [erased]
  *
  * @typedef {object} Deleted the hull was deleted; if it is created again, a snapshot follows
  * @property {"deleted"} type
@@ -138,7 +141,7 @@ import { fromWire } from "./json.js"
  */
 
 /** What events leave out. */
-const ABSENT = { vertexKeys: null, center: null, measures: null, changed: null, error: null, clock: null }
+const ABSENT = { vertexKeys: null, center: null, measures: null, changed: null, error: null, clock: null, erased: false }
 const UNCHANGED = { addedKeys: null, renamedRows: null, renamedKeys: null }
 
 /**

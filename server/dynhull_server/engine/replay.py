@@ -109,6 +109,10 @@ class ReplayedHull(LiveHull):
         """The number of its vertices."""
         return self._state.vertex_count
 
+    def erased_at(self, revision: int) -> bool:
+        """Whether it may lack keys at a revision that were erased from its past."""
+        return any(each.concerns(revision) for each in self._erasures)
+
     async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
         """Call `function` with the state at that revision."""
         await self.reached(min_revision)

@@ -59,6 +59,7 @@ class Replays:
             async def encoded(event: Event) -> pb.ReplayResponse:
                 message = await encode.encode_watched(event, encoding, self._aside, measure)
                 encode.encode_changed(hull, message)
+                message.erased = hull.erased_at(message.revision)
                 return pb.ReplayResponse(event=message)
 
             await send_each(call, events, encoded, self._max_lag)

@@ -71,7 +71,11 @@ def test_a_key_is_erased_from_what_can_be_read_of_the_past(tmp_path):
         copy, past = HullCopy(), client.at("fleet", 30)
         for event in client.replay("fleet", 12, 30, copy=copy):
             revision = event.revision
+            assert event.erased
         assert revision == 30
+        events = {event.revision: event.erased for event in client.replay("fleet", 30)}
+        assert events == {revision: client.at("fleet", revision).erased for revision in events}
+        assert set(events.values()) == {True, False}
         np.testing.assert_array_equal(copy.vertices, past.get_hull().vertices)
         with grpc.insecure_channel(server.address) as channel:  # who had the key in its copy does not go on with that
             request = pb.ReplayRequest(name="fleet")

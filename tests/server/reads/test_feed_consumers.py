@@ -278,9 +278,15 @@ def test_http_has_consumers(served, client, fleet):
         second = gateway.get(f"/feed/consumers?after={first['next']}", **past).json
         assert [each["prefix"] for each in (*first["consumers"], *second["consumers"])] == ["mine/", None]
         assert second["next"] is None
+        uid = client.get_hull(fleet).info.uid
+        assert gateway.get(f"/hulls/mine%2Ffleet?at=2&at_uid={uid}", **past).status == 200
         client.delete_hull(fleet)
         client.create_hull(fleet)
         client.apply(fleet, insert=[(7, 7)])
+        assert gateway.get("/hulls/mine%2Ffleet?at=1", **past).status == 200
+        replaced = gateway.get(f"/hulls/mine%2Ffleet?at=1&at_uid={uid}", **past).json
+        assert (replaced["reason"], replaced["field"]) == ("HULL_REPLACED", "at_uid")
+        assert gateway.get(f"/hulls/mine%2Ffleet?at_uid={uid}", **past).status == 400
         events = Events(gateway, f"{of_hull}?consumer=page", **past)
         kinds = [each.get("event") for each in islice(iter(events), 3)]
         assert kinds == ["replaced", None, "batch"]

@@ -29,6 +29,9 @@ class HullSnapshot(HullEvent):
     center: Place | None = Field(description="Of a hull on the globe, longitude and latitude of its centre.")
     measures: Measures | None = Field(None, description="With measures=true.")
     changed: str | None = Field(None, description=CHANGED)
+    erased: bool = Field(
+        False, description="In a replay, whether the hull may lack keys that it had then, since they were erased."
+    )
     error: float | None = Field(
         None,
         description="With max_vertices, the distance by which the hull reaches beyond the vertices, rounded up; "
@@ -58,6 +61,7 @@ class HullChange(HullEvent):
     clock: str | None = Field(None, description="The clock of a hull with a window.")
     center: Place | None = Field(None, description="Of a hull on the globe whose centre has moved.")
     changed: str | None = Field(None, description=CHANGED)
+    erased: bool = Field(False, description="As in a snapshot.")
 
 
 class HullProgress(HullEvent):
@@ -68,6 +72,7 @@ class HullProgress(HullEvent):
     clock: str | None = Field(None, description="As in a change.")
     center: Place | None = Field(None, description="As in a change.")
     changed: str | None = Field(None, description="As in a change.")
+    erased: bool = Field(False, description="As in a snapshot.")
 
 
 @answering(dynhull_client.FenceEvent, SENT, partial=True)

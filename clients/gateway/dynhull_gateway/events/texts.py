@@ -54,6 +54,7 @@ class HullTexts:
         self._view = view
         self._measures: Measures | None = None
         self._changed: datetime | None = None
+        self._erased = False
         self._error: float | None = None  # how far the hull reaches beyond the vertices of a sketch
         self._snapshot: bytes | None = None
 
@@ -67,7 +68,7 @@ class HullTexts:
             self._error = event.error
             event = _whole_sketch(event)
             self.copy.update(event)
-        self._changed = event.changed
+        self._changed, self._erased = event.changed, event.erased
         if not isinstance(event, Progress):
             self._measures = event.measures
         if isinstance(event, Snapshot) or (self._view.form != "changes" and not isinstance(event, Progress)):
@@ -92,6 +93,8 @@ class HullTexts:
             head["measures"] = shown(self._measures)
         if self._changed is not None:
             head["changed"] = self._changed
+        if self._erased:
+            head["erased"] = True
         if self._error is not None:
             head["error"] = self._error
         if self._view.form == "geojson":
@@ -104,13 +107,13 @@ class HullTexts:
 def shown(value: Any) -> dict[str, Any]:
     """A value of the SDK as JSON has it, without what is not there."""
     named = {name: getattr(value, name) for name in value.__dataclass_fields__}
-    return {name: _plain(each) for name, each in named.items() if each is not None}
+    return {name: _plain(each) for name, each in named.items() if each is not None and each is not False}
 
 
 def _whole_sketch(sketch: Sketch) -> Snapshot:
     """A sketch as the snapshot of a hull that has only these vertices."""
     head = sketch.revision, sketch.points, sketch.vertices, sketch.measures
-    return Snapshot(*head, vertex_keys=sketch.keys, center=sketch.center, changed=sketch.changed)
+    return Snapshot(*head, vertex_keys=sketch.keys, center=sketch.center, changed=sketch.changed, erased=sketch.erased)
 
 
 def _plain(value: Any) -> Any:
