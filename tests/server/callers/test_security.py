@@ -273,14 +273,22 @@ def test_tokens_are_read_again_when_they_change(tmp_path: Path) -> None:
 
 
 def test_a_new_token_and_its_entry(tmp_path: Path) -> None:
-    made = dynhull("token", "--name", "x", "--read", "", "--write", "fleet/")
+    useless = dynhull("token", "--read", "fleet/", "--past", "port/")
+    assert useless.exit_code != 0
+    assert "of no use without --read port/" in useless.stderr
+    made = dynhull("token", "--name", "x", "--read", "", "--write", "fleet/", "--past", "fleet/a")
     assert made.exit_code == 0
     tokens = tmp_path / "tokens.toml"
     tokens.write_text(made.stdout)
     token = made.stderr.removeprefix("token: ").strip()
-    options = ("--tokens", str(tokens), "--log-level", "error")
+    options = ("--tokens", str(tokens), "--log-level", "error", "--data", str(tmp_path / "data"))
     with server_process(*options) as server, HullClient(server.address, token=token) as client:
-        client.create_hull("fleet/a")
+        for name in ("fleet/a", "fleet/b"):
+            client.create_hull(name)
+            assert client.history(name).last_revision == 0  # how much is kept is no past
+        assert client.at("fleet/a", 0).revision == 0
+        with pytest.raises(PermissionDeniedError, match="read the past of"):
+            client.at("fleet/b", 0)
         with pytest.raises(PermissionDeniedError):
             client.create_hull("plane")
 
