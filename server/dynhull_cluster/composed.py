@@ -215,14 +215,20 @@ def _names_of_fence(max_corners: int, request: Any) -> Iterable[tuple[str, str]]
     """The names of a fence and of its hulls. A prefix has to have a whole first part."""
     config = decode_fence(request, max_corners)
     yield "name", decode_fence_name(request.name)
-    if config.kind == "prefix" and "/" not in config.subjects:
-        raise decode.InvalidFieldError("config.subject_prefix", config.subjects, PREFIX_PROBLEM)
+    _require_whole_part(config)
     yield from _hulls_of(request, config)
 
 
 def _names_of_past_fence(max_corners: int, request: Any) -> Iterable[tuple[str, str]]:
-    """The names of the hulls of a fence after the fact."""
-    return _hulls_of(request, decode_fence(request, max_corners))
+    """The names of the hulls of a fence after the fact. A prefix has to have a whole first part."""
+    config = decode_fence(request, max_corners)
+    _require_whole_part(config)
+    return _hulls_of(request, config)
+
+
+def _require_whole_part(config: FenceConfig) -> None:
+    if config.kind == "prefix" and "/" not in config.subjects:
+        raise decode.InvalidFieldError("config.subject_prefix", config.subjects, PREFIX_PROBLEM)
 
 
 def _hulls_of(request: Any, config: FenceConfig) -> Iterable[tuple[str, str]]:

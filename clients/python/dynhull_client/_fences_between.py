@@ -70,7 +70,8 @@ def fence_events_between(  # noqa: D417  # the settings have their descriptions
 
     Args:
         area: as for `create_fence`; a hull is the area as it was at each moment.
-        subjects: the keyed hull whose keys are compared,
+        subjects: the keyed hull whose keys are compared, or a `Prefix` of those that there are; then start and end are
+            times,
         start: where the fence begins, with what it says about subjects that are inside then: a revision of the hull of
             the subjects; or a time, a datetime with a time zone or such a text of ISO 8601, which stands for the last
             revision committed at or before it. None for the oldest one that the server keeps.

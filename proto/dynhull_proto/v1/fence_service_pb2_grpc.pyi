@@ -79,7 +79,10 @@ class FenceServiceStub:
     one with the first to the other, and so on.
 
     OUT_OF_RANGE with REVISION_FORGOTTEN if the server does not keep a part of that past, or it has not come.
-    FAILED_PRECONDITION for hulls over shards, for a subject_prefix, and where a geographic hull was recentred meanwhile.
+    FAILED_PRECONDITION for hulls over shards, and where a geographic hull was recentred meanwhile.
+
+    With a subject_prefix, of the hulls that there are now: those that were created after the start are empty before. Then it
+    begins and ends at times.
     """
 
 @_typing.type_check_only
@@ -133,7 +136,10 @@ class FenceServiceAsyncStub(FenceServiceStub):
     one with the first to the other, and so on.
 
     OUT_OF_RANGE with REVISION_FORGOTTEN if the server does not keep a part of that past, or it has not come.
-    FAILED_PRECONDITION for hulls over shards, for a subject_prefix, and where a geographic hull was recentred meanwhile.
+    FAILED_PRECONDITION for hulls over shards, and where a geographic hull was recentred meanwhile.
+
+    With a subject_prefix, of the hulls that there are now: those that were created after the start are empty before. Then it
+    begins and ends at times.
     """
 
 class FenceServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -244,7 +250,10 @@ class FenceServiceServicer(metaclass=_abc_1.ABCMeta):
         one with the first to the other, and so on.
 
         OUT_OF_RANGE with REVISION_FORGOTTEN if the server does not keep a part of that past, or it has not come.
-        FAILED_PRECONDITION for hulls over shards, for a subject_prefix, and where a geographic hull was recentred meanwhile.
+        FAILED_PRECONDITION for hulls over shards, and where a geographic hull was recentred meanwhile.
+
+        With a subject_prefix, of the hulls that there are now: those that were created after the start are empty before. Then it
+        begins and ends at times.
         """
 
 def add_FenceServiceServicer_to_server(servicer: FenceServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -283,7 +283,8 @@ class PastHulls:
         """Raise LimitExceededError, which says why, if hulls that one reader has have too many points together."""
         points = sum(hull.state.counts.points for hull in hulls)
         if points > self._max_rows:
-            which = " and ".join(f"{hull.name!r} at revision {hull.state.counts.revision}" for hull in hulls)
+            named = [f"{hull.name!r} at revision {hull.state.counts.revision}" for hull in hulls[:2]]
+            which = " and ".join([*named, *([f"{len(hulls) - 2} others"] if len(hulls) > 2 else [])])
             raise LimitExceededError("max_past_rows", self._max_rows, f"{points} points of {which}")
 
     def _require_room(self, rows: int) -> None:

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import AsyncGenerator, Callable, Iterator, Set
 from functools import partial
+from heapq import heapify, heappop, heappush
 from typing import TypeVar
 
 from ..state.contents.live import AnyKeyedHull
@@ -26,6 +27,9 @@ T = TypeVar("T")
 
 # Rows of batches that one step applies, about: some milliseconds.
 STEP_ROWS = 4096
+
+# Hulls of which the points are counted after each commit; those of more hulls at the beginning of a step.
+FEW_HULLS = 2
 
 # A moment as it is asked for: a revision of the hull of the subjects; or None, and a time in microseconds since 1970.
 When = tuple[int | None, int]
@@ -129,6 +133,8 @@ class _Run:
         self._leads = leads
         self._sieve = fence.sieve() if len(batches) == 1 else None
         self._following: Iterator[int] = iter(())
+        # The commits that come next, each with the place of a hull that it has changed.
+        self._coming: list[tuple[int, int]] | None = None
         self.over = False
 
     def step(self) -> list[FenceEvent]:
@@ -136,28 +142,46 @@ class _Run:
         fence, rows, made = self._fence, 0, self._fence.take()
         hulls = [each.hull for each in self._batches]
         while rows < STEP_ROWS and len(made) < EVENTS_TOGETHER:
-            self._pasts.require_room(hulls)
+            if len(hulls) <= FEW_HULLS or not rows:
+                self._pasts.require_room(hulls)
             followed = self._follow()
             if followed:
                 rows += followed
                 made += fence.take()
                 continue
-            coming = [(first.number, each) for each in self._batches if (first := each.commit()) is not None]
-            if not coming or (self._leads and self._batches[0].commit() is None):
+            time, commit = self._next()
+            if not commit:
                 if self._until is not None:
                     fence.pass_time(self._until)
                 self.over = True
                 return made + fence.take()
-            number = min(number for number, _ in coming)
-            commit: dict[Hull, list[Record]] = {}
-            for each in (each for its, each in coming if its == number):
-                time = _take(each, number, commit.setdefault(each.hull, []))
             fence.pass_time(time)
             for change in changes_of(commit):
                 fence.repeat(change, time)
             rows += sum(1 + len(record.rows) for records in commit.values() for record in records)
             made += fence.take()
         return made
+
+    def _next(self) -> tuple[int, dict[Hull, list[Record]]]:
+        """The next commit: its time, and the batches of each hull, in the order of these; none after the last."""
+        if self._coming is None or self._sieve is not None:
+            self._coming = [
+                (first.number, place)
+                for place, each in enumerate(self._batches)
+                if (first := each.commit()) is not None
+            ]
+            heapify(self._coming)
+        coming, found, time = self._coming, dict[Hull, list[Record]](), 0
+        if not coming or (self._leads and self._batches[0].commit() is None):
+            return time, found
+        number, _ = coming[0]
+        while coming and coming[0][0] == number:
+            _, place = heappop(coming)
+            each = self._batches[place]
+            time = _take(each, number, found.setdefault(each.hull, []))
+            if (following := each.commit()) is not None:
+                heappush(coming, (following.number, place))
+        return time, found
 
     def _follow(self) -> int:
         """Follow what was sifted, or sift what comes next. Returns the rows applied; 0 where each batch has to be."""
@@ -224,8 +248,7 @@ class PastFences:
 
     async def _begin(self, config: FenceConfig, start: When | None, end: When | None) -> tuple[_Run, list[Hull]]:
         if config.kind == "prefix":
-            reason = "is a prefix, and a fence after the fact compares one hull"
-            raise HullUnsuitableError(config.subjects, reason, field="config.subject_prefix")
+            return await self._begin_many(config, start, end)
         names = dict.fromkeys((config.subjects, config.area_hull or config.subjects))
         hulls = [self._driver.core.get(name) for name in names]
         checked = await self._fences.checked(config)
@@ -246,6 +269,51 @@ class PastFences:
             return _Run(self._pasts, fence, batches, until, leads=leads)
 
         return await self._pasts.ask(config.subjects, begin), hulls
+
+    async def _begin_many(self, config: FenceConfig, start: When | None, end: When | None) -> tuple[_Run, list[Hull]]:
+        """A fence over the hulls with a prefix that there are. One that came later is empty at the beginning."""
+        for field, when in (("start", start), ("end", end)):
+            if when is not None and when[0] is not None:
+                reason = "is a prefix, whose hulls have revisions of their own: give a time"
+                raise HullUnsuitableError(config.subjects, reason, field=f"{field}_revision")
+        compared = self._compared(config)
+        area = None if config.area_hull is None else self._driver.core.get(config.area_hull)
+        hulls = list(dict.fromkeys([*compared, *([] if area is None else [area])]))
+        checked = await self._fences.checked(config)
+        lasts, until = await self._end(hulls, end)
+        oldest = [
+            await self._pasts.ask(hull.name, partial(self._past.oldest_moment, hull.row.number, timed=True))
+            for hull in hulls
+        ]
+        times = [0 if each.committed is None else each.committed.time for each in oldest]
+        whole = [each.revision == 0 and hull is not area for hull, each in zip(hulls, oldest, strict=True)]
+        began = start[1] if start is not None else _oldest_of_many(times, whole)
+        own: list[_ReadHull] = []
+        for hull, time, is_whole in zip(hulls, times, whole, strict=True):
+            came_later = is_whole and time > began
+            moment = Moment(0, None) if came_later else await self._moment(hull, (None, began), "start")
+            own.append(await self._as_of(hull, moment))
+            self._pasts.require_room(own)
+        batches = [
+            _Batches(self._past, hull, max(last, hull.counts.revision)) for hull, last in zip(own, lasts, strict=True)
+        ]
+
+        def begin() -> _Run:
+            return _Run(self._pasts, PastFence(config, own, began, checked), batches, until, leads=False)
+
+        return await self._pasts.ask(config.subjects, begin), hulls
+
+    def _compared(self, config: FenceConfig) -> list[Hull]:
+        """The keyed hulls with the prefix of a fence, by name."""
+        prefix, hulls = config.subjects, self._driver.core.hulls
+        found = [hulls[name] for name in hulls.irange(prefix, f"{prefix}\U0010ffff")]
+        for hull in found:
+            if hull.divided:
+                raise HullUnsuitableError(hull.name, "is divided among shards, which no fence compares")
+        keyed = [hull for hull in found if hull.row.settings.identity != "multiset"]
+        if not keyed:
+            raise HullUnsuitableError(prefix, "is a prefix of no keyed hull", field="config.subject_prefix")
+        return keyed
 
     async def _start(self, hulls: list[Hull], start: When | None) -> tuple[int | None, list[_ReadHull]]:
         """The time at which it begins, and the hulls as they were then.
@@ -270,13 +338,20 @@ class PastFences:
     async def _end(self, hulls: list[Hull], end: When | None) -> tuple[list[int], int | None]:
         """The last revision that counts of each hull, and the time that passes after it; None for none."""
         if end is not None and end[0] is None:
-            return [(await self._moment(hull, end, "end")).revision for hull in hulls], end[1]
+            return [await self._last(hull, end) for hull in hulls], end[1]
         now = self._driver.commit_time()
         await self._driver.settled()
         newest = [hull.counts.revision for hull in hulls]
         if end is None:
             return newest, now
         return [(await self._moment(hulls[0], end, "end")).revision, *newest[1:]], None
+
+    async def _last(self, hull: Hull, end: When) -> int:
+        """The last revision of a hull at a time; 0 if it came later."""
+        oldest: Moment = await self._pasts.ask(hull.name, partial(self._past.oldest_moment, hull.row.number))
+        if oldest.revision == 0 and oldest.committed is not None and oldest.committed.time > end[1]:
+            return 0
+        return (await self._moment(hull, end, "end")).revision
 
     async def _oldest(self, hulls: list[Hull]) -> When:
         """The oldest moment at which all hulls are kept."""
@@ -293,6 +368,12 @@ class PastFences:
 
     async def _as_of(self, hull: Hull, moment: Moment) -> _ReadHull:
         return _ReadHull(hull.row, *await self._pasts.own(hull, moment.revision))
+
+
+def _oldest_of_many(times: list[int], whole: list[bool]) -> int:
+    """The oldest moment at which nothing is missing: that of the first hull, unless a past begins later."""
+    begun = [time for time, is_whole in zip(times, whole, strict=True) if not is_whole]
+    return max(begun) if begun else min(times)
 
 
 def _commit_of(hull: Hull) -> CommitStamp:

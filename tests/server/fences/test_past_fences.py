@@ -179,7 +179,11 @@ def test_what_cannot_be_is_refused_by_name(client):
 
     with pytest.raises(HullNotFoundError):
         asked(TRIANGLE, "nobody")
-    with pytest.raises(HullUnsuitableError, match="is a prefix"):
+    with pytest.raises(HullUnsuitableError, match="revisions of their own: give a time"):
+        asked(TRIANGLE, Prefix("all/"), start=1)
+    with pytest.raises(HullUnsuitableError, match="is a prefix of no keyed hull"):
+        asked(TRIANGLE, Prefix("nobody/"))
+    with pytest.raises(HullUnsuitableError, match="geographic"):
         asked(TRIANGLE, Prefix("all/"))
     with pytest.raises(RevisionForgottenError, match="the newest"):
         asked(TRIANGLE, "all/a", start=10**6)
@@ -192,6 +196,52 @@ def test_what_cannot_be_is_refused_by_name(client):
         asked(TRIANGLE, "all/a", start=client.at("all/a", 5).time, end=1)
     with pytest.raises(InvalidRequestError, match="edges 0 and 2 cross"):
         asked([[0, 0], [1, 1], [1, 0], [0, 1]], "all/a")
+
+
+OVER_MANY = {
+    "polygon": {"area": TRIANGLE, "crosses": True, "initial": "events"},
+    "one-of-them": {"area": "over/a", "margin": 1.0},
+    "another": {"area": "all/a", "boundary": "open"},
+    "confirmed": {"area": Circle(0, 0, 7), "confirmations": 2, "initial": "none"},
+}
+
+
+def test_a_prefix_has_the_events_of_its_hulls_and_of_those_that_came_later(client):
+    """Keys go from hull to hull in batches over both, and some hulls are there before the fences, some after."""
+    rng = random.Random(7)
+    client.create_hull("over/plain")
+    hulls = ["over/a", "over/b"]
+    for name in hulls:
+        client.create_hull(name, keyed="str")
+        client.put(name, KEYS[:8], [(rng.randint(-10, 10), rng.randint(-10, 10)) for _ in range(8)])
+    for name, settings in OVER_MANY.items():
+        client.create_fence(f"over/{name}", subjects=Prefix("over/"), **settings)
+    for number in range(90):
+        if number in (30, 60):
+            hulls.append(f"over/later-{number}")
+            client.create_hull(hulls[-1], keyed="str")
+        keys = rng.sample(KEYS, rng.randint(1, 4))
+        points = [(rng.randint(-10, 10), rng.randint(-10, 10)) for _ in keys]
+        first, second = rng.sample(hulls, 2)
+        if rng.random() < 0.4:
+            client.transfer({first: Batch(keys=keys, points=points), second: Batch(remove=keys, missing="count")})
+        else:
+            client.put(rng.choice([first, "all/a"]), keys, points)
+    newest = max(client.at(name, client.get_hull(name).info.revision).time for name in [*hulls, "all/a"])
+    found: set[str] = set()
+    for name, settings in OVER_MANY.items():
+        fence = client.get_fence(f"over/{name}")
+        given = settings | {"subjects": Prefix("over/"), "start": fence.created, "end": newest}
+        past = list(client.fence_events_between(**given, timeout=PATIENCE))
+        assert [plain(each) for each in past] == [plain(each) for each in live_events(client, fence.name)], name
+        assert len(past) > 5
+        found |= {each.hull for each in past}
+        client.delete_fence(fence.name)
+    assert found >= set(hulls)
+    oldest = list(client.fence_events_between(TRIANGLE, Prefix("over/"), initial="none"))
+    assert len(oldest) > 20
+    for name in [*hulls, "over/plain"]:
+        client.delete_hull(name)
 
 
 @pytest.fixture(scope="module")
