@@ -51,6 +51,7 @@ NAMES: Mapping[str, Name] = {
     "config.subject_hull": Name(("subjects",)),
     "config.subject_prefix": Name(argument="subjects"),
     "config.other_hull": Name(),
+    "config.expected": Name(row="key"),
     "rule": Name((), ""),
     "rule.hull": Name(),
     "rule.prefix": Name(),

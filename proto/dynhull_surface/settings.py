@@ -108,6 +108,7 @@ class FenceSettings:
     area: Any
     subjects: Any
     other_hull: str | None
+    expected: Any
     boundary: Boundary = setting(
         "closed", "boundary", "Whether a subject on the boundary is inside (closed) or outside (open)."
     )
@@ -153,6 +154,17 @@ class FenceSettings:
         "by_accuracy",
         "Whether a subject whose position has an accuracy enters or leaves only once it is on the other side by more "
         "than that.",
+    )
+    expected_by: str | None = setting(
+        None,
+        "expected_by",
+        "With `expected`: time of day by which these keys should be inside, a time zone and perhaps days, as in "
+        '"18:00 Europe/Berlin mon-fri". Each that is not makes an event.',
+    )
+    expected_within: timedelta | None = setting(
+        None,
+        "expected_within",
+        "With `expected`: time after which one of these keys that is outside makes an event.",
     )
     near: float = setting(
         0.0, "near_distance", "With `other_hull`: the hulls are near while their distance is at most this.", least=0

@@ -22,6 +22,7 @@ OWN = {
     "area",
     "subjects",
     "other_hull",
+    "expected",
     "quarantine",
     "history",
     "history_bytes",
@@ -35,6 +36,7 @@ KINDS = {
     int: "int",
     float: "float",
     bool: "bool",
+    str: "str",
     surface.Ahead: "Ahead",
     surface.Boundary: "Boundary",
     surface.Clock: "Clock",
@@ -72,6 +74,7 @@ WITHOUT_SETTING = {
     "polygon_area",
     "circle_area",
     "hull_area.name",
+    "expected",
     "quarantine",
     "history",
 }

@@ -30,6 +30,8 @@ EVENTS = {
     "exit": "{} left",
     "cross": "{} passed through",
     "dwell": "{} stayed",
+    "missing": "{} is missing",
+    "arrived": "{} arrived late",
     "transfer": "{} changed hulls",
 }
 

@@ -720,6 +720,9 @@ class FenceSettings(Request):
         None, description="or a prefix of the names of several,"
     )
     other_hull: Name | None = Field(None, description="or a hull that is compared as a whole.")
+    expected: Annotated[list[Key], Field(min_length=1, max_length=10_000)] | None = Field(
+        None, description="Keys that should be inside by `expected_by` or `expected_within`."
+    )
 
 
 @with_settings(surface.FenceSettings, at_creation=True)

@@ -14,6 +14,8 @@ from .numbers import Number, Point, Seconds
 Body = TypeVar("Body", bound=BaseModel)
 IN_SECONDS = "In seconds."
 
+LONGEST_TEXT = 200
+
 
 def with_settings(settings: type, *, at_creation: bool = False) -> Callable[[type[Body]], type[Body]]:
     """A body that also has a field for each described setting: those of a creation, or the others."""
@@ -50,6 +52,8 @@ def _kind(setting: Setting) -> Any:
         return StrictBool
     if setting.kind is timedelta:
         return Seconds
+    if setting.kind is str:
+        return Annotated[str, Field(strict=True, max_length=LONGEST_TEXT)]
     if setting.kind is int:
         return Annotated[int, Field(strict=True, ge=setting.least, le=setting.greatest)]
     if setting.kind is float:

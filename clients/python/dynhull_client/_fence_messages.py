@@ -18,6 +18,8 @@ EventType = Literal[
     "exit",
     "cross",
     "dwell",
+    "missing",
+    "arrived",
     "transfer",
     "begin",
     "cease",
@@ -77,6 +79,7 @@ class Fence(FenceSettings):
         area: the name of a hull, a `Circle`, or a tuple of `Polygon`.
         subjects: the name of a keyed hull, or a `Prefix`; None for a fence around another hull.
         other_hull: the hull that is compared as a whole; None for a fence around keys.
+        expected: the keys that should be inside; None for none.
         SETTINGS
         created: when it was created.
         uid: differs from that of an earlier or later fence of the same name.
@@ -89,6 +92,7 @@ class Fence(FenceSettings):
 
     area: Area
     subjects: str | Prefix | None
+    expected: KeyTuple | None
     created: datetime
     uid: str
     last_sequence: int
@@ -124,12 +128,12 @@ class FenceEvent:
 
     Attributes:
         type: what happened. "enter" and "exit" of a subject, which alternate; "cross": it passed through the area
-            between two positions outside; "dwell": it has been inside for the configured time; "transfer": it was
-            inside as a key of `previous_hull` and is inside as a key of `hull`;
-            "begin" and "cease": two hulls intersect or are near, or no longer; "snapshot": the subjects that were
-            inside at first; "closed": the fence was deleted. "lost": events were dropped before they could be sent;
-            "progress": nothing has happened for a while. "unknown": a type that this version of the client does not
-            know.
+            between two positions outside; "dwell": it has been inside for the configured time; "missing": a key that
+            should be inside is not at its deadline; "arrived": it is inside after all; "transfer": it was inside as a
+            key of `previous_hull` and is inside as a key of `hull`; "begin" and "cease": two hulls intersect or are
+            near, or no longer; "snapshot": the subjects that were inside at first; "closed": the fence was deleted.
+            "lost": events were dropped before they could be sent; "progress": nothing has happened for a while.
+            "unknown": a type that this version of the client does not know.
         sequence: counted per fence from 1, without gaps; of "lost" and "progress", the sequence that they lead to.
         fence: the name of the fence.
         uid: the uid of the fence; with `sequence` it identifies the event.
@@ -146,7 +150,8 @@ class FenceEvent:
         time: when the server made the event; None for "lost" and "progress".
         first_time: with `confirmations` or `min_dwell`, when the subject changed its side; with `by_accuracy` alone,
             since when its position has been on this side, if it was not certain at once; of "dwell", since when it has
-            been inside; None otherwise.
+            been inside; of "missing" by an age, since when it is outside; of "arrived", when it was missing; None
+            otherwise.
         inside: of "snapshot" and "closed", the subjects that were inside, by hull.
         first: of "lost", the first sequence that was dropped; 0 otherwise.
         last: of "lost", the last sequence that was dropped; 0 otherwise.
@@ -192,6 +197,7 @@ def decode_fence(message: fence_pb2.Fence) -> Fence:
         area=decode_area(config),
         subjects=_subjects(config),
         other_hull=config.other_hull if config.HasField("other_hull") else None,
+        expected=decode_names(config.expected) if config.HasField("expected") else None,
         **decode_settings(FenceSettings, config),
         created=decode_time(message.create_time),
         uid=message.uid,

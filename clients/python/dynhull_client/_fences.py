@@ -24,6 +24,7 @@ from ._fence_messages import (
     decode_fence,
     decode_inside,
 )
+from ._keys import checked_keys, encode_keys
 from ._numbered_place import encode_start
 from ._settings import SPAN, documenting_settings, encode_settings
 
@@ -51,6 +52,9 @@ def create_fence(  # noqa: D417  # the settings have their descriptions
     confirmations: int = 0,
     min_dwell: float | timedelta | None = None,
     by_accuracy: bool = False,
+    expected: Any = None,
+    expected_by: str | None = None,
+    expected_within: float | timedelta | None = None,
     near: float = 0.0,
     without_self: bool = False,
     layer: int = 1,
@@ -72,6 +76,7 @@ def create_fence(  # noqa: D417  # the settings have their descriptions
             or a `Circle`.
         subjects: the keyed hull whose keys are compared; or a `Prefix` for all keyed hulls with such names,
         other_hull: or a hull that is compared as a whole, with an area that is a hull.
+        expected: keys that should be inside by `expected_by` or `expected_within`, as for `put`; None for none.
         SETTINGS
         exist_ok: whether to return an existing fence of that name and with these settings. FenceExistsError if it has
             others, or without `exist_ok`.
@@ -110,6 +115,9 @@ def replace_fence(
     confirmations: int = 0,
     min_dwell: float | timedelta | None = None,
     by_accuracy: bool = False,
+    expected: Any = None,
+    expected_by: str | None = None,
+    expected_within: float | timedelta | None = None,
     near: float = 0.0,
     without_self: bool = False,
     layer: int = 1,
@@ -252,6 +260,8 @@ def encode_fence(given: dict[str, Any]) -> fence_pb2.FenceConfig:
     if given["confirmations"] == 1:  # each report agrees with itself
         given["confirmations"] = 0
     encode_settings(FenceSettings, given, config)
+    if given["expected"] is not None:
+        config.expected.CopyFrom(encode_keys(checked_keys(given["expected"], "expected")))
     if isinstance(subjects, Prefix):
         config.subject_prefix = text("subjects", subjects.text)
     elif subjects is not None:

@@ -49,6 +49,9 @@ def fence_events_between(  # noqa: D417  # the settings have their descriptions
     confirmations: int = 0,
     min_dwell: float | timedelta | None = None,
     by_accuracy: bool = False,
+    expected: Any = None,
+    expected_by: str | None = None,
+    expected_within: float | timedelta | None = None,
     near: float = 0.0,
     without_self: bool = False,
     layer: int = 1,
@@ -77,6 +80,7 @@ def fence_events_between(  # noqa: D417  # the settings have their descriptions
             revision committed at or before it. None for the oldest one that the server keeps.
         end: the last revision, or the last time, that counts; None for all that is committed.
         other_hull: or a hull that is compared as a whole, with an area that is a hull.
+        expected: keys that should be inside by `expected_by` or `expected_within`, as for `put`; None for none.
         SETTINGS
         timeout: seconds after which the stream ends with DeadlineError; None for never.
     """

@@ -37,6 +37,8 @@ class FenceEventType(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     FENCE_EVENT_TYPE_SNAPSHOT: _ClassVar[FenceEventType]
     FENCE_EVENT_TYPE_CLOSED: _ClassVar[FenceEventType]
     FENCE_EVENT_TYPE_TRANSFER: _ClassVar[FenceEventType]
+    FENCE_EVENT_TYPE_MISSING: _ClassVar[FenceEventType]
+    FENCE_EVENT_TYPE_ARRIVED: _ClassVar[FenceEventType]
 
 class FenceCause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -66,6 +68,8 @@ FENCE_EVENT_TYPE_CEASE: FenceEventType
 FENCE_EVENT_TYPE_SNAPSHOT: FenceEventType
 FENCE_EVENT_TYPE_CLOSED: FenceEventType
 FENCE_EVENT_TYPE_TRANSFER: FenceEventType
+FENCE_EVENT_TYPE_MISSING: FenceEventType
+FENCE_EVENT_TYPE_ARRIVED: FenceEventType
 FENCE_CAUSE_UNSPECIFIED: FenceCause
 FENCE_CAUSE_SUBJECT_MOVED: FenceCause
 FENCE_CAUSE_AREA_MOVED: FenceCause
@@ -113,7 +117,7 @@ class FenceConsumer(_message.Message):
     def __init__(self, name: _Optional[str] = ..., acknowledged_sequence: _Optional[int] = ..., backlog: _Optional[int] = ..., oldest_event_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., lost: _Optional[int] = ...) -> None: ...
 
 class FenceConfig(_message.Message):
-    __slots__ = ("hull_area", "polygon_area", "circle_area", "subject_hull", "subject_prefix", "other_hull", "boundary", "margin", "near_distance", "initial", "report_crosses", "dwell", "confirmations", "min_dwell", "max_events", "max_event_age", "by_accuracy")
+    __slots__ = ("hull_area", "polygon_area", "circle_area", "subject_hull", "subject_prefix", "other_hull", "boundary", "margin", "near_distance", "initial", "report_crosses", "dwell", "confirmations", "min_dwell", "max_events", "max_event_age", "by_accuracy", "expected", "expected_by", "expected_within")
     HULL_AREA_FIELD_NUMBER: _ClassVar[int]
     POLYGON_AREA_FIELD_NUMBER: _ClassVar[int]
     CIRCLE_AREA_FIELD_NUMBER: _ClassVar[int]
@@ -131,6 +135,9 @@ class FenceConfig(_message.Message):
     MAX_EVENTS_FIELD_NUMBER: _ClassVar[int]
     MAX_EVENT_AGE_FIELD_NUMBER: _ClassVar[int]
     BY_ACCURACY_FIELD_NUMBER: _ClassVar[int]
+    EXPECTED_FIELD_NUMBER: _ClassVar[int]
+    EXPECTED_BY_FIELD_NUMBER: _ClassVar[int]
+    EXPECTED_WITHIN_FIELD_NUMBER: _ClassVar[int]
     hull_area: HullArea
     polygon_area: PolygonArea
     circle_area: CircleArea
@@ -148,7 +155,10 @@ class FenceConfig(_message.Message):
     max_events: int
     max_event_age: _duration_pb2.Duration
     by_accuracy: bool
-    def __init__(self, hull_area: _Optional[_Union[HullArea, _Mapping]] = ..., polygon_area: _Optional[_Union[PolygonArea, _Mapping]] = ..., circle_area: _Optional[_Union[CircleArea, _Mapping]] = ..., subject_hull: _Optional[str] = ..., subject_prefix: _Optional[str] = ..., other_hull: _Optional[str] = ..., boundary: _Optional[_Union[FenceBoundary, str]] = ..., margin: _Optional[float] = ..., near_distance: _Optional[float] = ..., initial: _Optional[_Union[FenceInitial, str]] = ..., report_crosses: bool = ..., dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., confirmations: _Optional[int] = ..., min_dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_events: _Optional[int] = ..., max_event_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., by_accuracy: bool = ...) -> None: ...
+    expected: _points_pb2.Keys
+    expected_by: str
+    expected_within: _duration_pb2.Duration
+    def __init__(self, hull_area: _Optional[_Union[HullArea, _Mapping]] = ..., polygon_area: _Optional[_Union[PolygonArea, _Mapping]] = ..., circle_area: _Optional[_Union[CircleArea, _Mapping]] = ..., subject_hull: _Optional[str] = ..., subject_prefix: _Optional[str] = ..., other_hull: _Optional[str] = ..., boundary: _Optional[_Union[FenceBoundary, str]] = ..., margin: _Optional[float] = ..., near_distance: _Optional[float] = ..., initial: _Optional[_Union[FenceInitial, str]] = ..., report_crosses: bool = ..., dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., confirmations: _Optional[int] = ..., min_dwell: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., max_events: _Optional[int] = ..., max_event_age: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., by_accuracy: bool = ..., expected: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., expected_by: _Optional[str] = ..., expected_within: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ...) -> None: ...
 
 class HullArea(_message.Message):
     __slots__ = ("name", "without_self", "layer")

@@ -5,10 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynhull.keys import key_list
 from dynhull_proto.v1 import alarm_service_pb2, fence_pb2, fence_service_pb2, points_pb2
 
 from ..settings import NAME_CHARACTERS
 from ..state.fences.model.config import Area, CircleArea, FenceConfig, HullArea, Initial, PolygonArea, Ring, SubjectKind
+from ..state.fences.model.expected import daily
+from ..state.fences.model.records import Key
 from . import encode_fence
 from .decode import (
     LARGEST_INTEGER,
@@ -19,6 +22,7 @@ from .decode import (
     decode_name,
     decode_points,
 )
+from .decode_batch import decode_keys
 from .decode_settings import decode_duration
 
 BOUNDARIES = {
@@ -32,6 +36,7 @@ INITIALS: dict[int, Initial] = {
 }
 KINDS: dict[str, SubjectKind] = {"subject_hull": "hull", "subject_prefix": "prefix", "other_hull": "other"}
 BYTES_PER_POINT = 16
+MOST_EXPECTED = 10_000
 
 
 def decode_fence_name(name: str) -> str:
@@ -80,6 +85,9 @@ def decode_fence(
         config.max_events,
         _decode_duration(config, "max_event_age"),
         config.by_accuracy,
+        _decode_expected(config),
+        config.expected_by,
+        _decode_within(config),
     )
     _refuse_contradictions(decoded)
     return decoded
@@ -150,6 +158,37 @@ def _decode_duration(config: fence_pb2.FenceConfig, field: str) -> int:
     return decode_duration(getattr(config, field), f"config.{field}", least=0) if config.HasField(field) else 0
 
 
+def _decode_expected(config: fence_pb2.FenceConfig) -> tuple[Key, ...]:
+    """The keys that should be inside."""
+    if not config.HasField("expected"):
+        if config.WhichOneof("expected_deadline") is not None:
+            raise InvalidFieldError(
+                f"config.{config.WhichOneof('expected_deadline')}", "given", "without expected keys"
+            )
+        return ()
+    keys = decode_keys(config.expected, "config.expected")
+    found: list[Key] = [] if keys is None else key_list(keys)
+    if not found or len(found) > MOST_EXPECTED:
+        raise InvalidFieldError("config.expected", f"{len(found)} keys", f"from 1 to {MOST_EXPECTED} keys")
+    if len(set(found)) < len(found):
+        row = next(row for row, key in enumerate(found) if key in found[:row])
+        raise InvalidFieldError("config.expected", repr(found[row]), "each key is named once", row)
+    if config.WhichOneof("expected_deadline") is None:
+        raise InvalidFieldError("config.expected", f"{len(found)} keys", "give expected_by or expected_within, too")
+    if config.HasField("expected_by"):
+        try:
+            daily(config.expected_by)
+        except ValueError as error:
+            raise InvalidFieldError("config.expected_by", repr(config.expected_by), str(error)) from None
+    return tuple(found)
+
+
+def _decode_within(config: fence_pb2.FenceConfig) -> int:
+    if not config.HasField("expected_within"):
+        return 0
+    return decode_duration(config.expected_within, "config.expected_within", least=1)
+
+
 def _refuse_contradictions(config: FenceConfig) -> None:
     """Raise InvalidFieldError if settings exclude each other."""
     if config.near and config.kind != "other":
@@ -189,6 +228,7 @@ def _refuse_for_other_hull(config: FenceConfig) -> None:
         ("config.min_dwell", config.min_dwell),
         ("config.dwell", config.dwell),
         ("config.by_accuracy", config.by_accuracy),
+        ("config.expected", len(config.expected)),
     ):
         if value:
             raise InvalidFieldError(field, value, "only for fences that compare keys")

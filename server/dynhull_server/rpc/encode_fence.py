@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
+from dynhull.keys import PackedKeys
 from dynhull_proto.v1 import fence_pb2, fence_service_pb2, points_pb2
 
 from ..engine.fences import LiveFence
@@ -10,7 +13,7 @@ from ..engine.watch_fence import Sent
 from ..state.fences.model.config import CircleArea, FenceConfig, HullArea, Initial, PolygonArea
 from ..state.fences.model.fence import Fence
 from ..state.fences.model.records import Consumer, EventType, FenceEvent, Members
-from ..state.records import NO_TIME
+from ..state.records import NO_TIME, Keys
 from .encode import encode_keys
 
 INITIALS: dict[Initial, fence_pb2.FenceInitial] = {
@@ -49,6 +52,12 @@ def encode_config(config: FenceConfig) -> fence_pb2.FenceConfig:
         max_events=config.max_events,
         by_accuracy=config.by_accuracy,
     )
+    if config.expected:
+        strings = [key for key in config.expected if isinstance(key, str)]
+        keys: Keys = PackedKeys.pack(strings) if strings else np.array(config.expected, np.uint64)
+        message.expected.CopyFrom(encode_keys(keys, PACKED))
+    if config.expected_by:
+        message.expected_by = config.expected_by
     area = config.area
     if isinstance(area, HullArea):
         message.hull_area.name = area.name
@@ -71,6 +80,7 @@ def encode_config(config: FenceConfig) -> fence_pb2.FenceConfig:
         ("dwell", config.dwell),
         ("min_dwell", config.min_dwell),
         ("max_event_age", config.max_event_age),
+        ("expected_within", config.expected_within),
     ):
         if duration:
             getattr(message, field).FromMicroseconds(duration)

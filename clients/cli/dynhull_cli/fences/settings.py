@@ -38,6 +38,13 @@ Subjects = Annotated[str | None, _subjects("A keyed hull. Its keys are compared 
 SubjectPrefix = Annotated[
     str | None, _subjects("All keyed hulls whose names begin with this, later ones too.", metavar="PREFIX")
 ]
+Expected = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY",
+        help="A key that should be inside by --expected-by or --expected-within; may be given several times.",
+    ),
+]
 OtherHull = Annotated[
     str | None, _subjects("A hull as a whole: does it intersect --area, or is it near?", metavar="HULL")
 ]
@@ -50,6 +57,7 @@ def compared(
     subjects: Subjects = None,
     subject_prefix: SubjectPrefix = None,
     other_hull: OtherHull = None,
+    expected: Expected = None,
 ) -> dict[str, Any]:
     """The area and the subjects as arguments of the SDK; ValueError names what is missing or too much."""
     from dynhull_client import Circle, Prefix
@@ -67,7 +75,17 @@ def compared(
         "area": where,
         "subjects": Prefix(subject_prefix) if subject_prefix is not None else subjects,
         "other_hull": other_hull,
+        "expected": expected or None,
     }
+
+
+def with_keys(client: "HullClient", chosen: dict[str, Any]) -> dict[str, Any]:
+    """The arguments with the expected keys of the kind that the hull of the subjects has."""
+    from ..keyed_rows import keys_for
+
+    if chosen["expected"] is None or not isinstance(chosen["subjects"], str):
+        return chosen
+    return chosen | {"expected": keys_for(client, chosen["subjects"], chosen["expected"])}
 
 
 @connected
@@ -91,6 +109,7 @@ def create(
     """
     from dynhull_client import FenceExistsError
 
+    chosen = with_keys(client, chosen)
     fence, created = made(client.create_fence, FenceExistsError, exist_ok=exist_ok, name=name, **chosen)
     _remark_on_degrees(client, fence)
     _print(fence, "created" if created else "exists", as_json)
@@ -105,7 +124,7 @@ def replace(client: "HullClient", name: FenceName, chosen: dict[str, Any], as_js
 
     Subjects that are inside of one area and outside of the other enter or leave, with the cause fence_changed.
     """
-    fence = client.replace_fence(name, **chosen)
+    fence = client.replace_fence(name, **with_keys(client, chosen))
     _remark_on_degrees(client, fence)
     _print(fence, "replaced", as_json)
 

@@ -68,7 +68,8 @@ def subjects_text(fence: Fence) -> str:
 def settings_text(fence: Fence) -> str:
     """The settings that are not the usual ones."""
     found = ((each, getattr(fence, each.name)) for each in described(FenceSettings) if not each.at_creation)
-    return ", ".join(_setting_text(each, value) for each, value in found if value != each.usual)
+    texts = [_setting_text(each, value) for each, value in found if value != each.usual]
+    return ", ".join([*texts, *([f"expects {plural(len(fence.expected), 'key')}"] if fence.expected else [])])
 
 
 def _setting_text(setting: Setting, value: Any) -> str:
@@ -77,6 +78,8 @@ def _setting_text(setting: Setting, value: Any) -> str:
     name = setting.name.replace("_", " ")
     if setting.kind is bool:
         return name
+    if setting.kind is str:
+        return f"{name} {value}"
     return f"{name} {shown(value) if isinstance(value, timedelta) else format(value, 'g')}"
 
 

@@ -104,6 +104,8 @@ class PastFence:
         settings = subjects.hull.row.settings
         if settings.geographic or settings.window is not None or settings.by_event_time:
             return None  # their batches do more than they say
+        if config.by_accuracy or config.expected:
+            return None  # it asks for more than a move says
         cells = cells_of(config)
         return None if cells is None else Sieve(cells, config.crosses, bool(config.delays or config.dwell))
 

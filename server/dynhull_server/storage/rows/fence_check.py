@@ -125,7 +125,7 @@ class _Check:
             faults += [fault for fault in newest[number].faults if fault not in faults]
             # Those with a delay are on the other side than is reported.
             sides: dict[str, list[Key]] = {}
-            delayed = each.delays.keys() if each.row.config.rule is None else set()
+            delayed = {subject for subject in each.delays if subject[0]} if each.row.config.rule is None else set()
             for subject in inside ^ delayed:
                 if isinstance(subject, str):
                     sides[subject] = []

@@ -70,6 +70,8 @@ def settings_from(text: str) -> tuple[FenceConfig, Waits]:
     """The inverse of `settings_text`; ValueError, TypeError, KeyError or AttributeError for other texts."""
     given = json.loads(text)
     waits = Waits(*given.pop("waits", NO_WAITS))
+    if "expected" in given:
+        given["expected"] = tuple(given["expected"])
     return FenceConfig(**{**given, "area": _area_from_json(given["area"])}), waits
 
 

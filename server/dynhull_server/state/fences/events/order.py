@@ -98,7 +98,7 @@ class EventOrder:
         former = subject if event.key is None else event.former
         before = self._inside.get(former, False if self._is_complete else None)
         after = BEGINS.get(event.type)
-        must_be = event.type in (EventType.DWELL, EventType.TRANSFER) if after is None else not after
+        must_be = event.type in (EventType.DWELL, EventType.TRANSFER, EventType.ARRIVED) if after is None else not after
         if before not in (None, must_be):
             self._blame(event, f"a subject that is {WORDS[must_be]}", f"{event.type.name.lower()} of one that is not")
         if former != subject and (event.type is EventType.TRANSFER or after is not None):

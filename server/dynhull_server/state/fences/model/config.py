@@ -62,6 +62,9 @@ class FenceConfig:
         min_dwell: how long a subject must be on the other side before it enters or leaves.
         by_accuracy: whether a subject enters or leaves only once it is on the other side by more than the accuracy of
             its position.
+        expected: the keys that should be inside.
+        expected_by: the time of day by which they should be, as it is written; empty for none.
+        expected_within: or the time outside after which they are missing.
         max_events: the number of events to keep, 0 for the limit of the server.
         max_event_age: how long events are kept.
     """
@@ -80,6 +83,9 @@ class FenceConfig:
     max_events: int = 0
     max_event_age: int = 0
     by_accuracy: bool = False
+    expected: tuple[str | int, ...] = ()
+    expected_by: str = ""
+    expected_within: int = 0
 
     @property
     def rule(self) -> AlarmRule | None:

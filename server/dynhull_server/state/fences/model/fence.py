@@ -9,7 +9,8 @@ from ...alarms.watched import WatchedHulls
 from ...records import NO_TIME, Keys
 from .delays import Delays
 from .dwell import Dwelling, dwelling_after
-from .records import Consumer, FenceEvent, FenceRow, KeptFence
+from .expected import Expectations, expectations_of
+from .records import Consumer, FenceEvent, FenceRow, KeptFence, Key
 from .tallies import Column, Tallies
 
 if TYPE_CHECKING:
@@ -81,6 +82,7 @@ class Fence:
         self.time = NO_TIME
         self.consumers: dict[str, Consumer] = {}
         self.dwelling: Dwelling | None = None
+        self.expectations: Expectations | None = None
         self.due: int | None = None
         self.ended = False
 
@@ -128,6 +130,8 @@ class Fence:
             times.append(self.delays.first + self.row.config.min_dwell)
         if self.watched is not None and (due := self.watched.first_due) is not None:
             times.append(due)
+        if self.expectations is not None and (due := self.expectations.first_due) is not None:
+            times.append(due)
         return min(times, default=None)
 
     def due_after(self, time: int) -> int | None:
@@ -142,12 +146,16 @@ class Fence:
             times.append(since + self.row.config.min_dwell)
         if self.watched is not None and (due := self.watched.first_due_after(time)) is not None:
             times.append(due)
+        if self.expectations is not None and (due := self.expectations.due_after(time)) is not None:
+            times.append(due)
         return min(times, default=None)
 
     @property
     def waiting(self) -> int:
         """The number of subjects that wait for a time."""
-        return sum(len(each) for each in (self.dwelling, self.delays, self.watched) if each is not None)
+        return sum(
+            len(each) for each in (self.dwelling, self.delays, self.watched, self.expectations) if each is not None
+        )
 
     def keys_inside(self, subjects: "Subjects") -> Keys:
         """The keys of a hull that are inside, ascending, as its events say."""
@@ -167,24 +175,40 @@ class Fence:
         if self.delays is not None:
             self.inside += self.delays.balance
 
+    def count_expected(self) -> None:
+        """Find which of the keys that it expects are inside. O(those inside)."""
+        if self.expectations is None:
+            return
+        found: dict[Key, int] = {}
+        for subjects in self.subjects.values():
+            for key in key_list(self.keys_inside(subjects)):
+                if key in self.expectations.keys:
+                    found[key] = found.get(key, 0) + 1
+        self.expectations.found(found)
+
     def restored(self, kept: KeptFence) -> None:
         """Take over what the storage has; who is inside belongs to the subjects."""
         self.row = kept.row
         self.last, self.first = kept.last, kept.first
         self.consumers = dict(kept.consumers)
         self.dwelling = dwelling_after(kept)
-        self.delays = Delays(kept.row.config, kept.delays) if kept.row.config.delays else None
+        delays = {subject: delay for subject, delay in kept.delays.items() if subject[0]}
+        self.delays = Delays(kept.row.config, delays) if kept.row.config.delays else None
+        self.expectations = expectations_of(kept.row.config, kept.row.waits.time, kept.delays.items())
         self.unsaved = len(kept.events)
         self.time = max(self.time, kept.row.waits.time, kept.inside.time)
         if kept.events:
             self.time = max(self.time, kept.events[-1].time)
         if self.delays is not None:
             self.time = max(self.time, self.delays.newest)
+        if self.expectations is not None:
+            self.time = max(self.time, self.expectations.passed)
         self.note_settings()
 
     def note_settings(self) -> None:
         """Count what its settings ask for."""
-        self.tallies.rule(self.place, rules=self.dwelling is not None or self.delays is not None)
+        looks = self.dwelling, self.delays, self.expectations
+        self.tallies.rule(self.place, rules=any(each is not None for each in looks))
         limits = self.row.config.max_events or self.row.config.max_event_age
         self.tallies.columns[Column.LIMITED, self.place] = bool(limits)
 

@@ -24,6 +24,8 @@ class EventType(IntEnum):
     SNAPSHOT = 7
     CLOSED = 8
     TRANSFER = 9
+    MISSING = 10
+    ARRIVED = 11
 
 
 class Cause(IntFlag):
@@ -69,6 +71,10 @@ class AlarmStanding(NamedTuple):
 class Delay(NamedTuple):
     """A change of side that is no event yet. Or what an alarm has about a hull, whose key is then empty.
 
+    Or, of the hull without a name, what a fence knows of a key that it expects inside: `enters` says that it was
+    reported missing, and `since` when; otherwise `since` is since when it is outside, NO_TIME if it is inside. Under
+    the empty key `since` is up to when deadlines have passed.
+
     Attributes:
         enters: whether the subject is on the side of the area, though it is reported outside; or the opposite. Of an
             alarm, whether the condition holds, but not yet for long enough.
@@ -111,8 +117,9 @@ class FenceEvent(NamedTuple):
         distance: the distance from the position to the area; None if the subject is gone.
         event_time: the time of the position, NO_TIME if it has none.
         time: when the event was made, in microseconds since 1970 by the server's clock.
-        first_time: since when the subject has been inside, in a dwell event; when it changed its side, in one that was
-            delayed; otherwise NO_TIME.
+        first_time: since when the subject has been inside, in a dwell event; since when it has been outside, in one
+            that it is missing by its age; when it was missing, in one that it has arrived; when it changed its side, in
+            one that was delayed; otherwise NO_TIME.
         inside: the subjects that were inside, in a snapshot and at the end.
         origin: where the subject comes from, if the same batch has moved it from another hull; `previous` is there.
     """

@@ -117,6 +117,7 @@ def adopt(restored: Restored, subjects: Mapping[str, Subjects]) -> None:
             subjects[name].note_delays(fence)
     for fence in {fence.number: fence for each in subjects.values() for fence in each.fences.values()}.values():
         fence.count_inside()
+        fence.count_expected()
 
 
 def members_after(kept: KeptFence) -> dict[str, set[Key]]:

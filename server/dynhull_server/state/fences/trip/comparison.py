@@ -24,6 +24,7 @@ from ..model.records import Cause, Key, Origin
 from ..model.tallies import Column, Tallies
 from .alarms import look as alarm_at
 from .delayed import NO_ROWS, delay, take_over
+from .expected import follow
 from .leg import NOBODY, FenceLeg
 
 # The hull removes keys whose time has come.
@@ -131,6 +132,8 @@ class Comparison:
                         own, other = (each is not None and each.name in names for each in (watched.hull, watched.other))
                         cause = (Cause.EXPIRED if swap is EXPIRY else Cause.MOVED) if own else Cause(0)
                         alarm_at(self.leg(fence), watched, cause | (Cause.AREA if other else Cause(0)), now)
+            for leg in self.legs.values():
+                follow(leg, now)
         except BaseException:  # an index may have lost crossings
             self.tear(hulls)
             raise

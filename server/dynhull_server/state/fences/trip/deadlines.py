@@ -10,6 +10,7 @@ from ..model.requests import PassTime
 from .alarms import pass_time as raise_by_time
 from .comparison import Comparison
 from .delayed import end_some
+from .expected import follow, report_missing
 
 # The most subjects that make an event together because time has passed.
 MOST_DUE = 4096
@@ -22,7 +23,7 @@ def pass_time(request: PassTime, fence: Fence, comparison: Comparison) -> None:
     for watched, due in () if fence.watched is None else fence.watched.take(request.time, MOST_DUE):
         comparison.applied = True
         raise_by_time(comparison.leg(fence), watched, due)
-    config, stays = fence.row.config, _Stays(fence, comparison, request.time)
+    config, stays, expected = fence.row.config, _Stays(fence, comparison, request.time), fence.expectations
     made = 0
     while made < MOST_DUE:  # the others at the next look
         times = []
@@ -30,6 +31,8 @@ def pass_time(request: PassTime, fence: Fence, comparison: Comparison) -> None:
             times.append(fence.delays.first + config.min_dwell)
         if (since := stays.first()) is not None:
             times.append(since + config.dwell)
+        if expected is not None and (deadline := expected.first_due) is not None:
+            times.append(deadline)
         due = min(times, default=request.time + 1)
         if due > request.time:
             return
@@ -45,6 +48,11 @@ def pass_time(request: PassTime, fence: Fence, comparison: Comparison) -> None:
         for hull, keys in sorted(waited.items()):
             comparison.leg(fence).report(fence.subjects[hull], keys, due)
         made += sum(map(len, (*ripe.values(), *waited.values())))
+        if expected is not None:
+            comparison.applied = True
+            follow(comparison.leg(fence), due)
+            if expected.first_due == due:
+                made += report_missing(comparison.leg(fence), due)
 
 
 class _Stays:

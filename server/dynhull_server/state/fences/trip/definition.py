@@ -1,6 +1,7 @@
 """Fences are created, replaced and deleted: their areas are laid over subjects, and the first events are made."""
 
 from dataclasses import replace
+from operator import attrgetter
 
 from ...alarms.rule import AlarmRule
 from ...alarms.values import require_area
@@ -21,12 +22,14 @@ from ..model.requests import CreateFence, DeleteFence, ReplaceFence
 from .alarms import look, watched_hulls
 from .comparison import Comparison, Ground
 from .delayed import doubt_new, end_all
+from .expected import begin, follow
 from .leg import FenceLeg, members
 
 # The area of a fence that is replaced does not move.
 REPLACEMENT: Swap = Cause.AREA, Cause.CHANGED
 # The number of subjects inside of the fences that a trip has created after which it creates no more.
 MOST_INSIDE = 2**18
+EXPECTED = attrgetter("expected", "expected_by", "expected_within")
 SUBJECT_FIELDS = {"hull": "subject_hull", "prefix": "subject_prefix", "other": "other_hull"}
 
 
@@ -71,6 +74,7 @@ class Definition:
         lacking = [hull for hull in compared if request.gives_center and lacks_center(config, fence.area, hull)]
         center = center_for(config, fence.area, request.checked) if lacking else None
         self._require_frames(config, fence.area, compared, request.checked, lacking)
+        self._require_kind(config, compared)
         if config.kind == "other":
             assert fence.area is not None  # checked by the caller
             fence.pair = Pair(fence.area, self._hull(config.subjects), config.near)
@@ -96,6 +100,7 @@ class Definition:
                 leg.entered(subjects, request.time)
         else:
             leg.inside = Inside(0, tuple(members(fence)))
+        begin(leg, request.time)
         return fence
 
     def _create_alarm(self, request: CreateFence, number: int, rule: AlarmRule) -> Fence:
@@ -134,6 +139,7 @@ class Definition:
         """Replace the area and the settings of a fence."""
         comparison = self._comparison
         leg, config = comparison.leg(fence), request.config
+        before = leg.row.config
         if config == leg.row.config:
             return fence
         if (config.kind, config.subjects) != (leg.row.config.kind, leg.row.config.subjects):
@@ -143,6 +149,7 @@ class Definition:
         is_prefix = config.kind == "prefix"
         compared = [each.hull for each in fence.subjects.values()] if is_prefix else [self._hull(config.subjects)]
         self._require_frames(config, area, compared, request.checked)
+        self._require_kind(config, compared)
         for subjects in fence.subjects.values():
             lay_area(subjects, fence.number, config, area, request.checked)
             comparison.applied = True
@@ -160,9 +167,13 @@ class Definition:
             for subjects in fence.subjects.values():
                 comparison.cross(subjects, subjects.take(config, area), {}, REPLACEMENT, request.time)
             end_all(leg, request.time)
+            follow(leg, request.time)
         except BaseException:
             comparison.tear()
             raise
+        if EXPECTED(config) != EXPECTED(before):
+            comparison.applied = True
+            begin(leg, request.time)
         return fence
 
     def delete(self, request: DeleteFence, fence: Fence) -> None:
@@ -232,6 +243,14 @@ class Definition:
             require_margin(config)
         else:
             require_frames(config, area, compared[0])
+
+    def _require_kind(self, config: FenceConfig, compared: list[Hull]) -> None:
+        """Raise InvalidFenceError if a hull cannot have a key that is expected in it."""
+        for hull in compared if config.kind == "hull" else ():
+            kind = str if hull.row.settings.identity == "str" else int
+            for row, key in enumerate(config.expected):
+                if not isinstance(key, kind):
+                    raise InvalidFenceError(f"expected[{row}]", repr(key), f"is no key that {hull.name!r} can have")
 
     def _compared(self, config: FenceConfig) -> list[Hull]:
         """The hulls that a fence compares, those with a prefix by name: the keyed ones."""

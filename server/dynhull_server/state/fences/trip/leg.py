@@ -35,6 +35,7 @@ from ..model.records import (
     Key,
     Members,
     Origin,
+    Position,
     PutConsumer,
     PutDelays,
     Subject,
@@ -65,6 +66,7 @@ class FenceLeg:
         first: the oldest event that is kept after the trip.
         inside: who is inside of a new fence that says nothing about it.
         delays: the delays that it changes.
+        followed: of how many of its events it is known which of the expected keys they are about.
     """
 
     def __init__(self, fence: Fence, *, created: bool = False, told: tuple[int, int] | None = None) -> None:
@@ -79,6 +81,7 @@ class FenceLeg:
         self.first = fence.first
         self.inside = Inside()
         self.delays: dict[Subject, Delay | None] = {}
+        self.followed = 0
         self._last, self._time = (fence.last, fence.time) if told is None else told
 
     @property
@@ -210,6 +213,24 @@ class FenceLeg:
             self._time = max(self._time, delay.since)
         self.delays[subject] = delay
         self.fence.subjects[subject[0]].note_delays(self.fence)
+
+    def put_expected(self, key: Key, stored: Delay | None) -> None:
+        """Put what is stored of an expected key in the place of what was; None where nothing is new."""
+        if stored is not None:
+            self._time = max(self._time, stored.since)
+            self.delays["", key] = stored
+
+    def place(self, subjects: Subjects, key: Key) -> tuple[Position, float, int] | None:
+        """Where a key is that is outside as the events say, its distance, and the time; None if it is not there."""
+        hull, keys = subjects.hull, subjects.keys([key])
+        points = keyed(hull.state).positions(keys)
+        if np.isnan(points[0, 0]):
+            return None
+        delay = None if self.fence.delays is None else self.fence.delays.of(hull.name).get(key)
+        outside = np.array([delay is None or not delay.enters])
+        (distance,) = subjects.distances(self, keys, points, outside)
+        x, y = points[0].tolist()
+        return (x, y), distance, _event_times(subjects, keys)[0]
 
     def put_standing(self, hull: str, standing: Delay | None) -> None:
         """Put what an alarm has about a hull in the place of what it had."""

@@ -47,6 +47,7 @@ from .comparison import EXPIRY, Comparison, Ground
 from .consumers import drop_consumer, drop_events, put_consumer
 from .deadlines import pass_time
 from .definition import Definition
+from .expected import follow
 from .leg import FenceLeg
 
 
@@ -278,6 +279,8 @@ class FencePart:
 
     def settle(self, requests: list[Request]) -> None:
         """Number the events, and remove the requests that are left for a later trip."""
+        for leg in self.legs.values():
+            follow(leg, leg.time(NO_TIME))
         self._comparison.log.settle()
         self.events = self._block(self.legs.values())
         if self.left:
