@@ -49,9 +49,9 @@ def counted(places: object, news: tuple[object, object, object, object], columns
     Count events of fences at these places: two columns are set, two are added to, and the last is 1.
     """
 
-def plain_batches(payloads: list[bytes], first: int, kind: int) -> tuple[bytes, ...]:
+def plain_batches(payloads: list[bytes], first: int, kind: int, wanted: list[bytes] | None) -> tuple[bytes, ...]:
     """
-    The batches in payloads of the journal as columns, up to the first payload that has one of another kind.
+    The batches in payloads of the journal as columns, up to the first payload that has one of another kind; of keys, in UTF-8 or as eight bytes, only those that are wanted.
     """
 
 def key_codes(lengths: bytes, data: bytes) -> bytes:

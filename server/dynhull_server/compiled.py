@@ -96,8 +96,10 @@ class Native(Protocol):
     def key_codes(self, lengths: bytes, data: bytes) -> bytes:
         """`_codes` in storage/segments/gathered.py."""
 
-    def plain_batches(self, payloads: "list[bytes]", first: int, kind: int) -> "tuple[bytes, ...]":
-        """The columns of `_plain` in storage/rows/batch_columns.py."""
+    def plain_batches(
+        self, payloads: "list[bytes]", first: int, kind: int, wanted: "list[bytes] | None"
+    ) -> "tuple[bytes, ...]":
+        """The columns of `_plain` in storage/rows/batch_columns.py, of keys those that are wanted."""
 
 
 def _load() -> Native | None:

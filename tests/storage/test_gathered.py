@@ -2,6 +2,7 @@
 
 import dataclasses
 import struct
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -15,13 +16,14 @@ from dynhull_server.state.errors import MisfitError, RefusedError
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import CommitStamp, HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.storage.of_keys import changes_of_keys
 from dynhull_server.storage.rows import batch_columns
 from dynhull_server.storage.rows.batch_columns import columns_of_rows
 from dynhull_server.storage.rows.encoding import encode
 from dynhull_server.storage.segments import gathered as gathering
 from dynhull_server.storage.segments.columns import Batches, columns_of
 from dynhull_server.storage.segments.gathered import gathered, key_codes
-from dynhull_server.storage.segments.parquet import from_parquet, to_parquet
+from dynhull_server.storage.segments.parquet import from_parquet, keys_from_parquet, to_parquet
 
 LIMITS = Limits(10, 1000, 10, 10, 10**6)
 SECOND = 10**6
@@ -148,6 +150,24 @@ def test_rows_of_the_journal_are_the_same_columns_in_both_languages(kind, steps,
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(batch_columns, "native", None)
         same(columns_of_rows(rows, hull.identity), expected)
+
+
+@given(kind=st.sampled_from(sorted(KINDS)), steps=STEPS, wanted=st.sets(st.integers(0, 9), min_size=1, max_size=3))
+@settings(max_examples=40, deadline=None)
+def test_rows_of_keys_that_are_wanted_say_the_same_of_these(kind, steps, wanted):
+    hull = KINDS[kind]
+    if hull.identity == "multiset":
+        return
+    some = sorted(wanted)
+    keys = PackedKeys.pack([f"key {each}" for each in some]) if hull.identity == "str" else np.array(some, np.uint64)
+    records = lived(hull, steps)
+    rows = [(each.revision, each.revision, 0, encode([each]), *each.committed) for each in records]
+    expected = changes_of_keys(columns_of(records, hull.identity), keys)
+    found = columns_of_rows(rows, hull.identity, keys)
+    same(changes_of_keys(found, keys), expected)
+    assert np.unique(found.revision).tolist() == [each.revision for each in records]
+    file = BytesIO(to_parquet(columns_of(records, hull.identity), {}))
+    same(changes_of_keys(keys_from_parquet(file, "a file", keys)[0], keys), expected)
 
 
 def test_a_payload_that_is_cut_anywhere_is_no_batch():

@@ -1,5 +1,6 @@
 // dynhull_server._native: what the server does for each event of a fence, and each batch of the past, for Python.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 
 #include <memory>
 #include <string>
@@ -299,9 +300,17 @@ nb::bytes bytes(const std::vector<Value>& values) {
   return bytes(values.data(), values.size());
 }
 
-// The batches in payloads of the journal, from one of these on up to the first that has one that is not plain.
-nb::tuple plain_batches(const nb::list& payloads, std::size_t first, std::uint8_t kind) {
+// The batches in payloads of the journal, from one of these on up to the first that has one that is not plain. Of keys
+// only those that are wanted, if some are named.
+nb::tuple plain_batches(const nb::list& payloads, std::size_t first, std::uint8_t kind,
+                        const std::optional<nb::list>& wanted) {
   if (kind != 0 && kind != 16 && kind != 32) throw nb::value_error("no kind of rows");
+  std::vector<View<char>> texts;
+  std::optional<Wanted> keys;
+  if (wanted && kind != OF_POINTS) {
+    keys.emplace();
+    for (const nb::handle key : *wanted) keys->insert(texts.emplace_back(key).text());
+  }
   std::vector<View<char>> views;
   views.reserve(payloads.size());
   std::size_t size = 0;
@@ -309,7 +318,7 @@ nb::tuple plain_batches(const nb::list& payloads, std::size_t first, std::uint8_
     views.emplace_back(payloads[place]);
     size += views.back().size();
   }
-  PlainBatches batches(kind);
+  PlainBatches batches(kind, keys ? &*keys : nullptr);
   {
     std::optional<nb::gil_scoped_release> release;
     if (size >= MANY) release.emplace();
@@ -365,9 +374,11 @@ NB_MODULE(_native, module) {
                      "columns: tuple[object, object, object, object, object]) -> None"),
              "Count events of fences at these places: two columns are set, two are added to, and the last is 1.");
   module.def(
-      "plain_batches", &dynhull_server::plain_batches, "payloads"_a, "first"_a, "kind"_a,
-      nb::sig("def plain_batches(payloads: list[bytes], first: int, kind: int) -> tuple[bytes, ...]"),
-      "The batches in payloads of the journal as columns, up to the first payload that has one of another kind.");
+      "plain_batches", &dynhull_server::plain_batches, "payloads"_a, "first"_a, "kind"_a, "wanted"_a.none(),
+      nb::sig("def plain_batches(payloads: list[bytes], first: int, kind: int, wanted: list[bytes] | None) "
+              "-> tuple[bytes, ...]"),
+      "The batches in payloads of the journal as columns, up to the first payload that has one of another kind; of "
+      "keys, in UTF-8 or as eight bytes, only those that are wanted.");
   module.def(
       "key_codes", &dynhull_server::key_codes, "lengths"_a, "data"_a,
       nb::sig("def key_codes(lengths: bytes, data: bytes) -> bytes"),

@@ -19,15 +19,19 @@ KINDS = {"multiset": POINTS, "str": STRINGS, "int": INTEGERS}
 BatchRow = tuple[Any, ...]
 
 
-def columns_of_rows(rows: Sequence[BatchRow], identity: Identity) -> SegmentColumns:
-    """The batches in rows that have their checksums, one after the other. ValueError if the payloads have none."""
+def columns_of_rows(rows: Sequence[BatchRow], identity: Identity, wanted: Keys | None = None) -> SegmentColumns:
+    """The batches in rows that have their checksums, one after the other. ValueError if the payloads have none.
+
+    Where keys are wanted, rows of others may be missing: most of them, as a rule.
+    """
     parts: list[SegmentColumns] = []
     payloads = [row[3] for row in rows]
+    words = None if wanted is None else _words(wanted)
     at = 0
     while at < len(rows):
         count = 0
         if native is not None:
-            count, part = _plain(rows, native.plain_batches(payloads, at, KINDS[identity]), at, identity)
+            count, part = _plain(rows, native.plain_batches(payloads, at, KINDS[identity], words), at, identity)
         if not count:
             count, part = 1, columns_of(_records(rows[at]), identity)
         parts.append(part)
@@ -70,6 +74,13 @@ def _plain(
         np.zeros(len(ops)),  # batches with accuracies are none of these
         [None] * len(ops),
     )
+
+
+def _words(keys: Keys) -> list[bytes]:
+    """Each key as the bytes that the journal has."""
+    if isinstance(keys, PackedKeys):
+        return [key.encode() for key in keys]
+    return [int(key).to_bytes(8, "little") for key in keys]
 
 
 def _keys(lengths: bytes, data: bytes, identity: Identity) -> Keys:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...state.records import CommitStamp, Kept, Record
+from ...state.records import CommitStamp, Kept, Keys, Record
 from ..past import Moment, created
 from ..port import DamagedError
 from ..segments.columns import Batches, SegmentColumns, joined
@@ -21,6 +21,8 @@ from .tables import Reader
 STEP_POINTS, STEP_ROWS = 8192, 1024
 # Rows of batches are decoded together up to these many bytes of payloads.
 STEP_BYTES = 2**21
+# Of which few keys are wanted.
+WANTED_BYTES = 2**24
 # Those of one that gathers them.
 GATHERED_ROWS = 2**17
 
@@ -104,18 +106,22 @@ def gathered_after(reader: Reader, hull: HullRows, after: int, until: int) -> li
     return list(gathered(Batches(columns), hull.row.settings, after, last))
 
 
-def columns_between(reader: Reader, hull: HullRows, after: int, until: int, most: int) -> SegmentColumns:
+def columns_between(
+    reader: Reader, hull: HullRows, after: int, until: int, most: int, wanted: Keys | None = None
+) -> SegmentColumns:
     """The batches after a revision up to another one that is there, in columns.
 
-    At least those of one row of batches; no further row is read after `most` points and keys.
+    At least those of one row of batches; no further row is read after `most` points and keys. Where keys are wanted,
+    rows of others may be missing, and do not count; then no further row is read after WANTED_BYTES either.
     """
-    parts, count = list[SegmentColumns](), 0
+    parts, count, size = list[SegmentColumns](), 0, 0
     identity = hull.row.settings.identity
     with as_damage(hull):
         for rows in _few_bytes(whole_rows(hull, batch_rows(reader, hull.between(after, until)))):
-            parts.append(columns_of_rows(rows, identity))
+            parts.append(columns_of_rows(rows, identity, wanted))
             count += len(parts[-1])
-            if count >= most:
+            size += sum(len(row[3]) for row in rows)
+            if count >= most or (wanted is not None and size >= WANTED_BYTES):
                 break
     columns = joined(parts, identity)
     columns = columns.between(after, until)

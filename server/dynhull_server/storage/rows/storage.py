@@ -229,7 +229,7 @@ class RowStorage(ABC):
 
         def in_journal(reader: Reader, hull: HullRows) -> tuple[int, KeyChanges]:
             require_kept(hull, after)
-            columns = columns_between(reader, hull, after, min(until, hull.last), GATHERED_ROWS)
+            columns = columns_between(reader, hull, after, min(until, hull.last), GATHERED_ROWS, keys)
             return int(columns.revision[-1]), changes_of_keys(columns, keys)
 
         return self._of_past(

@@ -46,6 +46,7 @@ class _Blocks(io.RawIOBase):
         self._digests = b64decode(written.blocks)
         self._size = written.bytes
         self._at = 0
+        self._first, self._content = 0, b""  # of the blocks that were read last: columns of a group lie side by side
         self._file = path.open("rb", buffering=0)
         if os.fstat(self._file.fileno()).st_size != self._size:
             raise _changed(path)
@@ -72,16 +73,19 @@ class _Blocks(io.RawIOBase):
         start, end = self._at, min(self._at + len(target), self._size)
         if start >= end:
             return 0
-        first = start // BLOCK
-        content = os.pread(
-            self._file.fileno(), min(-(-end // BLOCK) * BLOCK, self._size) - first * BLOCK, first * BLOCK
-        )
-        expected = self._digests[first * BLOCK_DIGEST_BYTES : -(-end // BLOCK) * BLOCK_DIGEST_BYTES]
-        if _digests_of(content) != expected:
-            raise _changed(self._path)
-        target[: end - start] = content[start - first * BLOCK : end - first * BLOCK]
+        if not self._first <= start <= end <= self._first + len(self._content):
+            self._read(start // BLOCK, -(-end // BLOCK))
+        target[: end - start] = self._content[start - self._first : end - self._first]
         self._at = end
         return end - start
+
+    def _read(self, first: int, end: int) -> None:
+        """Read some blocks."""
+        size = min(end * BLOCK, self._size) - first * BLOCK
+        content = os.pread(self._file.fileno(), size, first * BLOCK)
+        if _digests_of(content) != self._digests[first * BLOCK_DIGEST_BYTES : end * BLOCK_DIGEST_BYTES]:
+            raise _changed(self._path)
+        self._first, self._content = first * BLOCK, content
 
 
 def is_installed() -> bool:

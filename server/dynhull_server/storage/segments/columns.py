@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields
+from itertools import chain
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -159,7 +160,7 @@ def joined(parts: Sequence[SegmentColumns], identity: Identity) -> SegmentColumn
         return parts[0]
     empty = columns_of([], identity)
     keys = _joined_keys([part.keys for part in parts], identity)
-    detail = [said for part in parts for said in part.detail]
+    detail = list(chain.from_iterable(part.detail for part in parts))
     arrays = {
         name: np.concatenate([getattr(empty, name), *(getattr(part, name) for part in parts)])
         for name in COLUMNS

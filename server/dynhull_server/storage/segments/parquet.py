@@ -66,6 +66,7 @@ ORDER = (
     "clock",
     "row",
 )
+CONSTANT = ("cause", "kind", "op")  # as a rule the same word in all rows
 WORDS: tuple[str, ...] = ("cause", "kind", "op", "key")
 CODED = ("key", "cause", "kind", "op", "detail")  # what is read as places in a list of words
 # Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
@@ -185,7 +186,7 @@ def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentCol
         file = _opened(pa.PythonFile(source, mode="r"), name)
         found = file.schema_arrow.metadata
         values = sorted(key_list(keys))
-        table = file.read_row_groups(_groups(file, values), use_threads=False)
+        table = _of_groups(file, _groups(file, values))
         return _columns(table, found, _of_keys(table, values)), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
@@ -305,6 +306,32 @@ def _groups(file: pq.ParquetFile, values: list[Any]) -> list[int]:
             found.add(place)
             place += 1
     return sorted(found)
+
+
+def _of_groups(file: pq.ParquetFile, groups: list[int]) -> pa.Table:
+    """Some groups, of which no column is read that has the same in each row, or nothing; nor the numbers of commits."""
+    import pyarrow as pa
+
+    there, schema = [file.metadata.row_group(group) for group in groups], file.schema_arrow
+    count = sum(group.num_rows for group in there)
+    constant = {"commit": pa.nulls(count, schema.field("commit").type)}
+    for place, name in enumerate(ORDER):
+        found = [group.column(place).statistics for group in there]
+        if any(each is None or not each.has_null_count for each in found):
+            continue
+        nulls = sum(each.null_count for each in found)
+        if nulls == count:
+            constant[name] = pa.nulls(count, schema.field(name).type)
+        elif name in CONSTANT and not nulls:
+            words = {word for each in found for word in (each.min, each.max)}
+            if len(words) == 1:
+                constant[name] = pa.DictionaryArray.from_arrays(np.zeros(count, np.int32), list(words))
+    if "kind" in constant and "op" in constant:  # of a revision each key has one row
+        constant["row"] = pa.array(np.zeros(count, np.int32))
+    table = file.read_row_groups(groups, columns=[name for name in ORDER if name not in constant], use_threads=False)
+    for name, column in constant.items():
+        table = table.append_column(name, column)
+    return table
 
 
 def _about(found: dict[bytes, bytes]) -> dict[str, str]:
