@@ -5,6 +5,7 @@ import json
 import subprocess
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -15,6 +16,7 @@ from chromium import chromium
 from gateway_process import Gateway, gateway_process
 from mortal_server import MortalServer
 from peers import program, typescript
+from playwright.sync_api import Browser, Page, expect
 from server_process import PATIENCE
 
 from dynhull import DynamicHull
@@ -24,6 +26,7 @@ HERE = Path(__file__).parent
 KILLS = 2
 POINTS = 20_000
 ONE_SCRIPT = 60_000  # bytes, compressed
+DEPENDENCIES = "lossless-json", "robust-predicates", "d3-geo", "d3-array", "internmap", "topojson-client"
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +66,7 @@ def test_it_packs() -> None:
     command = [program("npm"), "pack", "--dry-run", "--json", "--ignore-scripts"]
     packed = subprocess.run(command, cwd=typescript(), capture_output=True, text=True, check=True, timeout=PATIENCE)
     files = {each["path"] for each in json.loads(packed.stdout)[0]["files"]}
-    sources = {f"src/{each.name}" for each in (typescript() / "src").iterdir()}
+    sources = {str(each.relative_to(typescript())) for each in (typescript() / "src").rglob("*.js")}
     assert files == sources | {"package.json", "README.md", "LICENSES.md"}
 
 
@@ -129,29 +132,52 @@ def test_what_the_page_of_documentation_says(gateway: Gateway, server: MortalSer
         assert client.positions("fleet", ["LH400"]).positions.tolist() == [[9, 51]]
 
 
+@contextmanager
+def served(folder: Path, gateway: Gateway, page: str) -> Iterator[str]:
+    """The URL of a page of the documentation, in a folder with the installed package."""
+    (text,) = blocks(f'html title="{page}"')
+    (folder / page).write_text(
+        text.replace("http://127.0.0.1:8080", gateway.url).replace("fleet", f"typescript/{page}")
+    )
+    (folder / "node_modules").mkdir()
+    for package in DEPENDENCIES:
+        (folder / "node_modules" / package).symlink_to(typescript() / "node_modules" / package)
+    (folder / "node_modules" / "dynhull").symlink_to(typescript())
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            return
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder))) as pages:
+        serving = threading.Thread(target=pages.serve_forever)
+        serving.start()
+        try:
+            yield f"http://127.0.0.1:{pages.server_port}/{page}"
+        finally:
+            pages.shutdown()
+            serving.join()
+
+
+def watched(browser: Browser, loaded: list[bytes] | None = None) -> tuple[Page, list[str]]:
+    """A page, and the errors in it."""
+    seen, errors = browser.new_page(), list[str]()
+    seen.on("pageerror", lambda error: errors.append(str(error)))
+    if loaded is not None:
+        seen.on("response", lambda response: loaded.append(response.body()) if response.url.endswith(".js") else None)
+    return seen, errors
+
+
 def test_a_page_with_a_live_hull(gateway: Gateway, server: MortalServer, tmp_path: Path) -> None:
-    name = "typescript/page"
-    (page,) = blocks('html title="index.html"')
-    (tmp_path / "index.html").write_text(page.replace("http://127.0.0.1:8080", gateway.url).replace("fleet", name))
-    (tmp_path / "node_modules").mkdir()
-    for package in ("lossless-json", "robust-predicates"):
-        (tmp_path / "node_modules" / package).symlink_to(typescript() / "node_modules" / package)
-    (tmp_path / "node_modules" / "dynhull").symlink_to(typescript())
+    name = "typescript/index.html"
     loaded: list[bytes] = []
-    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
     with (
-        ThreadingHTTPServer(("127.0.0.1", 0), handler) as pages,
+        served(tmp_path, gateway, "index.html") as url,
         HullClient(server.address) as client,
         chromium() as browser,
     ):
-        serving = threading.Thread(target=pages.serve_forever)
-        serving.start()
         client.create_hull(name)
-        seen = browser.new_page()
-        errors: list[str] = []
-        seen.on("pageerror", lambda error: errors.append(str(error)))
-        seen.on("response", lambda response: loaded.append(response.body()) if response.url.endswith(".js") else None)
-        seen.goto(f"http://127.0.0.1:{pages.server_port}/")
+        seen, errors = watched(browser, loaded)
+        seen.goto(url)
         client.apply(name, insert=[(0, 0), (4, 0), (4, 3)])
         seen.wait_for_function("document.title === 'revision 1: area 6'")
         client.apply(name, insert=[(0, 3)])
@@ -159,6 +185,52 @@ def test_a_page_with_a_live_hull(gateway: Gateway, server: MortalServer, tmp_pat
         assert seen.locator("polygon").get_attribute("points") == "0,0 4,0 4,3 0,3"
         assert errors == []
         seen.close()
-        pages.shutdown()
-        serving.join()
     assert sum(len(gzip.compress(each)) for each in loaded) <= ONE_SCRIPT
+
+
+# The share of the pixels of the map that have about the colour.
+INKED = """colour => {
+    const [, things] = document.querySelector("dynhull-map").shadowRoot.querySelectorAll("canvas")
+    const {data} = things.getContext("2d").getImageData(0, 0, things.width, things.height)
+    const [red, green, blue] = [1, 3, 5].map(at => parseInt(colour.slice(at, at + 2), 16))
+    let found = 0
+    for (let i = 0; i < data.length; i += 4)
+        found += data[i + 3] > 200 && Math.hypot(data[i] - red, data[i + 1] - green, data[i + 2] - blue) < 30
+    return found
+}"""
+HULL, FENCE, ALARM = "#0072B2", "#9b5de5", "#D0342C"
+
+
+def test_a_map_of_a_hull_a_fence_and_an_alarm(gateway: Gateway, server: MortalServer, tmp_path: Path) -> None:
+    name = "typescript/map.html"
+    with served(tmp_path, gateway, "map.html") as url, HullClient(server.address) as client, chromium() as browser:
+        client.create_hull(name, keyed="str")
+        client.create_fence("yard", [(2, -1), (9, -1), (9, 9), (2, 9)], subjects=name)
+        client.create_alarm("spread", hull=name, when="area > 100")
+        client.put(name, list("abc"), [(0, 0), (4, 0), (4, 3)])
+        seen, errors = watched(browser)
+        streams: list[str] = []
+        seen.on("request", lambda request: streams.append(request.url) if request.url.endswith("/streams") else None)
+        seen.goto(url)
+        seen.wait_for_function("document.title === 'revision 1'")
+        for colour in (HULL, FENCE):
+            seen.wait_for_function(f"({INKED})('{colour}') > 200")
+        assert seen.evaluate(INKED, ALARM) == 0
+        client.put(name, ["c"], [(4, 90)])
+        shown = seen.locator("dynhull-map .alarms li")
+        expect(shown).to_have_text(f"▲ spread: {name}, 180", timeout=PATIENCE * 1000)
+        seen.wait_for_function(f"({INKED})('{ALARM}') > 200")
+        client.put(name, ["c"], [(4, 3)])
+        expect(shown).to_have_count(0, timeout=PATIENCE * 1000)
+        seen.wait_for_function(f"({INKED})('{HULL}') > 200")
+        server.kill()
+        server.start()
+        client.put(name, ["d"], [(0, 3)])
+        seen.wait_for_function("document.title === 'revision 4'")
+        seen.evaluate("document.querySelector('dynhull-map').setAttribute('hull', '')")
+        seen.wait_for_function(f"({INKED})('{HULL}') === 0")
+        assert len(streams) == 1, "all that the map follows is to take one connection"
+        assert errors == []
+        seen.close()
+        client.delete_alarm("spread")
+        client.delete_fence("yard")

@@ -19,7 +19,9 @@ from ..tiles import Tiles
 HERE = Path(__file__).parent
 # Libraries and maps of others, as published; their licences are in LICENSES.txt.
 VENDOR = HERE.parent / "vendor"
-SCRIPTS = (
+# What draws, which the package for browsers has; of the source code, or beside the other scripts.
+MAP = next(each for each in (HERE / "map", HERE.parents[2] / "typescript" / "src" / "map") if each.exists())
+DRAWING = (
     "views.js",
     "coasts.js",
     "tiles.js",
@@ -31,6 +33,8 @@ SCRIPTS = (
     "trails.js",
     "picture.js",
     "hands.js",
+)
+SCRIPTS = (
     "recorder.js",
     "time_bar.js",
     "time_lines.js",
@@ -83,7 +87,10 @@ def page(hub: Hub, tiles: Tiles | None) -> tuple[str, str]:
     }
     texts = {name: escape(str(value)) for name, value in settings.items()}
     pictures = {"inside": symbol(INSIDE), "mean": key(MEAN), "percentile": key(PERCENTILE)}
-    parts = {"styles": _read("page.css") + _dark_symbols(), "scripts": "".join(map(_read, SCRIPTS))}
+    parts = {
+        "styles": _read("page.css") + _dark_symbols(),
+        "scripts": "".join([*map(_drawing, DRAWING), *map(_read, SCRIPTS)]),
+    }
     content = "".join([_read("page.html"), *parts.values(), *texts.values()])
     version = hashlib.sha256(content.encode()).hexdigest()[:16]
     return Template(_read("page.html")).substitute(texts, **pictures, **parts, version=version), version
@@ -112,6 +119,11 @@ def _dark_symbols() -> str:
         for colour, lighter in ON_DARK.items()
     )
     return f"@media (prefers-color-scheme: dark) {{\n{rules}}}\n"
+
+
+def _drawing(name: str) -> str:
+    """A module as a part of the one script of the page: there is nothing to import or export."""
+    return re.sub("^(import .*\n|export )", "", (MAP / name).read_text("utf-8"), flags=re.MULTILINE)
 
 
 def _read(name: str) -> str:

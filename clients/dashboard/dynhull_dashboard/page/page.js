@@ -12,6 +12,7 @@ const is_dark = matchMedia("(prefers-color-scheme: dark)"), on_dark = JSON.parse
 const lit = colour => is_dark.matches ? on_dark[colour] ?? colour : colour
 const picture = new Picture(find(".map"), {
   x_unit: settings.xUnit, y_unit: settings.yUnit, tiles: {url: settings.tiles, largest_zoom: +settings.largestZoom, attribution: settings.attribution},
+  coasts: "vendor/",
 })
 const events = new Events(key => seek(key))
 const alarms = new Alarms(find(".alarms"), ask)

@@ -1,6 +1,6 @@
 // The moments of the picture to go back to. Of the last minutes it keeps what the server sent, as text: of what is old and
 // much, every other drawing. What is older the server plays, as far as it has kept it.
-const RECORDED_MILLISECONDS = 5 * 60_000, MOST_TEXT = 60_000_000, TICK = 100
+const MOST_TEXT = 60_000_000, TICK = 100
 class Recorder {
   // `show` is given messages, whether they come now or are shown again; `ask` what is to be played, or null.
   constructor(show, changed, ask) {

@@ -1,7 +1,9 @@
+// @ts-nocheck
 // The names beside vertices, subjects of fences and points: as many as fit without overlap. Hovering shows the others.
-const LABEL_OFFSET = 8, RING_RADIUS = 13, WIDE_RING_RADIUS = 17, RING_DASH = [5, 3]
-const MOST_HALOS = 100  // of more names, drawing takes too long
-class Labels {
+import { FOUND_LABEL_FONT, LABEL_FONT, LABEL_GAP, LABEL_HEIGHT, is_inside, label_box, square_box, text_width } from "./boxes.js"
+export const LABEL_OFFSET = 8, RING_RADIUS = 13, WIDE_RING_RADIUS = 17, RING_DASH = [5, 3]
+export const MOST_HALOS = 100  // of more names, drawing takes too long
+export class Labels {
   shown = new Set()
   all = false  // of points that are no vertices, too
   draw(canvas, picture) {
@@ -48,7 +50,7 @@ class Labels {
 }
 // The rings around the key that the viewer looks for and around the most influential vertices, and their names: where they
 // are, before other text takes the room.
-function place_rings(picture) {
+export function place_rings(picture) {
   const {view, sought, taken, hulls, outliers} = picture, found = sought ? picture.found() : []
   const stretching = outliers ? [...hulls.values()].filter(hull => hull.outliers.vertex) : []
   const ringed = [
@@ -67,7 +69,7 @@ function place_rings(picture) {
     return [{across, down, box, ...ring}]
   })
 }
-function draw_rings(canvas, {rings, colours}) {
+export function draw_rings(canvas, {rings, colours}) {
   canvas.font = FOUND_LABEL_FONT
   for (const {across, down, colour, text, radius, dash, box: {left, top, right, bottom}} of rings) {
     for (const [style, width] of [[colours.paper, 7], [colour, 3]]) {

@@ -1,8 +1,12 @@
+// @ts-nocheck
 // The fences in the picture: areas, margins, names, and the subjects inside.
-const ARC_STEPS = 96, NAME_FONT = `bold 13px ${FONT}`, NAME_HEIGHT = 18, NAME_GAP = 9, LONGEST_NAME = 28
-const AREA_ALPHA = 0.08, HALO_ALPHA = 0.25, HALO_WIDTH = 8, MARGIN_DASH = [3, 3], MARK_RADIUS = 6
-const NO_AREA = {hulls: [], margin: 0, polygons: [], around: [], globe: false}, NOBODY = {hull: [], key: [], x: [], y: []}
-class Fence {
+import { Boxes, FONT, is_inside, square_box, text_width } from "./boxes.js"
+import { STAR_SIZE, add_marker, sizes_in_crowds } from "./hulls.js"
+import { box_around, wound } from "./views.js"
+export const ARC_STEPS = 96, NAME_FONT = `bold 13px ${FONT}`, NAME_HEIGHT = 18, NAME_GAP = 9, LONGEST_NAME = 28
+export const AREA_ALPHA = 0.08, HALO_ALPHA = 0.25, HALO_WIDTH = 8, MARGIN_DASH = [3, 3], MARK_RADIUS = 6
+export const NO_AREA = {hulls: [], margin: 0, polygons: [], around: [], globe: false}, NOBODY = {hull: [], key: [], x: [], y: []}
+export class Fence {
   constructor(name, look) {
     this.name = name
     this.look = look
@@ -29,7 +33,7 @@ class Fence {
     return key.map((text, row) => ({key: text, hull: hull[row], place: hulls.get(hull[row])?.place_of(text) ?? [x[row], y[row]]}))
   }
 }
-function draw_fences(canvas, {view, hulls, fences}) {
+export function draw_fences(canvas, {view, hulls, fences}) {
   const stroke = (polygons, width, alpha, dash) => {
     canvas.beginPath()
     for (const rings of polygons) view.polygon(canvas, rings)
@@ -55,7 +59,7 @@ function draw_fences(canvas, {view, hulls, fences}) {
     stroke(fence.margins(view, hulls), 1, 0.8, MARGIN_DASH)
   }
 }
-function draw_marks(canvas, {view, hulls, fences, colours}) {
+export function draw_marks(canvas, {view, hulls, fences, colours}) {
   for (const fence of fences.values()) {
     const places = fence.marks(hulls).map(({place}) => view.place(...place)), sizes = sizes_in_crowds(places, STAR_SIZE)
     canvas.fillStyle = fence.look.colour
@@ -70,7 +74,7 @@ function draw_marks(canvas, {view, hulls, fences, colours}) {
   }
 }
 // The name above or below each area, or in its middle: where there is room; else above or below, over points.
-function draw_fence_names(canvas, {view, hulls, fences, taken, colours, rings}) {
+export function draw_fence_names(canvas, {view, hulls, fences, taken, colours, rings}) {
   const names = new Boxes()
   for (const {across, down, radius, box} of rings) {
     names.add(square_box(across, down, radius))
@@ -103,7 +107,7 @@ function draw_fence_names(canvas, {view, hulls, fences, taken, colours, rings}) 
   canvas.textAlign = "left"
 }
 // The outline at a distance from a convex polygon whose vertices are counterclockwise.
-function offset_outline(corners, distance) {
+export function offset_outline(corners, distance) {
   const outline = []
   let at = corners.reduce((best, [x], row) => x > corners[best][0] ? row : best, 0)
   for (let step = 0; step < ARC_STEPS; step++) {

@@ -1,7 +1,10 @@
+// @ts-nocheck
 // All hulls of some prefixes: outlines alone, each prefix in one colour.
-const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, LEAST_PIXELS = 3, MOST_FILLED = 2_000, CROWD_ALPHA = 0.5
+import { Hull } from "./hulls.js"
+import { box_around } from "./views.js"
+export const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, LEAST_PIXELS = 3, MOST_FILLED = 2_000, CROWD_ALPHA = 0.5
 // What is drawn of one of many hulls, with the extreme corners alone for the extent of the picture.
-class Outline extends Hull {
+export class Outline extends Hull {
   take(message) {
     super.take({...message, kind: "vertices"})
     const [left, low, right, high] = box_around(this.corners)
@@ -23,7 +26,7 @@ class Outline extends Hull {
     } else for (const rings of this.polygons(view)) view.polygon(canvas, rings)
   }
 }
-class Many {
+export class Many {
   constructor() {
     this.prefixes = new Map()  // the look of each, and its hulls by name
   }
@@ -48,7 +51,7 @@ class Many {
   }
 }
 // Each by itself: one path of thousands takes seconds. Of a crowd the lines are enough, through which others can be seen.
-function draw_many(canvas, {view, many}) {
+export function draw_many(canvas, {view, many}) {
   canvas.lineWidth = 1
   for (const {look, hulls} of many.prefixes.values()) {
     const crowded = hulls.size > MOST_FILLED, line_alpha = crowded ? CROWD_ALPHA : 1
@@ -67,7 +70,7 @@ function draw_many(canvas, {view, many}) {
   canvas.globalAlpha = 1
 }
 // What a message about many hulls says of each, as messages that are kept one by one; `known` are those there were.
-function* told_apart({prefix, whole, hulls}, known) {
+export function* told_apart({prefix, whole, hulls}, known) {
   const names = new Set(hulls.map(({hull}) => hull))
   for (const hull of whole ? known : []) if (!names.has(hull)) yield {kind: "outline", within: prefix, hull, revision: 0, x: [], y: [], rings: null, gone: true}
   for (const each of hulls) yield {kind: "outline", within: prefix, ...each}

@@ -1,7 +1,9 @@
+// @ts-nocheck
 // A map of another server: square pictures in the Web Mercator projection, bent into the view of the globe in pieces.
-const TILE_PIXELS = 256, MOST_TILES = 300, MOST_KEPT_TILES = 600, FEWEST_ZOOM = 2, MOST_PIECES = 16, OVERLAP_PIXELS = 0.6
-const TILE_RETRY_MILLISECONDS = 10_000
-class Tiles {
+import { RADIAN, unit_vector } from "./views.js"
+export const TILE_PIXELS = 256, MOST_TILES = 300, MOST_KEPT_TILES = 600, FEWEST_ZOOM = 2, MOST_PIECES = 16, OVERLAP_PIXELS = 0.6
+export const TILE_RETRY_MILLISECONDS = 10_000
+export class Tiles {
   // `url` has {z}, {x} and {y}; without one there are no tiles. `changed` is called when a picture has come or cannot come.
   constructor({url, largest_zoom}, changed) {
     this.url = url
@@ -71,17 +73,17 @@ class Tiles {
     if (image) bend(canvas, view, tile, image, source)
   }
 }
-const QUARTERS = [[0, 0], [1, 0], [0, 1], [1, 1]]
+export const QUARTERS = [[0, 0], [1, 0], [0, 1], [1, 1]]
 // The width of a tile at the equator, in radians.
-function tile_angle(zoom) {
+export function tile_angle(zoom) {
   return 2 * Math.PI / 2 ** zoom
 }
-function tile_place(zoom, across, down) {
+export function tile_place(zoom, across, down) {
   const angle = tile_angle(zoom)
   return [(across * angle - Math.PI) / RADIAN, Math.atan(Math.sinh(Math.PI - down * angle)) / RADIAN]
 }
 // Draws part of a picture, a square, where a tile is: as parallelograms which are less than a pixel off.
-function bend(canvas, view, [zoom, column, row], image, [left, top, size]) {
+export function bend(canvas, view, [zoom, column, row], image, [left, top, size]) {
   const off = view.scale * tile_angle(zoom) ** 2 / 4, pieces = Math.max(1, Math.min(MOST_PIECES, Math.ceil(Math.sqrt(off))))
   const place = (i, j) => view.place(...tile_place(zoom, column + i / pieces, row + j / pieces))
   const grid = Array.from({length: pieces + 1}, (_, j) => Array.from({length: pieces + 1}, (_, i) => place(i, j)))

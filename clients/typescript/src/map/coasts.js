@@ -1,24 +1,30 @@
+// @ts-nocheck
 // Coasts and borders of Natural Earth, drawn again for each view. Great circles between their points would look the same.
-const COARSE = "vendor/countries-110m.json", FINE = "vendor/countries-50m.json", PIECE = 48
+import * as topojson from "topojson-client"
+import { RADIAN, unit_vector } from "./views.js"
+export const COARSE = "countries-110m.json", FINE = "countries-50m.json", PIECE = 48
 // Pixels in a radian from which the fine coasts are drawn. Most of them are out of sight when the scale is larger still:
 // then they can be drawn while the picture moves, too.
-const FINE_SCALE = 900, FINE_MOVING_SCALE = 5000
-class Coasts {
-  constructor(changed) {
+export const NO_LINES = {coasts: [], borders: []}, FINE_SCALE = 900, FINE_MOVING_SCALE = 5000
+export class Coasts {
+  // `folder` has the files of world-atlas; without one there are no lines.
+  constructor(folder, changed) {
+    this.folder = folder
     this.changed = changed
     this.known = new Map()
   }
   // The lines to draw, once they are loaded.
   lines(scale, moving) {
+    if (!this.folder) return NO_LINES
     const name = scale > (moving ? FINE_MOVING_SCALE : FINE_SCALE) ? FINE : COARSE
     if (!this.known.has(name)) {
       this.known.set(name, undefined)
-      fetch(name).then(answer => answer.json()).then(atlas => {
+      fetch(this.folder + name).then(answer => answer.json()).then(atlas => {
         this.known.set(name, decoded(atlas))
         this.changed()
       }).catch(() => this.known.delete(name))  // the next view asks again
     }
-    return this.known.get(name) ?? this.known.get(COARSE) ?? this.known.get(FINE) ?? {coasts: [], borders: []}
+    return this.known.get(name) ?? this.known.get(COARSE) ?? this.known.get(FINE) ?? NO_LINES
   }
   draw(canvas, view, colours, moving) {
     const {coasts, borders} = this.lines(view.scale, moving)
@@ -31,13 +37,13 @@ class Coasts {
     }
   }
 }
-function decoded(atlas) {
+export function decoded(atlas) {
   const {countries} = atlas.objects
   const lines = filter => topojson.mesh(atlas, countries, filter).coordinates.flatMap(pieces)
   return {coasts: lines((one, two) => one == two), borders: lines((one, two) => one != two)}
 }
 // A line as pieces of few points: unit vectors, with a ball around them, so that what is out of sight costs little.
-function pieces(line) {
+export function pieces(line) {
   const found = []
   for (let first = 0; first + 1 < line.length; first += PIECE) {
     const part = line.slice(first, first + PIECE + 1)
@@ -55,7 +61,7 @@ function pieces(line) {
   }
   return found
 }
-function trace(canvas, view, {points, middle, reach}) {
+export function trace(canvas, view, {points, middle, reach}) {
   if (!view.sees(middle, reach)) return
   const lon = view.middle[0] * RADIAN, sin_lon = Math.sin(lon), cos_lon = Math.cos(lon), {sin, cos, scale} = view
   const [center, center_down] = view.center()

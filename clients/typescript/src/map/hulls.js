@@ -1,9 +1,10 @@
+// @ts-nocheck
 // The hulls in the picture.
-const SURFACE_ALPHA = 0.12, POINT_ALPHA = 0.65, POINT_SIZE = 4, VERTEX_SIZE = 8, STAR_SIZE = 16
-const LEAST_SIZE = 0.35, ROOM_FOR = 4  // things in a square of twice their size do not overlap much
-const NOTHING = {revision: 0, x: [], y: [], keys: null, rings: null}
-const NO_OUTLIERS = {layers: [], vertex: null, label: ""}, LAYER_ALPHA = 0.7
-const SHAPES = {
+export const SURFACE_ALPHA = 0.12, POINT_ALPHA = 0.65, POINT_SIZE = 4, VERTEX_SIZE = 8, STAR_SIZE = 16
+export const LEAST_SIZE = 0.35, ROOM_FOR = 4  // things in a square of twice their size do not overlap much
+export const NOTHING = {revision: 0, x: [], y: [], keys: null, rings: null}
+export const NO_OUTLIERS = {layers: [], vertex: null, label: ""}, LAYER_ALPHA = 0.7
+export const SHAPES = {
   square: [[-4, -4], [4, -4], [4, 4], [-4, 4]],
   triangle: [[0, -5], [4.5, 3.5], [-4.5, 3.5]],
   inverted_triangle: [[0, 5], [4.5, -3.5], [-4.5, -3.5]],
@@ -12,14 +13,14 @@ const SHAPES = {
   star: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(i => [(i % 2 ? 3.4 : 8) * Math.sin(i * Math.PI / 5), -(i % 2 ? 3.4 : 8) * Math.cos(i * Math.PI / 5)]),
 }
 // How large each of some things is drawn, from LEAST_SIZE to 1: a crowd becomes small, so that it does not hide what is below.
-function sizes_in_crowds(places, pixels) {
+export function sizes_in_crowds(places, pixels) {
   const cell = 2 * pixels, counts = new Map()
   const cells = places.map(([across, down]) => Math.floor(across / cell) * 100_000 + Math.floor(down / cell))
   for (const each of cells) counts.set(each, (counts.get(each) ?? 0) + 1)
   return cells.map(each => Math.max(LEAST_SIZE, Math.min(1, Math.sqrt(ROOM_FOR / counts.get(each)))))
 }
 // Adds a marker to the path of a canvas.
-function add_marker(canvas, marker, [across, down], size) {
+export function add_marker(canvas, marker, [across, down], size) {
   const shape = SHAPES[marker]
   if (!shape) {
     canvas.moveTo(across + size * VERTEX_SIZE / 2, down)
@@ -29,7 +30,7 @@ function add_marker(canvas, marker, [across, down], size) {
   shape.forEach(([x, y], row) => row ? canvas.lineTo(across + size * x, down + size * y) : canvas.moveTo(across + size * x, down + size * y))
   canvas.closePath()
 }
-class Hull {
+export class Hull {
   constructor(name, look) {
     this.name = name
     this.look = look
@@ -74,7 +75,7 @@ class Hull {
   }
 }
 // Of all functions that draw: the canvas in CSS pixels, and the picture.
-function draw_surfaces(canvas, {view, hulls}) {
+export function draw_surfaces(canvas, {view, hulls}) {
   for (const hull of hulls.values()) {
     canvas.beginPath()
     for (const rings of hull.polygons(view)) view.polygon(canvas, rings)
@@ -89,7 +90,7 @@ function draw_surfaces(canvas, {view, hulls}) {
   }
 }
 // The deeper, the fainter.
-function draw_layers(canvas, {view, hulls, outliers}) {
+export function draw_layers(canvas, {view, hulls, outliers}) {
   if (!outliers) return
   canvas.lineWidth = 1
   for (const {layers, look} of hulls.values()) {
@@ -103,7 +104,7 @@ function draw_layers(canvas, {view, hulls, outliers}) {
   }
   canvas.globalAlpha = 1
 }
-function draw_points(canvas, {view, hulls}) {
+export function draw_points(canvas, {view, hulls}) {
   canvas.globalAlpha = POINT_ALPHA
   for (const {points: {x, y}, look} of hulls.values()) {
     canvas.beginPath()
@@ -117,7 +118,7 @@ function draw_points(canvas, {view, hulls}) {
   }
   canvas.globalAlpha = 1
 }
-function draw_vertices(canvas, {view, hulls}) {
+export function draw_vertices(canvas, {view, hulls}) {
   for (const {vertices: {x, y}, look} of hulls.values()) {
     canvas.beginPath()
     const places = x.map((each, row) => view.place(each, y[row])), sizes = sizes_in_crowds(places, VERTEX_SIZE)

@@ -1,8 +1,10 @@
+// @ts-nocheck
 // Where things are in the picture: in a plane, and on the globe. Both have the same methods.
-const FRAME_MARGIN = 0.08, LEAST_FILLED = 0.5, NO_FRAME = [0, 0, 1, 1]
-const EARTH_RADIUS = 6371008.8, ALONE_METRES = 100_000, LARGEST_SCALE = 1e10, RADIAN = Math.PI / 180
+import * as d3 from "d3-geo"
+export const FRAME_MARGIN = 0.08, LEAST_FILLED = 0.5, NO_FRAME = [0, 0, 1, 1]
+export const EARTH_RADIUS = 6371008.8, ALONE_METRES = 100_000, LARGEST_SCALE = 1e10, RADIAN = Math.PI / 180
 // The smallest box around some points.
-function box_around(points) {
+export function box_around(points) {
   const box = [Infinity, Infinity, -Infinity, -Infinity]
   for (const [x, y] of points) {
     box[0] = Math.min(box[0], x)
@@ -15,7 +17,7 @@ function box_around(points) {
 // The region that a picture shows: the old frame while the box fits and fills it, else a new one, so that the picture
 // stands still while the hulls in it move. With one scale for both axes the box fills the frame along either of them,
 // otherwise along both.
-function frame_around(box, frame, same_scale = true) {
+export function frame_around(box, frame, same_scale = true) {
   let size = [box[2] - box[0], box[3] - box[1]]
   if (frame) {
     const fits = box[0] >= frame[0] && box[1] >= frame[1] && box[2] <= frame[2] && box[3] <= frame[3]
@@ -27,7 +29,7 @@ function frame_around(box, frame, same_scale = true) {
   const room = size.map((each, axis) => FRAME_MARGIN * (each || Math.max(Math.abs(box[axis]), Math.abs(box[axis + 2])) || 1))
   return [box[0] - room[0], box[1] - room[1], box[2] + room[0], box[3] + room[1]]
 }
-class PlaneView {
+export class PlaneView {
   globe = false
   constructor(same_scale) {
     this.same_scale = same_scale
@@ -88,7 +90,7 @@ class PlaneView {
 }
 // The globe as seen from far away (orthographic), from above the middle of the picture: there the scale is right in all
 // directions, and poles and 180 degrees are places like others. d3-geo follows great circles to within half a pixel.
-class GlobeView {
+export class GlobeView {
   globe = true
   constructor() {
     this.projection = d3.geoOrthographic().precision(0.5)
@@ -190,12 +192,12 @@ class GlobeView {
     d3.geoPath(this.projection, canvas)(line ? {type: "LineString", coordinates: coordinates[0]} : {type: "Polygon", coordinates})
   }
 }
-function unit_vector(lon, lat) {
+export function unit_vector(lon, lat) {
   const cos = Math.cos(lat * RADIAN)
   return [cos * Math.cos(lon * RADIAN), cos * Math.sin(lon * RADIAN), Math.sin(lat * RADIAN)]
 }
 // Rings as d3-geo wants them: the exterior, which is smaller than half the globe, clockwise, and the holes the other way.
-function wound(rings) {
+export function wound(rings) {
   return rings.map((ring, row) => {
     const large = d3.geoArea({type: "Polygon", coordinates: [[...ring, ring[0]]]}) > 2 * Math.PI
     return large == (row == 0) ? [...ring].reverse() : ring

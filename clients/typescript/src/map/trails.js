@@ -1,6 +1,7 @@
+// @ts-nocheck
 // Where keys have been within the last minute.
-const TRAIL_MILLISECONDS = 60_000, TRAIL_STEP = 1000, TRAIL_ALPHA = 0.45, MOST_TRAILS = 2_000
-class Trails {
+export const RECORDED_MILLISECONDS = 5 * 60_000, TRAIL_MILLISECONDS = 60_000, TRAIL_STEP = 1000, TRAIL_ALPHA = 0.45, MOST_TRAILS = 2_000
+export class Trails {
   hulls = new Map()
   shown = false  // of all keys; the one that is looked for always has its trail
   // A drawing of a hull that arrived at a moment. Positions are kept as long as the recording goes back.
@@ -45,7 +46,7 @@ class Trails {
   }
 }
 // From where the key is to where it was a minute before.
-function trace_back(canvas, view, here, trail, until) {
+export function trace_back(canvas, view, here, trail, until) {
   let place = view.place(...here), pen = !isNaN(place[0])
   canvas.moveTo(...place)
   for (let row = trail.length - 1; row >= 0 && trail[row][0] > until - TRAIL_MILLISECONDS; row--) {

@@ -1,6 +1,8 @@
+// @ts-nocheck
 // What the viewer's hands do with the picture: dragging, pinching, scrolling, keys, and pointing at things.
-const PAN_STEP = 60, ZOOM_STEP = 1.4, NEAR = 12, WHEEL_PIXELS = 300, CLICK_PIXELS = 4
-class Hands {
+import { place_words } from "./picture.js"
+export const PAN_STEP = 60, ZOOM_STEP = 1.4, NEAR = 12, WHEEL_PIXELS = 300, CLICK_PIXELS = 4
+export class Hands {
   // `toggle_pause` is what the space bar does.
   constructor(picture, tip, toggle_pause) {
     this.picture = picture
@@ -97,6 +99,6 @@ class Hands {
     return best
   }
 }
-function distance(one, two) {
+export function distance(one, two) {
   return Math.hypot(one[0] - two[0], one[1] - two[1])
 }

@@ -1,18 +1,29 @@
+// @ts-nocheck
 // The picture: two canvases, one for the ground (coasts or axes), one for what moves, and the order in which things are
 // drawn. A new layer is a function of the canvas and the picture, in its place in LAYERS.
-const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
+import * as d3 from "d3-geo"
+import { Boxes, FONT, square_box } from "./boxes.js"
+import { Coasts } from "./coasts.js"
+import { Fence, MARK_RADIUS, draw_fence_names, draw_fences, draw_marks } from "./fences.js"
+import { Hull, draw_layers, draw_points, draw_surfaces, draw_vertices } from "./hulls.js"
+import { Labels, draw_rings, place_rings } from "./labels.js"
+import { Many, draw_many } from "./many.js"
+import { Tiles } from "./tiles.js"
+import { Trails } from "./trails.js"
+import { EARTH_RADIUS, GlobeView, PlaneView, RADIAN } from "./views.js"
+export const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
   draw_rings]
-const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
-const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
-function draw_trails(canvas, picture) {
+export const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
+export const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
+export function draw_trails(canvas, picture) {
   picture.trails.draw(canvas, picture)
 }
-function draw_names(canvas, picture) {
+export function draw_names(canvas, picture) {
   picture.labels.draw(canvas, picture)
 }
-class Picture {
-  // `settings` are those of the page: units, whether x and y have one scale, and tiles of a map.
-  constructor(element, {x_unit, y_unit, tiles}) {
+export class Picture {
+  // Units, whose being equal says that x and y have one scale; tiles of a map, and the folder of the coasts, if any.
+  constructor(element, {x_unit, y_unit, tiles, coasts}) {
     this.element = element
     this.units = {x: x_unit, y: y_unit}
     this.canvases = [...element.querySelectorAll("canvas")]
@@ -24,7 +35,7 @@ class Picture {
     this.fences = new Map()
     this.labels = new Labels()
     this.trails = new Trails()
-    this.coasts = new Coasts(() => this.draw_all())
+    this.coasts = new Coasts(coasts, () => this.draw_all())
     this.tiles = new Tiles(tiles, () => {
       element.querySelector(".attribution").textContent = this.tiles.failed ? `No map from ${new URL(tiles.url).host}` : tiles.attribution
       this.draw_all()
@@ -133,7 +144,7 @@ class Picture {
       this.following = true
       view.refit()
       this.ground_drawn = false
-      this.element.closest(".page").classList.toggle("globe", view.globe)
+      this.element.closest(".page")?.classList.toggle("globe", view.globe)
     }
     if (this.wanted && globe.length) {
       view.show_extent(this.wanted)
@@ -270,29 +281,29 @@ class Picture {
   }
 }
 // An extent as it is in an address; undefined for what is none.
-function read_extent(text) {
+export function read_extent(text) {
   const numbers = text?.split(",").map(Number) ?? [], [, , wide, high = wide] = numbers
   return numbers.every(isFinite) && wide > 0 && high > 0 ? numbers : undefined
 }
 // A place, on the globe to the decimetre.
-function place_words(place, globe) {
+export function place_words(place, globe) {
   const [x, y] = place.map(each => globe ? +each.toFixed(6) : +each.toPrecision(8))
   return globe ? [`longitude ${x}`, `latitude ${y}`] : [`x ${x}`, `y ${y}`]
 }
 // One, two or five times a power of ten.
-function nice_below(length) {
+export function nice_below(length) {
   const power = 10 ** Math.floor(Math.log10(length))
   return [5, 2, 1].find(each => each * power <= length) * power
 }
-function ticks(low, high, count) {
+export function ticks(low, high, count) {
   const step = nice_below(2 * (high - low) / Math.max(2, count))
   const first = Math.ceil(low / step), last = Math.floor(high / step)
   if (!(step > 0) || !isFinite(first) || last - first > 100) return []
   return Array.from({length: last - first + 1}, (_, row) => (first + row) * step)
 }
 // 1.2K and 3.4M; very small and very large numbers with an exponent.
-const short_number = new Intl.NumberFormat("en", {notation: "compact", maximumSignificantDigits: 4})
-function compact(value) {
+export const short_number = new Intl.NumberFormat("en", {notation: "compact", maximumSignificantDigits: 4})
+export function compact(value) {
   const size = Math.abs(value)
   return size > 0 && (size < 1e-3 || size >= 1e15) ? value.toExponential(1) : short_number.format(value)
 }

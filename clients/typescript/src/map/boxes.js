@@ -1,11 +1,12 @@
+// @ts-nocheck
 // Room for text: boxes that do not overlap.
-const LABEL_HEIGHT = 15, LABEL_GAP = 3, CELL_WIDTH = 96, CELL_HEIGHT = 32
-const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif"
-const LABEL_FONT = `12px ${FONT}`, FOUND_LABEL_FONT = `bold ${LABEL_FONT}`
-const MOST_WIDTHS = 20_000
-const ruler = document.createElement("canvas").getContext("2d")
-const widths = new Map()
-function text_width(text, font) {
+export const LABEL_HEIGHT = 15, LABEL_GAP = 3, CELL_WIDTH = 96, CELL_HEIGHT = 32
+export const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif"
+export const LABEL_FONT = `12px ${FONT}`, FOUND_LABEL_FONT = `bold ${LABEL_FONT}`
+export const MOST_WIDTHS = 20_000
+export const ruler = document.createElement("canvas").getContext("2d")
+export const widths = new Map()
+export function text_width(text, font) {
   const id = font + text
   let width = widths.get(id)
   if (width == undefined) {
@@ -16,17 +17,17 @@ function text_width(text, font) {
   return width
 }
 // The box of a text whose left or right end is at x.
-function label_box(x, bottom, width, side) {
+export function label_box(x, bottom, width, side) {
   const left = side == "left" ? x : x - width
   return {left: left - LABEL_GAP, right: left + width + LABEL_GAP, top: bottom - LABEL_HEIGHT, bottom, side}
 }
-function square_box(across, down, radius) {
+export function square_box(across, down, radius) {
   return {left: across - radius, right: across + radius, top: down - radius, bottom: down + radius}
 }
-function is_inside(box, {left, top, width, height}) {
+export function is_inside(box, {left, top, width, height}) {
   return box.left >= left && box.right <= left + width && box.top >= top && box.bottom <= top + height
 }
-class Boxes {
+export class Boxes {
   cells = new Map()
   add(box) {
     for (const cell of this.around(box)) {
