@@ -17,6 +17,7 @@ EXCEPTIONS = {
     "bridges/test_webhooks.py": "receivers that are slow to answer",
     "robustness/bridges/ingest_torture.py": "faults come at moments of chance",
     "robustness/bridges/mqtt_torture.py": "publishes now and then",
+    "robustness/bridges/alarm_torture.py": "faults come at moments of chance",
     "robustness/bridges/relay_torture.py": "faults come at moments of chance",
     "robustness/fences/kill_torture.py": "looks again and again whether others have failed",
     "robustness/server/actors.py": "looks again and again whether to go on",
