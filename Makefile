@@ -151,6 +151,7 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 	$(BIN)/python tests/robustness/fences/fence_torture.py --steps 1000000
 	$(BIN)/python tests/robustness/fences/kill_torture.py --steps 1000000 --kills 1000
 	$(BIN)/python tests/robustness/bridges/relay_torture.py --kills 100
+	$(BIN)/python tests/robustness/bridges/alarm_torture.py --faults 300
 	$(BIN)/python tests/robustness/bridges/ingest_torture.py --kills 50
 	$(BIN)/python tests/robustness/bridges/ingest_torture.py --kills 20 --only broker
 	$(BIN)/python tests/robustness/bridges/mqtt_torture.py --kills 20
@@ -164,6 +165,7 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100 --workers
 	$(BIN)/python tests/robustness/cluster/machines_torture.py --faults 100
 	$(BIN)/python tests/robustness/cluster/planned.py --changes 300
+	$(BIN)/python tests/robustness/bridges/alarm_torture.py --faults 100 --moves
 
 FAULTS ?= 25
 
@@ -201,8 +203,8 @@ objects: .venv/.test  ## servers that keep the past of hulls in an object store,
 languages: .venv/.test  ## the programs in Go, Java and Rust on their pages, each where its tools are: built, and run beside a server that is killed
 	PATH="$(CURDIR)/$(BIN):$$PATH" LANGUAGES_CASES=all $(BIN)/pytest tests/docs/test_languages.py
 
-kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, which Maven brings (Debian: maven, default-jre-headless)
-	KAFKA_CASES=all $(BIN)/pytest tests/bridges/test_kafka.py
+kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, and a relay to one that is killed, which Maven brings (Debian: maven, default-jre-headless)
+	KAFKA_CASES=all $(BIN)/pytest tests/bridges/test_kafka.py tests/bridges/test_kafka_target.py
 
 soak: fuzz fuzz-server fuzz-gateway properties robustness robustness-cluster workers shards cluster ray objects ends simulate  ## all that takes too long for every run, for hours; `make test` has a short run of each
 	PYTHONPATH=tests $(BIN)/python -m simulation mutants

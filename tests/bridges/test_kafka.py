@@ -2,23 +2,22 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 from aiokafka import AIOKafkaProducer, TopicPartition
-from aiokafka.admin import AIOKafkaAdminClient, NewTopic, RecordsToDelete
-from aiokafka.errors import UnknownTopicOrPartitionError
+from aiokafka.admin import RecordsToDelete
 from brokers import broker, kafka
 from ingest_process import ingest_process, ingested
 from patience import PATIENCE, wait_until
 from ports import free_port
 from proxy import Proxy, proxy
+from topics import administer, made
 
 from dynhull_bridges.ingest import kafka as feeds
 from dynhull_bridges.ingest.feed import FeedError
-from dynhull_bridges.ingest.topic_id import topic_id
 from dynhull_client import HullClient
 
 pytestmark = [pytest.mark.long, pytest.mark.only_with("KAFKA_CASES")]
@@ -51,34 +50,6 @@ def client(address: str) -> Iterator[HullClient]:
 def topic(name: str) -> str:
     """A name of a topic, which has no slashes."""
     return name[-100:]
-
-
-def administer(servers: str, do: Callable[[AIOKafkaAdminClient], Awaitable[Any]]) -> None:
-    async def run() -> None:
-        admin = AIOKafkaAdminClient(bootstrap_servers=servers)
-        await admin.start()
-        try:
-            await do(admin)
-        finally:
-            await admin.close()
-
-    asyncio.run(run())
-
-
-def made(servers: str, topic: str, partitions: int = 1) -> None:
-    """Make a topic, in place of one under its name."""
-    before = known_id(servers, topic)
-    if before is not None:
-        administer(servers, lambda admin: admin.delete_topics([topic]))
-    administer(servers, lambda admin: admin.create_topics([NewTopic(topic, partitions, 1)]))
-    wait_until(lambda: known_id(servers, topic) not in (None, before))
-
-
-def known_id(servers: str, topic: str) -> bytes | None:
-    try:
-        return asyncio.run(topic_id(servers, topic, 1000 * PATIENCE))
-    except UnknownTopicOrPartitionError:
-        return None
 
 
 @asynccontextmanager

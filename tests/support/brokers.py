@@ -38,11 +38,14 @@ def nats_server(folder: Path, port: int) -> list[object]:
     return [program("nats-server"), "-js", "-a", "127.0.0.1", "-p", port, "-sd", folder / "nats"]
 
 
-def kafka(folder: Path, port: int, reached_at: str | None = None) -> list[object]:
+def kafka(
+    folder: Path, port: int, reached_at: str | None = None, protocol: str = "PLAINTEXT", **more: object
+) -> list[object]:
     """The command of a Kafka broker that is its own controller; `make kafka` brings its jars.
 
-    It tells clients to connect to `reached_at`, or to itself.
+    It tells clients to connect to `reached_at`, or to itself. `more` are settings, with "__" for dots.
     """
+    folder.mkdir(parents=True, exist_ok=True)
     config = folder / "kafka.properties"
     controller = free_port()
     settings = {
@@ -50,8 +53,8 @@ def kafka(folder: Path, port: int, reached_at: str | None = None) -> list[object
         "node.id": 1,
         "controller.quorum.voters": f"1@127.0.0.1:{controller}",
         "controller.listener.names": "CONTROLLER",
-        "listeners": f"PLAINTEXT://127.0.0.1:{port},CONTROLLER://127.0.0.1:{controller}",
-        "advertised.listeners": f"PLAINTEXT://{reached_at or f'127.0.0.1:{port}'}",
+        "listeners": f"{protocol}://127.0.0.1:{port},CONTROLLER://127.0.0.1:{controller}",
+        "advertised.listeners": f"{protocol}://{reached_at or f'127.0.0.1:{port}'}",
         "log.dirs": folder / "log",
         "auto.create.topics.enable": "false",
         "offsets.topic.num.partitions": 1,
@@ -59,11 +62,11 @@ def kafka(folder: Path, port: int, reached_at: str | None = None) -> list[object
         "transaction.state.log.num.partitions": 1,
         "transaction.state.log.replication.factor": 1,
         "transaction.state.log.min.isr": 1,
-    }
+    } | {name.replace("__", "."): value for name, value in more.items()}
     config.write_text("".join(f"{name}={value}\n" for name, value in settings.items()))
     java = [program("java"), "-XX:TieredStopAtLevel=1", "-Xmx512m", "-cp", KAFKA_JARS / "*"]
     cluster = "AAAAAAAAAAAAAAAAAAAAAQ"  # any id
-    formatting = [*java, "kafka.tools.StorageTool", "format", "-t", cluster, "-c", config]
+    formatting = [*java, "kafka.tools.StorageTool", "format", "--ignore-formatted", "-t", cluster, "-c", config]
     subprocess.run([*map(str, formatting)], check=True, capture_output=True)
     return [*java, "kafka.Kafka", config]
 

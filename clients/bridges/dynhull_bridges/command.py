@@ -26,7 +26,8 @@ To = Annotated[
     str,
     typer.Option(
         metavar="URL|FILE|-",
-        help="Receiver: http(s)://, mqtt(s)://HOST/TOPIC, nats://HOST/SUBJECT, a file, or - for standard output. "
+        help="Receiver: http(s)://, mqtt(s)://HOST/TOPIC, nats://HOST/SUBJECT, "
+        "kafka://HOST/TOPIC, a file, or - for standard output. "
         "{kind}, {name} and {type} of events are filled in. The environment keeps a URL that is a secret, as Slack's "
         "are, out of the list of processes.",
         envvar="DYNHULL_RELAY_TO",
@@ -65,6 +66,15 @@ Headers = Annotated[
         "--header",
         metavar="NAME: VALUE|@FILE",
         help="Header of webhooks, whose value is a template, too; or a file with such lines, as for secrets.",
+    ),
+]
+KafkaConfig = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        dir_okay=False,
+        envvar="DYNHULL_KAFKA_CONFIG",
+        help="Settings of Kafka's clients for TLS and passwords, such as security.protocol=SASL_SSL, a line each.",
     ),
 ]
 Timeout = Annotated[str, typer.Option(help="How long a delivery may take.")]
@@ -111,6 +121,7 @@ def send(
     body_template: BodyTemplate = None,
     content_type: ContentType = None,
     header: Headers = None,
+    kafka_config: KafkaConfig = None,
     timeout: Timeout = "30s",
 ) -> None:
     """Send dead letters again, the oldest first, with their ids, and remove those that arrive.
@@ -142,6 +153,8 @@ def send(
             body_template=body_template,
             content_type=content_type,
             header=header,
+            consumer=None,
+            kafka_config=kafka_config,
         )
         target = target_of(to, options)
         return await send_again([each for each in found if not ids or each.letter.id in ids], target)
@@ -179,6 +192,7 @@ def relay(
     body_template: BodyTemplate = None,
     content_type: ContentType = None,
     header: Headers = None,
+    kafka_config: KafkaConfig = None,
     batch: Annotated[int, typer.Option(min=1, max=1000, help="Most events in one webhook.")] = 1,
     timeout: Timeout = "30s",
     attempts: Annotated[
@@ -197,7 +211,7 @@ def relay(
     metrics_host: Annotated[str, typer.Option(help="Address of the metrics page.")] = "127.0.0.1",
     log_format: Annotated[LogForm, typer.Option(help="Form of the log on standard error.")] = LogForm.TEXT,
 ) -> None:
-    """Deliver the events of fences and alarms to webhooks, MQTT, NATS JetStream or a file, at least once and in order.
+    """Deliver the events of fences and alarms to webhooks, MQTT, NATS, Kafka or a file, at least once and in order.
 
         dynhull relay depot --consumer alarm --to https://alarms.example/hook
         dynhull relay alarm:spread alarm:silence --consumer pager --to https://alarms.example/hook
@@ -237,6 +251,8 @@ def relay(
         body_template=body_template,
         content_type=content_type,
         header=header,
+        consumer=consumer,
+        kafka_config=kafka_config,
     )
     patience = Patience(
         attempts, more_than_0(first_pause, "--first-pause"), more_than_0(longest_pause, "--longest-pause")

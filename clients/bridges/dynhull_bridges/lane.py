@@ -176,8 +176,13 @@ class Lane:
             except Exception as error:
                 self._figures.failed.labels(*self._labels).inc()
                 refusals += isinstance(error, RefusedError)
-                if refusals >= self._patience.attempts and self._bury(letters, str(error), refusals):
-                    break
+                if isinstance(error, RefusedError) and refusals >= self._patience.attempts:
+                    left = self._bury(letters, error, refusals)
+                    if not left:
+                        break
+                    if len(left) < len(letters):
+                        letters, refusals = left, 0
+                        continue
                 asked = error.retry_after or 0.0 if isinstance(error, NotDeliveredError) else 0.0
                 pause = max(next(pauses), min(asked, LONGEST_RETRY_AFTER))
                 self._log.warning(
@@ -197,17 +202,19 @@ class Lane:
         self._done = events[-1]
         self._news.set()
 
-    def _bury(self, letters: list[Letter], reason: str, attempts: int) -> bool:
-        """Keep what is refused; returns whether it could be."""
+    def _bury(self, letters: list[Letter], error: RefusedError, attempts: int) -> list[Letter]:
+        """Keep what is refused; returns what is still to deliver: all of it where it could not be kept."""
+        refused = letters if error.letter is None else [error.letter]
+        reason = str(error)
         try:
-            for each in letters:
+            for each in refused:
                 self._folder.bury(each, self._target.place(each), reason, attempts)
         except OSError as failure:
             self._log.error("no dead letter can be kept", error=str(failure))
-            return False
-        self._figures.dead.labels(*self._labels).inc(len(letters))
-        self._log.error("refused: a dead letter now", id=letters[0].id, letters=len(letters), error=reason)
-        return True
+            return letters
+        self._figures.dead.labels(*self._labels).inc(len(refused))
+        self._log.error("refused: a dead letter now", id=refused[0].id, letters=len(refused), error=reason)
+        return [each for each in letters if each not in refused]
 
     async def _acknowledge(self) -> None:
         """Acknowledge what is delivered, now and then: each acknowledgement is a commit of the server."""

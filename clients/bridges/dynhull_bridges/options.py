@@ -22,6 +22,8 @@ def options_from(
     body_template: Path | None,
     content_type: str | None,
     header: list[str] | None,
+    consumer: str | None,
+    kafka_config: Path | None,
 ) -> TargetOptions:
     """The options of a receiver of events of these kinds.
 
@@ -49,4 +51,6 @@ def options_from(
         allow_private=allow_private,
         body=body,
         headers=headers,
+        consumer=consumer,
+        kafka_config=kafka_config,
     )

@@ -23,7 +23,13 @@ class NotDeliveredError(Exception):
 
 
 class RefusedError(NotDeliveredError):
-    """The receiver does not want these letters: after some attempts they become dead letters."""
+    """The receiver does not want these letters: after some attempts they become dead letters.
+
+    Attributes:
+        letter: the one that it does not want; None if nothing is known about single ones.
+    """
+
+    letter: "Letter | None" = None
 
 
 def not_delivered(meaning: Meaning, message: str, retry_after: float | None = None) -> NotDeliveredError:

@@ -25,6 +25,8 @@ class TargetOptions:
         allow_private: whether webhooks may go to private networks.
         body: makes the bodies.
         headers: those that webhooks get besides.
+        consumer: the name of the relay's consumer; None for letters that are sent again.
+        kafka_config: a file of settings for Kafka.
     """
 
     keys: Sequence[bytes]
@@ -34,6 +36,8 @@ class TargetOptions:
     allow_private: bool
     body: Body = CLOUD_EVENTS
     headers: Sequence[Header] = ()
+    consumer: str | None = None
+    kafka_config: Path | None = None
 
 
 Open = Callable[[str, TargetOptions], Target]
@@ -55,6 +59,8 @@ def target_of(to: str, options: TargetOptions) -> Target:
         raise ValueError(f"--to {to}: {{kind}}, {{name}} and {{type}} are filled in in URLs; one file has all events")
     if scheme not in WEBHOOKS and options.batch > 1:
         raise ValueError("--batch is for webhooks (http and https)")
+    if scheme != "kafka" and options.kafka_config is not None:
+        raise ValueError("--kafka-config is for kafka://")
     if scheme not in WEBHOOKS and options.headers:
         raise ValueError("--header is for webhooks (http and https)")
     if options.body is not CLOUD_EVENTS and (scheme in LINES or options.batch > 1):
@@ -99,6 +105,13 @@ def _jetstream(to: str, options: TargetOptions) -> Target:
     return JetStream(to, options.timeout, options.body)
 
 
+def _kafka(to: str, options: TargetOptions) -> Target:
+    from .kafka import KafkaTarget
+    from .kafka_settings import read_settings
+
+    return KafkaTarget(to, options.timeout, options.consumer, options.body, read_settings(options.kafka_config))
+
+
 def _lines(to: str, _: TargetOptions) -> Target:
     from .lines import LinesFile, StandardOutput
 
@@ -110,4 +123,4 @@ def _lines(to: str, _: TargetOptions) -> Target:
 WEBHOOKS: dict[str, Open] = {"http": _webhook, "https": _webhook}
 LINES: dict[str, Open] = {"": _lines, "file": _lines}
 # Each imports what it needs, which takes long, only when it is asked for.
-TARGETS = {**WEBHOOKS, "mqtt": _mqtt, "mqtts": _mqtt, "nats": _jetstream, "tls": _jetstream, **LINES}
+TARGETS = {**WEBHOOKS, "mqtt": _mqtt, "mqtts": _mqtt, "nats": _jetstream, "tls": _jetstream, "kafka": _kafka, **LINES}

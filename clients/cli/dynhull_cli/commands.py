@@ -58,7 +58,7 @@ PANELS = {
 }
 OTHERS = "More"
 PACKAGES: dict[str | None, str | None] = {"google": "protobuf", "grpc": "grpcio"}  # of modules with other names
-EXTRAS = {"pyogrio": "gis"}  # of modules that a command needs for a part of what it does
+EXTRAS = {"aiokafka": "kafka", "pyogrio": "gis"}  # of modules that a command needs for a part of what it does
 
 
 class Flags:

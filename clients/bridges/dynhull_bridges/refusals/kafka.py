@@ -46,3 +46,16 @@ KAFKA = Refusals(
     },
     otherwise=Meaning.PASSES,
 )
+
+# What brokers and aiokafka say about records of the relay. All else is about the connection or the transaction.
+RECORDS = Refusals(
+    {
+        Meaning.FINAL: {
+            errors.InvalidTopicError: "no name of a topic",
+            errors.MessageSizeTooLargeError: "too large for the topic, or for a request",
+            errors.RecordListTooLargeError: "too large for a segment of the topic",
+            errors.TopicAuthorizationFailedError: "no rights on the topic",
+        },
+    },
+    otherwise=Meaning.PASSES,
+)
