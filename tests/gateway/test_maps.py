@@ -2,12 +2,15 @@
 
 import json
 import subprocess
+from datetime import timedelta
+from hashlib import sha256
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 import pytest
 from gateway_process import Gateway, gateway_process
 from peers import program
+from server_process import server_process
 
 from dynhull_client import HullClient
 
@@ -66,6 +69,52 @@ def test_pages_have_every_feature_once(gateway: Gateway, fleet: str) -> None:
         found += [each["id"] for each in page["features"]]
     assert found == KEYS
     gateway.post("/hulls/maps%2Ffleet/points", {"remove": ["v0000"]})
+
+
+def test_times_reach_the_past_of_a_hull_that_keeps_it(tmp_path: Path) -> None:
+    """In pages of one revision; with tokens it needs the right to read the past."""
+    tokens = tmp_path / "tokens.toml"
+    tokens.write_text(
+        "".join(
+            f'[[token]]\nsha256 = "{sha256(name.encode()).hexdigest()}"\nread = [""]\nwrite = [""]\n{more}\n'
+            for name, more in (("all", 'past = [""]'), ("now", ""))
+        )
+    )
+    options = "--data", str(tmp_path / "data"), "--tokens", str(tokens)
+    bearer = {"Authorization": "Bearer all"}
+    with server_process(*options, complaints=None) as server, HullClient(server.address, token="all") as client:
+        client.create_hull("kept", keyed="str", geographic=True, history="1d")
+        client.create_hull("brief", keyed="str", geographic=True)
+        moments = []
+        for number in range(3):
+            for name in ("kept", "brief"):
+                client.put(name, KEYS[:20], [(number, 50)] * 20)
+            info = client.get_hull("kept").info
+            moments.append(info.changed.isoformat().replace("+00:00", "Z"))
+        early = (info.created - timedelta(days=1)).isoformat().replace("+00:00", "Z")
+        with gateway_process(server.address) as gateway:
+
+            def places(name: str, when: str) -> set[float]:
+                found, path = [], f"/collections/entities:{name}/items?limit=8&datetime={when}"
+                while path is not None:
+                    page = gateway.get(path, **bearer).json
+                    found += page["features"]
+                    following = link(page, "next")
+                    path = None if following is None else following.removeprefix(gateway.url)
+                assert len(found) in (0, 20)
+                return {each["geometry"]["coordinates"][0] for each in found}
+
+            assert [places("kept", each) for each in moments] == [{0}, {1}, {2}]
+            assert [places("kept", f"{early}/{each}") for each in moments] == [{0}, {1}, {2}]
+            assert (places("kept", f"{early}/.."), places("kept", early)) == ({2}, set())
+            assert places("kept", f"{moments[0]}/2999-01-01T00:00:00Z") == {2}
+            assert places("brief", moments[0]) == {2}
+            extent = gateway.get("/collections/entities:kept", **bearer).json["extent"]["temporal"]
+            assert extent["interval"] == [[client.history("kept").first_time.isoformat().replace("+00:00", "Z"), None]]
+            assert "temporal" not in gateway.get("/collections/entities:brief", **bearer).json["extent"]
+            for when, status in ((moments[0], 403), (f"{moments[0]}/..", 200)):
+                path = f"/collections/entities:kept/items?datetime={when}"
+                assert gateway.get(path, Authorization="Bearer now").status == status
 
 
 def test_boxes_and_times(gateway: Gateway, fleet: str) -> None:

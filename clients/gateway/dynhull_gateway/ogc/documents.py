@@ -53,10 +53,18 @@ class Spatial(BaseModel):
     crs: str = CRS84
 
 
-class Extent(BaseModel):
-    """Where the features are."""
+class Temporal(BaseModel):
+    """Times of which the features can be had: a beginning and an end, null for none."""
 
-    spatial: Spatial
+    interval: list[Annotated[list[str | None], Field(min_length=2, max_length=2)]]
+    trs: str = "http://www.opengis.net/def/uom/ISO-8601/0/Gregorian"
+
+
+class Extent(BaseModel):
+    """Where and when the features are."""
+
+    spatial: Spatial | None = None
+    temporal: Temporal | None = None
 
 
 class Collection(Document):

@@ -2,7 +2,8 @@
 
 import bisect
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import datetime
 from http import HTTPStatus
 from typing import Any
 
@@ -41,13 +42,14 @@ class Snapshot:
             order = numbers
         return cls(f"{uid}:{found.revision}", keys, order, found.points, found.times)
 
-    def page(self, page: Page) -> Matching:
-        """The features of a page."""
+    def page(self, page: Page, *, standing: bool) -> Matching:
+        """The features of a page; those `standing` at the end of an interval may be there for long."""
         wanted = np.ones(len(self.keys), np.bool_)
         if page.box is not None:
             wanted &= page.box.holds(self.points)
         if page.interval is not None and self.times is not None:
-            wanted &= page.interval.holds(self.times) | (self.times == NO_TIME)
+            interval = replace(page.interval, begin=None) if standing else page.interval
+            wanted &= interval.holds(self.times) | (self.times == NO_TIME)
         matched = int(wanted.sum())
         if page.after is not None:
             wanted[: self._row_after(page.after)] = False
@@ -74,12 +76,14 @@ class Snapshots:
         self._kept: OrderedDict[tuple[str | None, str, str], Snapshot] = OrderedDict()
         self._keys = 0
 
-    async def of(self, client: AsyncHullClient, token: str | None, hull: HullInfo, place: str | None) -> Snapshot:
-        """The snapshot at a place, UID:REVISION, or of now; ProblemError if that revision is gone."""
+    async def of(
+        self, client: AsyncHullClient, token: str | None, hull: HullInfo, place: str | None, then: datetime | None
+    ) -> Snapshot:
+        """The snapshot at a place, UID:REVISION, or of then, or of now; ProblemError if that revision is gone."""
         kept = None if place is None else self._kept.get((token, hull.name, place))
         if kept is not None:
             return kept
-        found = Snapshot.of(hull.uid, await client.entities(hull.name))
+        found = await _read(client, hull, then)
         if place in (None, found.place):
             return found
         detail = f"the gateway no longer has revision {place}: begin again, without after and revision"
@@ -93,6 +97,15 @@ class Snapshots:
         while len(self._kept) > 1 and (len(self._kept) > KEPT or self._keys > KEPT_KEYS):
             _, oldest = self._kept.popitem(last=False)
             self._keys -= len(oldest.keys)
+
+
+async def _read(client: AsyncHullClient, hull: HullInfo, then: datetime | None) -> Snapshot:
+    if then is None:
+        return Snapshot.of(hull.uid, await client.entities(hull.name))
+    if then < hull.created:
+        return Snapshot(f"{hull.uid}:0", [], [], np.empty((0, 2)), None)
+    past = await client.at(hull.name, then)
+    return Snapshot.of(past.uid, await past.entities())
 
 
 def feature(key: Key, lonlat: list[float], time: np.datetime64 | None) -> dict[str, Any]:

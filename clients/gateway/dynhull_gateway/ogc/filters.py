@@ -150,7 +150,8 @@ class Page(BaseModel):
     )
     datetime: Annotated[str, Field(max_length=100), _readable(Interval)] | None = Field(
         default=None,
-        description="An instant, or an interval such as 2026-01-01T00:00:00Z/.. with one open end.",
+        description="An instant, or an interval such as 2026-01-01T00:00:00Z/.. with one open end: features with an "
+        "event time in it, or without one. Keys of a hull that keeps its past are where they were at a past end.",
         examples=["2026-01-01T00:00:00Z/.."],
     )
     limit: int = Field(default=FEW, ge=1, description=f"The most features of a page; more than {MOST} means {MOST}.")

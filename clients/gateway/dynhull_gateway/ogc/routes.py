@@ -37,6 +37,7 @@ from .documents import (
     Landing,
     Link,
     Spatial,
+    Temporal,
     schema_of_entities,
 )
 from .entities import Snapshots, feature
@@ -103,8 +104,14 @@ async def describe_collection(request: Request, client: Caller, collection: Coll
     await _info(client, name, keyed=True)
     described = _entities(request, name)
     bounds = (await client.get_hull(name)).measures.bounds
+    kept = await client.history(name)
+    spatial, temporal = None, None
     if not any(map(math.isnan, bounds)):  # those of an empty hull
-        described.extent = Extent(spatial=Spatial(bbox=[list(bounds)]))
+        spatial = Spatial(bbox=[list(bounds)])
+    if kept.history is not None and kept.first_time is not None:
+        temporal = Temporal(interval=[[kept.first_time.isoformat().replace("+00:00", "Z"), None]])
+    if spatial is not None or temporal is not None:
+        described.extent = Extent(spatial=spatial, temporal=temporal)
     return described
 
 
@@ -141,8 +148,9 @@ async def items(request: Request, client: Caller, collection: CollectionId, page
     else:
         info = await _info(client, name, keyed=True)
         snapshots: Snapshots = request.app.state.snapshots
-        snapshot = await snapshots.of(client, token_of(request), info, page.revision)
-        found = snapshot.page(page)
+        then = await _then(client, name, page)
+        snapshot = await snapshots.of(client, token_of(request), info, page.revision, then)
+        found = snapshot.page(page, standing=then is not None)
         if found.following is not None:
             snapshots.keep(token_of(request), name, snapshot)
         more = {"revision": snapshot.place}
@@ -185,6 +193,14 @@ async def item(request: Request, client: Caller, collection: CollectionId, featu
         _link(request, path, "collection", JSON, "The collection"),
     ]
     return GeoJsonAnswer(Item.model_validate({**found, "links": links}).model_dump_json())
+
+
+async def _then(client: AsyncHullClient, name: str, page: Page) -> datetime | None:
+    """The end of an interval, if it is past and the hull keeps its past; None for the present."""
+    end = None if page.interval is None else page.interval.end
+    if end is None or end >= datetime.now(UTC) or (await client.history(name)).history is None:
+        return None
+    return end
 
 
 def _hull_of(collection: str) -> str | None:
