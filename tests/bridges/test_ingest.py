@@ -110,7 +110,7 @@ def test_messages_say_when_keys_leave_and_the_command_which_are_put(
     at = {"x": 1, "y": 2, "at": "2026-03-01 13:00:00"}
     moves = [
         ("a", at | {"until": "2026-03-01 13:00:05"}),
-        ("b", at),
+        ("b", at | {"error": 2.5}),
         ("c", at | {"until": ""}),
         ("d", at | {"until": 7}),
         ("e", at | {"at": "2026-03-29 02:30:00"}),
@@ -120,7 +120,7 @@ def test_messages_say_when_keys_leave_and_the_command_which_are_put(
     url = f"nats://127.0.0.1:{nats_port}/{name}/{name}.*"
     options = ("--hull", name, "--key", "{1}", "--x", "$.x", "--y", "$.y", "--time", "$.at")
     berlin = ("--time-zone", "Europe/Berlin", "--time-format", "%Y-%m-%d %H:%M:%S")
-    said = ingested(address, url, *options, *berlin, "--expires", "$.until")
+    said = ingested(address, url, *options, *berlin, "--expires", "$.until", "--accuracy", "$.error")
     bad = [line["error"] for line in said if line["event"] == "bad message"]
     assert [each.partition(",")[0] for each in bad] == [
         "expires is '7'", "time is '2026-03-29 02:30:00'", "time is '2026-03-01T12:00:10Z'"
@@ -128,6 +128,8 @@ def test_messages_say_when_keys_leave_and_the_command_which_are_put(
     assert said[-1] == {**said[-1], "points": 3, "bad": 3, "inserted": 3}
     entities = client.entities(name)
     assert entities.times is not None
+    assert entities.accuracies is not None
+    assert entities.accuracies.tolist() == [0, 2.5, 0]
     assert {str(each) for each in entities.times} == {"2026-03-01T12:00:00.000000"}
     client.put(name, ["z"], [[0, 0]], [datetime(2026, 3, 1, 12, 0, 10, tzinfo=UTC)])
     assert sorted(client.entities(name).keys) == ["b", "c", "z"]

@@ -65,6 +65,11 @@ LOADS = [
         "load {name} points.csv --key x --expires y",
     ),
     (
+        "load {name} points.csv --accuracy y",
+        "--accuracy is given with --key",
+        "load {name} points.csv --key x --accuracy y",
+    ),
+    (
         "load {name} points.csv --key x --expires y --ttl 5m",
         "--ttl and --expires both say when keys leave",
         "load {name} points.csv --key x --ttl 5m",

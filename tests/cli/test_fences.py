@@ -56,6 +56,20 @@ def test_bad_files_are_named(text: str, complaint: str, tmp_path: Path, monkeypa
     assert complaint in done.stderr
 
 
+@pytest.mark.usefixtures("served")
+@pytest.mark.parametrize(("kind", "keys"), [("str", ["a", "b"]), ("int", [7, 8])])
+def test_expected_keys_are_of_the_kind_of_the_hull(name: str, kind: str, keys: list[object]) -> None:
+    dynhull("create", name, "--keyed", kind)
+    given = [word for key in keys for word in ("--expected", key)]
+    options = ["--circle", 0, 0, 1, "--subjects", name, *given, "--expected-within", "2h", "--by-accuracy"]
+    made = dynhull("fences", "create", name, *options, "--json")
+    assert (json.loads(made.stdout)["expected"], json.loads(made.stdout)["expected_within"]) == (keys, 7200.0)
+    assert "by accuracy, expected within 2h, expects 2 keys" in dynhull("fences", "show", name).stdout
+    refused = dynhull("fences", "replace", name, "--circle", 0, 0, 1, "--subjects", name, "--expected", keys[0])
+    assert refused.exit_code != 0
+    assert "expected" in refused.stderr
+
+
 def test_ack_needs_a_name() -> None:
     done = dynhull("fences", "watch", "zone", "--ack", "--address", "127.0.0.1:1")
     assert (done.exit_code, done.stderr) == (2, "error: --ack needs --consumer: who acknowledges?\n")

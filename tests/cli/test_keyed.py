@@ -210,6 +210,32 @@ def test_a_row_with_a_bad_time_is_named(served, name):
     assert entities(served, name)[0] == {"e": [1, 1], "f": [1, 1]}
 
 
+@pytest.mark.parametrize("form", ["csv", "ndjson", "geojson"])
+def test_positions_have_accuracies(served, name, form):
+    rows = [("a", 1.5), ("b", None), ("c", -1), ("d", "wide"), ("e", 0)]
+    match form:
+        case "csv":
+            given = "id,hdop,x,y\n" + "".join(f"{key},{'' if error is None else error},1,1\n" for key, error in rows)
+        case "ndjson":
+            given = "\n".join(json.dumps({"id": key, "hdop": error, "x": 1, "y": 1}) for key, error in rows)
+        case _:
+            point = {"type": "Point", "coordinates": [1, 1]}
+            listed = [{"type": "Feature", "id": k, "geometry": point, "properties": {"hdop": e}} for k, e in rows]
+            given = json.dumps({"type": "FeatureCollection", "features": listed})
+    options = ("--format", form, "--key", "id", "--accuracy", "hdop")
+    dynhull("create", name, "--keyed", "str")
+    done = dynhull("load", name, "-", *options, input=given)
+    assert "2 bad rows left out" in done.stderr
+    assert "must not be negative" in done.stderr
+    found = [
+        json.loads(line) for line in dynhull("query", name, "positions", "a", "b", "e", "--json").stdout.splitlines()
+    ]
+    assert [line["accuracy"] for line in found] == [1.5, 0, 0]
+    dynhull("put", name, "b", "2", "2", "--accuracy", "7")
+    with HullClient(served) as client:
+        assert client.entities(name).accuracies.tolist() == [1.5, 7, 0]
+
+
 def test_the_unit_of_times_may_be_given(served, name):
     dynhull("create", name, "--keyed", "str", "--max-age", "1h", "--clock", "data")
     done = dynhull(

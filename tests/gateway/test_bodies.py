@@ -331,6 +331,31 @@ def test_rows_say_when_keys_leave_and_which_keys_are_put(gateway: Gateway, name:
     assert (wrong.status, "ttl" in wrong.json["detail"]) == (400, True)
 
 
+def test_rows_and_batches_have_accuracies(gateway: Gateway, name: str) -> None:
+    gateway.post("/hulls", {"name": name, "keyed": "str"})
+    at, known = f"/hulls/{name}/rows", f"/hulls/{name}/entities"
+    assert gateway.post(at, b"key,x,y,accuracy\na,0,0,1.5\nb,1,1,\n", CSV).json["inserted"] == 2
+    more = b'{"key": "c", "x": 1, "y": 2, "accuracy": 2}\n{"key": "d", "x": 1, "y": 3, "accuracy": -1}\n'
+    done = gateway.post(f"{at}?max_bad=1", more, NDJSON).json
+    assert [(each["row"], each["field"], each["value"]) for each in done["bad"]] == [(1, "accuracy", "-1")]
+    assert gateway.get(known).json["accuracies"] == [1.5, 0, 2]
+    wrong = gateway.post(at, b'{"x": 1, "y": 2, "accuracy": 3}\n', NDJSON)
+    assert (wrong.status, wrong.json["field"]) == (400, "accuracy")
+    put = {"keys": ["a", "b"], "points": [[0, 0], [1, 1]], "accuracies": [0, 4]}
+    assert gateway.post(f"/hulls/{name}/points", put).status == 200
+    assert gateway.get(known).json["accuracies"] == [0, 4, 2]
+    for bad, place in [([1], "accuracies"), ([1, -1], "accuracies"), ([1, "2"], "accuracies")]:
+        refused = gateway.post(f"/hulls/{name}/points", put | {"accuracies": bad})
+        assert (refused.status, refused.json["field"]) == (400, place)
+    fence = {"name": name, "area": {"center": [0, 0], "radius": 9}, "subjects": name, "by_accuracy": True}
+    expected = {"expected": ["a", "z"], "expected_by": "18:00 Europe/Berlin mon-fri"}
+    made = gateway.post("/fences", fence | expected).json
+    assert {each: made[each] for each in expected} == expected
+    assert made["by_accuracy"] is True
+    refused = gateway.post("/fences", fence | {"name": f"{name}2", "expected": ["a"], "expected_by": "noon"})
+    assert (refused.status, refused.json["field"]) == (400, "expected_by")
+
+
 def test_a_row_of_the_distant_future_is_a_bad_row_without_a_window_too(gateway: Gateway, name: str) -> None:
     made = gateway.post("/hulls", {"name": name, "keyed": "str", "max_skew": 60, "ordering": "event_time"})
     assert (made.json["window"]["max_age"], made.json["window"]["max_skew"]) == (None, 60)

@@ -13,7 +13,7 @@ from ..connected import AsJson, connected
 from ..json_lines import json_line
 from ..setting_options import choosing, settings_options
 from ..tab_lines import tab_line
-from .settings import compared
+from .settings import compared, with_keys
 
 if TYPE_CHECKING:
     from dynhull_client import HullClient
@@ -52,7 +52,7 @@ def between(
     from .shown import event_cells, event_members
 
     chosen |= {name: None if when is None else moment_of(when) for name, when in (("start", start), ("end", end))}
-    with client.fence_events_between(**chosen) as stream:
+    with client.fence_events_between(**with_keys(client, chosen)) as stream:
         if not sys.stdout.isatty():
             when_pipe_closes(stream.close)
         for event in islice(stream, events):
