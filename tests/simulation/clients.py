@@ -49,7 +49,7 @@ from dynhull_server.state.hull_state import Counts, HullState
 from dynhull_server.state.records import NO_TIME, Center, HullSettings, Identity, QuarantineRules, Times, Window
 
 from .cluster_plan import Operation
-from .entities import Key
+from .entities import Key, accuracy_of
 from .fence_model import PREFIX
 from .globe import CENTERS, FAR, GLOBE, places, points
 from .model import SKIPS, Asked, Content, Model, tag
@@ -469,6 +469,7 @@ class Client:
             op.get("ttl"),
             np.full(len(new), self.server.time() + op["deadline"], np.int64) if "deadline" in op else None,
             refuse_missing="refuse" in op,
+            accuracies=np.array([accuracy_of(x) for x in new[:, 0].tolist()]),
         )
 
     def _applied(self, asked: Asked, attempt: int, applied: Applied, producer: str, sequence: int) -> None:

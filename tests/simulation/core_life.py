@@ -574,7 +574,7 @@ def compare_fences(core: Core, model: Model) -> None:
         inside = {
             (hull, key): None if fence.dwelling is None else fence.dwelling.times(hull, subjects.keys([key])).item()
             for hull, subjects in fence.subjects.items()
-            for key in key_list(subjects.index.inside(fence.number))
+            for key in key_list(fence.keys_inside(subjects))
         }
         kept = {subject: NO_TIME if since is None else since for subject, since in truth.inside.items()}
         if fence.dwelling is None:

@@ -44,7 +44,7 @@ from dynhull_server.state.records import NO_TIME
 from .alarm_model import AlarmJudge, Known, kept, same_event
 from .alarm_model import Change as AlarmChange
 from .alarm_model import alike as known_alike
-from .entities import Entity, Key
+from .entities import Entity, Key, accuracy_of
 
 if TYPE_CHECKING:
     from .model import Model, Truth
@@ -274,7 +274,8 @@ class FenceModel:
         for name, truth in self._subjects(config):
             revision = now[name]
             for key, entity in sorted(truth.held[revision].items()):
-                if self._shape(config, now, key).holds(_exact(entity), closed=config.closed):
+                shape, p = self._shape(config, now, key), _exact(entity)
+                if shape.holds(p, closed=config.closed) and _is_clear(config, shape, entity):
                     fence.inside[name, key] = since
                     there = Expected(config, now, name, key, None, entity)
                     expected.append(there.event(EventType.ENTER, Cause.CREATED))
@@ -584,7 +585,10 @@ class FenceModel:
             p = _exact(place)
             causes = cause | (Cause.APPEARED if was is None else Cause.MOVED if origin or _exact(was) != p else 0)
             causes = causes or Cause.AREA  # only the others have moved, of whom the subject itself is not one
-            if inside:
+            if not _is_clear(config, shape, place):
+                if inside and origin is not None:
+                    yield there.event(EventType.TRANSFER, causes)
+            elif inside:
                 if shape.farther(p, _units(config.margin), closed=config.closed):
                     yield there.event(EventType.EXIT, causes)
                 elif origin is not None:
@@ -1065,6 +1069,9 @@ def same(real: FenceEvent, expected: FenceEvent, *, together: bool = False) -> b
         sequence=real.sequence, time=real.time, distance=real.distance, inside=real.inside, causes=real.causes
     )
     causes = expected.causes
+    if real.first_time != NO_TIME and real.type in (EventType.ENTER, EventType.EXIT):  # it was in doubt before
+        known = known._replace(first_time=real.first_time, previous=None)
+        causes = real.causes
     if together and causes & Cause.EXPIRED and real.causes & Cause.REMOVED:
         causes = causes & ~Cause.EXPIRED | Cause.REMOVED
     return real == known and real.causes == causes and _members(real.inside) == _members(expected.inside)
@@ -1087,6 +1094,12 @@ def _named(event: FenceEvent) -> list[Subject]:
     if event.type is EventType.SNAPSHOT:
         return [(each.hull, key) for each in event.inside for key in key_list(each.keys)]
     return [] if event.key is None else [(event.hull, event.key)]
+
+
+def _is_clear(config: FenceConfig, shape: Shape, entity: Entity) -> bool:
+    """Whether a position decides its side, by its accuracy."""
+    error = _units(accuracy_of(entity.x)) if config.by_accuracy else 0
+    return not error or shape.clear(_exact(entity), error, closed=config.closed)
 
 
 @cache

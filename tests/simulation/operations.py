@@ -23,6 +23,8 @@ FENCES = {
 }
 # Fences have names of their own; each has its kind of subjects.
 FENCED = {"f": ("hull", "k"), "g": ("prefix", "k"), "h": ("other", "k"), "i": ("hull", "l")}
+# The subjects of fences that ask for certain positions, with all of their settings.
+BY_ACCURACY = ("l",)
 AREAS = ("a", "k", "kk", "l", "w")
 
 # The names of hulls of points, of hulls with keys or a window, and of fences.
@@ -171,7 +173,8 @@ def _config(draw: random.Random, kind: str, subjects: str) -> dict[str, Any]:
         while hull == subjects:
             hull = draw.choice(AREAS)
         return config | {"area": {"hull": hull}, "near": draw.choice((0.0, 0.0, 2.0, 50.0))}
-    match draw.choice(("hull", "hull", "strips", "strips", "circle", "others")):
+    forms = "hull", "hull", "strips", "strips", "circle", "hull" if subjects in BY_ACCURACY else "others"
+    match draw.choice(forms):
         case "hull":
             config["area"] = {"hull": hull}
         case "strips":
@@ -185,6 +188,8 @@ def _config(draw: random.Random, kind: str, subjects: str) -> dict[str, Any]:
         return config | {"margin": draw.choice((0.5, 20.0))}
     config["closed"] = "hull" in config["area"] or draw.random() < 0.7
     config["crosses"] = config["closed"] and draw.random() < 0.4
+    if subjects in BY_ACCURACY:
+        config |= {"by_accuracy": True, "margin": 0.0, "crosses": False}
     if draw.random() < 0.3:
         config["dwell"] = draw.choice((1, 100_000, 400_000))
     if draw.random() < 0.3:

@@ -128,6 +128,15 @@ class Rings:
             return True
         return not any(near(p, a, b, margin) for a, b in self.boundary())
 
+    def clear(self, p: Point, error: int, *, closed: bool) -> bool:
+        """Whether a point is inside or outside by more than an error above 0."""
+        if all(len(exterior) < 3 for exterior, *_ in self.polygons) and not closed:
+            return True
+        inside = [polygon for polygon in self.polygons if Rings((polygon,)).holds(p, closed=False)]
+        around = [[edge for ring in polygon for edge in edges(ring)] for polygon in inside or self.polygons]
+        clear = [not any(near(p, a, b, error) for a, b in sides) for sides in around]
+        return any(clear) if inside else all(clear)
+
     def distance(self, p: Point, *, closed: bool) -> float:
         """The distance of a point, rounded once."""
         degenerate = all(len(exterior) < 3 for exterior, *_ in self.polygons)
@@ -159,6 +168,12 @@ class Disk:
         if margin == 0 or (self.radius == 0 and not closed):  # an open disk of this radius is empty
             return True
         return squared(p, self.center) > (self.radius + margin) ** 2
+
+    def clear(self, p: Point, error: int, *, closed: bool) -> bool:
+        if not self.radius and not closed:
+            return True
+        square = squared(p, self.center)
+        return (error < self.radius and square < (self.radius - error) ** 2) or square > (self.radius + error) ** 2
 
     def distance(self, p: Point, *, closed: bool) -> float:
         if not self.radius and not closed:

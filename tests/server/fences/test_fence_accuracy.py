@@ -230,6 +230,18 @@ def test_what_a_fence_says_of_doubtful_positions(client):
     ]
 
 
+def test_the_events_of_a_replacement_are_in_the_order_of_keys(client):
+    client.create_hull("order", keyed="str")
+    client.put("order", ["a", "b", "c"], [[4, 0], [7, 0], [4, 1]], accuracies=[2, 1, 2])
+    client.create_fence("order", Circle(0, 0, 5), "order", by_accuracy=True, initial="none")
+    client.replace_fence("order", Circle(0, 0, 9), "order", by_accuracy=True)
+    assert told(client, "order") == [
+        ("enter", "a", "fence_changed"),
+        ("enter", "b", "fence_changed"),
+        ("enter", "c", "fence_changed"),
+    ]
+
+
 def test_an_area_that_moves_makes_subjects_certain(client):
     for name in ("pack", "yard"):
         client.create_hull(name, keyed="str")

@@ -163,10 +163,12 @@ class Definition:
             waits = _waits(config, leg.last, leg.time(request.time))
         leg.row = replace(leg.row, config=config, waits=waits)
         leg.area = area
+        first = len(leg.events)
         try:
             for subjects in fence.subjects.values():
                 comparison.cross(subjects, subjects.take(config, area), {}, REPLACEMENT, request.time)
             end_all(leg, request.time)
+            leg.order(first)
             follow(leg, request.time)
         except BaseException:
             comparison.tear()

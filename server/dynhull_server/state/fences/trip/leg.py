@@ -205,6 +205,12 @@ class FenceLeg:
             subject = EventType.EXIT, why, hull, key, *revisions
             self.events.append(FenceEvent(self.last + 1, *subject, None, before, None, NO_TIME, time))
 
+    def order(self, first: int) -> None:
+        """Order its events from one on by hull and key, as those of one revision are."""
+        ordered = sorted(self.events[first:], key=lambda event: (event.hull, event.key))
+        start = self.events[first].sequence if ordered else 0
+        self.events[first:] = [event._replace(sequence=start + place) for place, event in enumerate(ordered)]
+
     def put_delay(self, subject: Subject, delay: Delay | None) -> None:
         """Put the delay of a subject in the place of the one before."""
         assert self.fence.delays is not None  # only such fences have subjects with delays
