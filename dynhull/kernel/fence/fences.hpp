@@ -28,7 +28,7 @@ struct Arrival {
 
 class Fences {
  public:
-  Fences(const Slots& slots, std::shared_ptr<const Metres> metres)
+  explicit Fences(const Slots& slots, std::shared_ptr<const Metres> metres = {})
       : zoning_(slots, std::move(metres)),
         reports_(zoning_),
         decisions_(zoning_, reports_),
