@@ -148,6 +148,7 @@ robustness: .venv/.test  ## kill, starve and damage servers, set clocks back, le
 	$(BIN)/python tests/robustness/server/deaf.py --callers 200
 	$(BIN)/python tests/robustness/storage/flips.py --flips 20000
 	$(BIN)/python tests/robustness/storage/segment_flips.py --flips 10000
+	$(BIN)/python tests/robustness/alarms/alarm_rationals.py --batches 100000
 	$(BIN)/python tests/robustness/fences/fence_torture.py --steps 1000000
 	$(BIN)/python tests/robustness/fences/kill_torture.py --steps 1000000 --kills 1000
 	$(BIN)/python tests/robustness/bridges/relay_torture.py --kills 100

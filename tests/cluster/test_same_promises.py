@@ -79,6 +79,11 @@ def test_an_alarm_is_with_the_worker_of_its_hulls(client: HullClient, name: str)
     with pytest.raises(HullUnsuitableError) as refused:
         client.create_alarm(apart, hull=name, when="area > 1")
     assert refused.value.reason == "HULLS_APART"
+    client.create_hull(apart)
+    for alarm, hulls in ((name, {"hull": name}), (f"{name}/near", {"prefix": f"{name}/"})):
+        with pytest.raises(HullUnsuitableError, match=apart) as refused:
+            client.create_alarm(alarm, **hulls, when=f"near {apart} 5")
+        assert refused.value.reason == "HULLS_APART"
     with pytest.raises(InvalidRequestError, match='a prefix has a "/"'):
         client.create_alarm(name, prefix="all", when="area > 1")
     for each in (name, apart):

@@ -1,5 +1,6 @@
 """Alarms are decided as exact rationals of the points decide: also where a measure is the bound, to the last bit."""
 
+import math
 import random
 from collections.abc import Iterator
 from fractions import Fraction
@@ -16,6 +17,7 @@ from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.core import Core
 from dynhull_server.state.events import Commit, Committed, Compute, Computed
 from dynhull_server.state.fences.events.block import AppendEvents
+from dynhull_server.state.fences.index.pair import nearness
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.records import EventType
 from dynhull_server.state.fences.model.requests import CreateFence
@@ -162,3 +164,35 @@ def test_distances_are_those_of_exact_rationals(scale: float) -> None:
     assert life.made == expected
     assert len(expected) > 3
     assert attained > 0
+
+
+@pytest.mark.parametrize("turned", [((1, 0), (0, 1)), ((3, -4), (4, 3))])
+def test_a_distance_of_large_hulls_is_decided_exactly(turned: tuple[tuple[int, int], ...]) -> None:
+    """Two thousand corners, of which a thousand face the other hull nearly flat: 7 apart in the middle, or 35."""
+    x = np.arange(-500.0, 501.0)
+    upper = convex_hull(np.vstack([np.column_stack([x, -x * x / 2**20]), [[-500, -5], [500, -5]]]))
+    lower = convex_hull([0, 7] - upper)
+    one, other = (convex_hull(each @ np.array(turned, np.float64).T) for each in (upper, lower))
+    distance = 7.0 * math.hypot(*turned[0])
+    limits = math.nextafter(distance, 0), distance, math.nextafter(distance, math.inf)
+    assert [nearness(one, other, limit, None)[0] for limit in limits] == [False, True, True]
+    assert [nearness(other, one, limit, None)[0] for limit in limits] == [False, True, True]
+
+
+def test_distances_are_decided_as_fractions_decide() -> None:
+    """Of random hulls with few and with many corners, by the rounded distance and its neighbours."""
+    dice = np.random.default_rng(1)
+    decided = set()
+    for _ in range(60):
+        points = dice.integers(-4, 5, (2, int(dice.integers(1, 12)), 2)) * float(10.0 ** dice.integers(-3, 3))
+        one, other = convex_hull(points[0]), convex_hull(points[1] + np.abs(points).max() * dice.integers(-4, 5, 2))
+        corners = [[(Fraction(x), Fraction(y)) for x, y in each.tolist()] for each in (one, other)]
+        near, distance = nearness(one, other, 0.0, None)
+        if near:
+            continue
+        square = apart(*corners)
+        for limit in (math.nextafter(distance, 0), distance, math.nextafter(distance, math.inf)):
+            expected = square <= Fraction(limit) ** 2
+            assert nearness(one, other, limit, None)[0] == expected
+            decided.add((expected, square == Fraction(limit) ** 2))
+    assert decided >= {(True, True), (True, False), (False, False)}

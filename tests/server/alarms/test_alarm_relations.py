@@ -148,6 +148,24 @@ def test_on_the_globe(client: HullClient, name: str) -> None:
     assert (event.hull[-1], event.keys) == ("b", ("x", "y", "z"))
 
 
+@pytest.mark.parametrize("beyond", [False, True])
+def test_hulls_cross_without_a_corner_in_each_other(client: HullClient, name: str, beyond: bool) -> None:
+    """Also where one reaches beyond the projection about the centre of the other; and one that is inside of another."""
+    east = -80 if beyond else 55
+    for hull, center in (("long", (0, 0)), ("across", (120, 0)), ("within", (60, 0))):
+        client.create_hull(f"{name}/{hull}", geographic=True, center=center)
+    for hull in ("across", "within"):
+        client.create_alarm(f"{name}/{hull}", hull=f"{name}/long", when=f"near {name}/{hull}")
+    client.apply(f"{name}/across", insert=[(60, -40), (64, -40), (60, 40), (64, 40)])
+    client.apply(f"{name}/within", insert=[(66, 0), (66, 1), (67, 0)])
+    client.apply(f"{name}/long", insert=[(east, -3), (east, 3), (59, -3), (59, 3)])
+    assert {each.name for each in client.list_alarms(f"{name}/") if each.raised} == set()
+    client.apply(f"{name}/long", insert=[(84, -3), (84, 3)])
+    assert {each.name for each in client.list_alarms(f"{name}/") if each.raised} == {f"{name}/across", f"{name}/within"}
+    client.apply(f"{name}/long", delete=[(84, -3), (84, 3)])
+    assert [each.type for each in seen(client, f"{name}/across")] == ["raised", "cleared"]
+
+
 @pytest.mark.parametrize(
     ("when", "position", "problem"),
     [

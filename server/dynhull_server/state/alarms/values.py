@@ -173,9 +173,4 @@ def _near(found: Seen, limit: float) -> tuple[bool, float]:
     """Whether two hulls are at most that far apart, and their distance."""
     if not (len(found.vertices) and len(found.others)):
         return False, math.inf
-    try:
-        return nearness(found.vertices, found.others, limit, found.center)
-    except ValueError:  # farther from that centre than a projection reaches
-        one, other = globe.distance(found.vertices, found.others), globe.distance(found.others, found.vertices)
-        apart = min(float(one.min()), float(other.min()))
-        return apart <= limit, apart
+    return nearness(found.vertices, found.others, limit, found.center)

@@ -8,7 +8,7 @@ import numpy as np
 from dynhull.arrays import Points
 from dynhull.convex import Cloud
 from dynhull.gjk import intersect
-from dynhull.globe import MOST_METRES, REACH, Gnomonic, distance, project_far
+from dynhull.globe import MOST_METRES, REACH, Gnomonic, distance, project_far, project_hull
 
 from ...errors import HullUnsuitableError, InvalidFenceError
 from ...frames import off_globe, out_of_reach
@@ -194,9 +194,10 @@ def outline(frame: Gnomonic, vertices: Points) -> Points:
 
 
 def compared(a: Points, b: Points, limit: float, center: Center) -> tuple[bool, float]:
-    """Whether two hulls about one centre intersect or are at most `limit` metres apart, and their distance."""
+    """Whether two hulls intersect or are at most `limit` metres apart, and their distance. The centre is that of b."""
     frame = Gnomonic(center)
-    if intersect(Cloud(outline(frame, a)), Cloud(outline(frame, b))):
+    within = outline(frame, a) if frame.project(a)[1].all() else project_hull(frame, a)
+    if len(within) and intersect(Cloud(within), Cloud(outline(frame, b))):
         return True, 0.0
     apart = min(float(distance(a, b).min()), float(distance(b, a).min()))
     return apart <= limit, apart
