@@ -238,7 +238,7 @@ class Queues:
             if queue.guests is not None:
                 home.guests = (home.guests or set()) | queue.guests
             line.names |= names
-            self._queues |= dict.fromkeys(names, home)
+            self._queues |= dict.fromkeys((*names, *(queue.guests or ())), home)
         for fence in fences:
             line.add(fence)
         home.waiting = waiting
