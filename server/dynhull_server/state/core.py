@@ -236,6 +236,8 @@ class Core:
             self._pass_time(request.write.arrived, effects)
         queue = self._queues.of(request.name)
         hull = queue.hull
+        if hull is None and self._immediate and queue.line is not None:
+            hull = self._fences.quiet_hull(queue.line, request)
         if hull is not None and hull.divided and isinstance(request, DIVIDED):
             self._divide(hull, [request], effects)
         elif queue.trip is not None or queue.waiting or self._stopping or request.abandoned:
@@ -303,7 +305,12 @@ class Core:
             return
         records: list[Record] | None = [] if self._keeps else None
         applied = write(request, hull, self._now, records)
-        if applied is not None:
+        line = queue.line
+        if line is not None and applied is not None and line.stirred(hull, applied, request.write.arrived):
+            trip = self._new_trip([queue], [request])
+            trip.alarmed(request, applied, records)
+            self._ran(trip, effects)
+        elif applied is not None:
             if records:
                 effects.append(Commit(None, [Append(hull.row.number, records)]))
             hull.counts = hull.state.counts

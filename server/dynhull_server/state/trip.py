@@ -145,6 +145,18 @@ class Trip:
         if self.fences is not None:
             self.fences.settle(self.requests)
 
+    def alarmed(self, request: WriteBatch, applied: Applied, records: list[Record] | None) -> None:
+        """Take over a batch that was applied without a trip, and about which an alarm has something to say."""
+        if self.quiet is not None:
+            self.fences, self.quiet = self.quiet.part(), None
+        leg = self.legs[request.name]
+        leg.records = records
+        assert self.fences is not None  # it was made for a hull with alarms,
+        assert leg.after is not None  # which has the batch
+        self.fences.wrote(leg, leg.after, applied, request.write.arrived)
+        self._count(leg, applied)
+        self.fences.settle(self.requests)
+
     def changes(self) -> list[Change]:
         """The changes to commit."""
         changes = [change for leg in self.legs.values() for change in leg.changes()]

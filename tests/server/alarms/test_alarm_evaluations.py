@@ -11,7 +11,9 @@ import dynhull
 from dynhull.keys import PackedKeys
 from dynhull.measure import _comparison
 from dynhull_server.state.alarms import watched
+from dynhull_server.state.alarms.conditions import condition_of
 from dynhull_server.state.alarms.rule import AlarmRule, marked
+from dynhull_server.state.alarms.values import EXACT
 from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.core import Core
 from dynhull_server.state.events import Arrived, Commit, Committed, Event
@@ -66,7 +68,7 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     rule = AlarmRule(f"{measure} > 1000", f"{measure} <= 1000")
     for kind, subjects in [("prefix", "fleet/")] if prefix else [("other", hull) for hull in HULLS]:
         step(core, CreateFence(None, marked(subjects), 1, FenceConfig(rule, kind, subjects), CREATED))
-    counted(monkeypatch, counts, watched, "holds")
+    counted(monkeypatch, counts, watched, "compare" if measure in EXACT else "holds")
     counted(monkeypatch, counts, watched.Watched, "touched")
     counted(monkeypatch, counts, _comparison, "_sign")
     for number in range(BATCHES):
@@ -76,8 +78,9 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     assert counts == {}
     for number in range(BATCHES):
         step(core, moved(HULLS[0], {"c": (4, 4 + number)}))
+    looked = "compare" if measure in EXACT else "holds"
     exactly = 0 if dynhull.KERNEL == "cpp" or measure not in ("diameter", "width") else BATCHES
-    assert counts == Counter(touched=BATCHES, holds=BATCHES) + Counter(_sign=exactly)
+    assert counts == Counter({"touched": BATCHES, looked: BATCHES}) + Counter(_sign=exactly)
     step(core, moved(HULLS[0], {"e": (2, -1)}))
     line = core.line(HULLS[0])
     assert line is not None
@@ -85,6 +88,29 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     step(core, moved(HULLS[0], {"e": (2, 1)}))
     for hull in HULLS:
         assert core.get(hull).counts.revision == 1 + 3 * BATCHES + (BATCHES + 2 if hull == HULLS[0] else 0)
+
+
+@pytest.mark.parametrize("when", ["area > 1000", "near fleet/1 1", "vertex in circle(900, 900, 1)"])
+def test_a_batch_in_memory_is_applied_as_without_alarms(monkeypatch: pytest.MonkeyPatch, when: str) -> None:
+    core, counts = Core(LIMITS, immediate=True, keeps=False), Counter[str]()
+    for number, hull in enumerate(HULLS):
+        step(core, CreateHull(None, hull, CREATED, HullSettings("str")))
+        places = {key: (x + 100 * number, y) for key, (x, y) in CORNERS.items()}
+        step(core, moved(hull, places | {"inside": (1 + 100 * number, 1)}))
+    rule = AlarmRule(when, str(condition_of(when).opposite))
+    step(core, CreateFence(None, marked("rule"), 1, FenceConfig(rule, "other", HULLS[0]), CREATED))
+    counted(monkeypatch, counts, Core, "_new_trip")
+    counted(monkeypatch, counts, watched.Watched, "touched")
+    for number in range(BATCHES):
+        step(core, moved(HULLS[0], {"inside": (1 + number / BATCHES, 1)}))
+        step(core, moved(HULLS[2], {"c": (204, 4 + number)}))
+    assert counts == {}
+    for number in range(BATCHES):
+        step(core, moved(HULLS[0], {"c": (4, 4 + number)}))
+    assert counts == Counter(touched=BATCHES)
+    step(core, moved(HULLS[0], {"c": (900, 900), "d": (101, 1)}))
+    assert counts["_new_trip"] == 1
+    assert core.fence(marked("rule")).last == 1
 
 
 @pytest.mark.parametrize("keeps", [False, True])

@@ -2,16 +2,17 @@
 
 from collections.abc import Collection, Iterator, Mapping
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from dynhull.keys import PackedKeys
+from dynhull.measure import Compared, compare
 
 from ..records import NO_TIME
 from .conditions import Condition
 from .rule import MICROSECONDS, AlarmRule
-from .values import NOTHING, Seen, holds, rows_in, seen, value_of
+from .values import EXACT, NOTHING, Seen, holds, rows_in, seen, value_of
 
 if TYPE_CHECKING:
     from ..fences.model.records import Delay, Subject
@@ -46,6 +47,7 @@ class Watched:
 
     __slots__ = (
         "_as_of",
+        "_exact",
         "_rule",
         "_seen",
         "fresh",
@@ -66,6 +68,9 @@ class Watched:
         self.planned: int | None = None
         self.fresh = True
         self._rule = rule
+        measure = rule.raises.measure
+        exact = measure in EXACT and not self._geographic
+        self._exact = cast("Compared", measure) if exact else None
         self._look()
 
     def _look(self) -> None:
@@ -117,6 +122,8 @@ class Watched:
 
     def touched(self, now: int) -> bool:
         """Whether a new revision of the hull changes anything for the alarm; takes note of it if it does not."""
+        if self._exact is not None and not self.fresh:
+            return self._crossed(self._exact)
         if self.fresh or self._as_of == self._changes():
             return self.fresh
         rule, before = self._rule, self._seen
@@ -130,6 +137,19 @@ class Watched:
         if changes:  # `changed` says what was before
             self._as_of, self._seen = NEVER, before
         return changes
+
+    def _crossed(self, measure: Compared) -> bool:
+        """As `touched`, for a measure that is compared exactly: what is done after most changes of outlines."""
+        hull = self.hull.state.hull
+        changes = hull.changes
+        if changes == self._as_of[0]:
+            return False
+        vertices, condition = hull.vertices(), self._rule.clears if self.raised else self._rule.raises
+        if condition.holds(compare(vertices, measure, condition.bound)) != (self.waits and not self.raised):
+            self._as_of = NEVER  # `changed` says what was before
+            return True
+        self._as_of, self._seen = (changes, 0), Seen(vertices)
+        return False
 
     def doubt(self) -> None:
         """Compare the hull anew when it is touched next, even if its vertices have not changed."""

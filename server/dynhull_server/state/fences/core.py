@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any
 
 from ..events import Effect, Examine, WakeFences
+from ..hull import Hull
 from ..leg import Leg
 from ..queues import Queue, Queues, names_of
 from ..registry import Registry
@@ -81,6 +82,15 @@ class FenceCore:
         room = limits.max_alarm_hulls - (self._registry.watched if creates or births else 0)
         ground = Ground(legs, lines, fences, numbers, self._registry.tallies, limits, room)
         return Trip(legs, requests, now, pause, places, FencePart(ground, requests))
+
+    def quiet_hull(self, line: Line, request: Request) -> Hull | None:
+        """The hull of a batch that needs no trip unless an alarm has something to say; None if it may need one."""
+        if type(request) is not WriteBatch or not line.has_only_alarms:
+            return None
+        hull: Hull | None = self._registry.hulls.get(request.name)
+        if hull is None or hull.state.contents.clock is not None or line.weight(hull.name) > QUIET_WEIGHT:
+            return None
+        return hull
 
     def _quiet_trip(self, queues: Sequence[Queue], requests: list[Request], now: float, pause: float) -> Trip | None:
         """A trip of batches to hulls with alarms alone, which gets a part for these once one is touched; else None."""

@@ -7,6 +7,7 @@ from dynhull import Crossings
 from dynhull.arrays import Points
 
 from ...alarms.watched import Watched
+from ...batch import Applied
 from ...hull import Hull
 from ...records import HullSettings
 from ..model.fence import Fence
@@ -137,6 +138,10 @@ class Line:
     def has_only_alarms(self) -> bool:
         """Whether nothing but alarms depends on its hulls."""
         return not (self.subjects or self.areas or self.pairs)
+
+    def stirred(self, hull: Hull, applied: Applied, now: int) -> bool:
+        """Whether a batch may mean anything for one of the alarms at a hull: as a rule it does not."""
+        return (applied.hull_changed or self.restless > 0) and self.touched(hull, now)
 
     def touched(self, hull: Hull, now: int) -> bool:
         """Whether a new revision of a hull may mean anything for one of the alarms at it: as a rule it does not."""
