@@ -7,6 +7,7 @@ from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
+from dynhull_server.state.feed_consumers import FeedConsumer
 from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
 from dynhull_server.state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
 from dynhull_server.state.tracks import KeyChanges
@@ -165,6 +166,11 @@ class FaultyStorage:
         """The oldest revision of a hull."""
         self._fail("oldest")
         return self._inner.oldest(number)
+
+    def feed_consumers(self) -> list[FeedConsumer]:
+        """Consumers of feeds."""
+        self._fail("read")
+        return self._inner.feed_consumers()
 
     def read_fences(self, numbers: Sequence[int]) -> list[KeptFence | None]:
         """Fences."""

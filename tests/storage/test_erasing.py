@@ -39,6 +39,7 @@ def leave(fleet):
         np.array([np.nan]),
         np.array([revision]),
         np.array([0]),
+        np.array([np.nan]),
     )
     dropped = KeyRows(NONE, np.empty((0, 2)), PackedKeys.pack(GONE), held=HeldChange(held, NONE))
     last = KeyRows(
