@@ -2,11 +2,9 @@
 
 import json
 from functools import partial
-from typing import Any
 
 from fastapi import Depends, FastAPI, Request, Response
 from fastapi.middleware.cors import CORSMiddleware
-from pydantic import BaseModel
 from starlette.responses import HTMLResponse
 from starlette.routing import Route
 
@@ -15,22 +13,21 @@ from dynhull_client import AsyncHullClient
 
 from . import alarms, feed_consumers, fences, handlers, health, hulls, people, points, questions, tracks, uploads
 from .bodies import JSON, LimitedBodies
+from .description import description_of
 from .ends import AnsweredAtTheEnd
 from .events import replays, subscriptions
 from .events import routes as events
-from .events.documents import AlarmEvent, FeedBatch, FenceEvent, HullChange, HullProgress, Hulls, HullSnapshot
+from .events.documents import EVENTS
 from .events.shared import SharedWatches
 from .figures import Figures, Measured
 from .gathering import Gatherer
 from .heads import HeadAsGet
 from .hosts import KnownHosts
 from .ogc import routes as maps
-from .ogc.documents import FeatureCollection, Item
 from .ogc.entities import Snapshots
 from .parameters import require_known, require_one_number
 from .paths import PathsAsSent
-from .problems import RESPONSES, Problem
-from .schemas import Batch, Feature
+from .problems import RESPONSES
 from .settings import Settings
 from .small_changes import SmallChanges
 
@@ -43,11 +40,6 @@ Of a name that is given twice in an object of JSON, the last one counts.
 
 The examples work as they are written, each after those that create what it names: hulls first, then points, fences,
 alarms, questions."""
-# What the descriptions of routes refer to by name.
-REFERRED: tuple[type[BaseModel], ...] = (
-    *(Problem, Batch, Feature, FeatureCollection, Item),
-    *(HullSnapshot, HullChange, HullProgress, Hulls, FenceEvent, AlarmEvent, FeedBatch),
-)
 SEEN_BY_PAGES = ["Idempotency-Key", "Last-Event-ID", "Authorization", "Content-Type"]
 
 
@@ -57,6 +49,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         title="dynhull gateway",
         version=dynhull_client.__version__,
         description=DESCRIPTION,
+        license_info={"name": "Apache 2.0", "identifier": "Apache-2.0"},
         openapi_url=None,  # below, with a newline at its end
         docs_url=None,  # the framework's pages load scripts from elsewhere
         redoc_url=None,
@@ -79,7 +72,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     routers = [module.router for module in modules]
     for router in routers:
         app.include_router(router)
-    app.openapi = partial(_description, app)  # type: ignore[method-assign]  # the framework's way to have one's own
+    app.openapi = partial(description_of, app, EVENTS)  # type: ignore[method-assign]  # the framework's way to have one's own
     described = [
         Route("/openapi.json", _answer_description, include_in_schema=False),
         Route("/docs", _answer_people, include_in_schema=False),
@@ -114,24 +107,3 @@ async def _answer_description(request: Request) -> Response:
 async def _answer_people(request: Request) -> Response:
     page = people.page_of(request.app.openapi(), request.scope.get("root_path", ""))
     return HTMLResponse(page, headers={"Content-Security-Policy": people.POLICY})
-
-
-def _description(app: FastAPI) -> dict[str, Any]:
-    """The OpenAPI document: of what the routes declare, and what holds for all of them."""
-    if app.openapi_schema is None:
-        made = FastAPI.openapi(app)
-        schemas = made["components"]["schemas"]
-        for model in REFERRED:
-            own = model.model_json_schema(ref_template="#/components/schemas/{model}")
-            schemas |= {**own.pop("$defs", {}), model.__name__: own}
-        for path in made["paths"].values():
-            for operation in path.values():
-                operation["responses"].pop("422", None)  # the framework's own; ours are 400
-                for content in operation["responses"].get("200", {}).get("content", {}).values():
-                    if "$ref" in content["schema"]:
-                        content["schema"].pop("type", None)  # "string", the framework's guess
-                operation.setdefault("security", []).append({})  # a server without tokens needs none
-        for unused in ("HTTPValidationError", "ValidationError"):
-            schemas.pop(unused, None)
-        app.openapi_schema = made
-    return app.openapi_schema

@@ -125,6 +125,8 @@ class Hulls(BaseModel):
     unchanged: list[str] = Field(description="Those that are as they were at the id that the stream goes on from.")
 
 
+EVENTS = HullSnapshot, HullChange, HullProgress, Hulls, FenceEvent, AlarmEvent, FeedBatch
+
 OF_MANY = (
     "retry: 1000\n\n"
     "event: begin\ndata: {}\n\n"

@@ -14,7 +14,7 @@ from ..problems import ProblemError
 from ..schemas import HullPath
 from . import documents
 from .messages import COMMENT, message, problem, resumed
-from .routes import Described, FormOf, LastEventId, Layer, MaxVertices, WithKeys, WithMeasures, admit, events
+from .routes import OF_A_HULL, Described, FormOf, LastEventId, Layer, MaxVertices, WithKeys, WithMeasures, admit, events
 from .stream import EventStream
 from .texts import HullTexts, View
 
@@ -41,7 +41,7 @@ OVER = "over"  # in an id, after the uid
 @router.get(
     "/hulls/{name}/replay",
     response_class=Described,
-    responses={**events(documents.OF_PAST), 204: {"description": "The replay is over."}},
+    responses={**events(documents.OF_PAST, *OF_A_HULL), 204: {"description": "The replay is over."}},
 )
 async def replay(
     request: Request,

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from dynhull_client import Alarm, AsyncHullClient, DeadlineError, Fence, HullNotFoundError, UnavailableError
 from dynhull_surface.as_of import moment_of
@@ -94,6 +94,7 @@ FeedConsumer = Annotated[
         description="A durable consumer, which knows its place: batches after those acknowledged, or all that is kept.",
     ),
 ]
+OF_A_HULL = documents.HullSnapshot, documents.HullChange, documents.HullProgress
 Conflate = Annotated[bool, Query(description="Leave out events that cancel each other.")]
 
 
@@ -103,13 +104,16 @@ class Described(Response):
     media_type = EventStream.media_type
 
 
-def events(example: str) -> dict[int | str, dict[str, Any]]:
-    """The description of a stream of events."""
-    content = {"schema": {"type": "string"}, "example": example}
+def events(example: str, *data: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
+    """The description of a stream of events, with this data."""
+    schemas = [{"$ref": f"#/components/schemas/{each.__name__}"} for each in data]
+    of_one = {"anyOf": schemas} if len(schemas) > 1 else schemas[0]
+    schema = {"type": "string", "contentMediaType": Described.media_type, "contentSchema": of_one}
+    content = {"schema": schema, "example": example}
     return {200: {"description": "Events.", "content": {Described.media_type: content}}}
 
 
-@router.get("/hulls/{name}/events", response_class=Described, responses=events(documents.OF_HULL))
+@router.get("/hulls/{name}/events", response_class=Described, responses=events(documents.OF_HULL, *OF_A_HULL))
 async def hull_events(
     request: Request,
     client: Caller,
@@ -155,7 +159,7 @@ async def hull_events(
     return EventStream(texts, state.health, state.figures)
 
 
-@router.get("/events", response_class=Described, responses=events(documents.OF_MANY))
+@router.get("/events", response_class=Described, responses=events(documents.OF_MANY, documents.Hulls))
 async def watch_many(
     request: Request,
     client: Caller,
@@ -195,7 +199,9 @@ async def watch_many(
     return EventStream(texts, state.health, figures, figures.many_stream(caller))
 
 
-@router.get("/fences/{name}/events", response_class=Described, responses=events(documents.OF_FENCE))
+@router.get(
+    "/fences/{name}/events", response_class=Described, responses=events(documents.OF_FENCE, documents.FenceEvent)
+)
 async def follow_fence(
     request: Request,
     client: Caller,
@@ -228,7 +234,9 @@ async def follow_fence(
     return EventStream(texts, state.health, state.figures)
 
 
-@router.get("/alarms/{name}/events", response_class=Described, responses=events(documents.OF_ALARM))
+@router.get(
+    "/alarms/{name}/events", response_class=Described, responses=events(documents.OF_ALARM, documents.AlarmEvent)
+)
 async def follow_alarm(
     request: Request,
     client: Caller,
@@ -259,7 +267,7 @@ async def follow_alarm(
 @router.post(
     "/fences/between",
     response_class=Described,
-    responses=events(documents.OF_PAST_FENCE),
+    responses=events(documents.OF_PAST_FENCE, documents.FenceEvent),
 )
 async def fence_events_between(
     request: Request, client: Caller, fence: Annotated[schemas.PastFence, schemas.body(examples.PAST_FENCES)]
@@ -279,7 +287,7 @@ async def fence_events_between(
     return EventStream(past.texts(state.settings.keepalive_seconds), state.health, state.figures)
 
 
-@router.get("/hulls/{name}/feed", response_class=Described, responses=events(documents.OF_FEED))
+@router.get("/hulls/{name}/feed", response_class=Described, responses=events(documents.OF_FEED, documents.FeedBatch))
 async def hull_feed(
     request: Request,
     client: Caller,
@@ -303,7 +311,7 @@ async def hull_feed(
     return await _feed(request, client, FeedReading(name, None, uid, place, consumer))
 
 
-@router.get("/feed", response_class=Described, responses=events(documents.OF_FEED))
+@router.get("/feed", response_class=Described, responses=events(documents.OF_FEED, documents.FeedBatch))
 async def feed_of_many(
     request: Request,
     client: Caller,

@@ -25,7 +25,7 @@ SubscriptionPath = Annotated[
 ]
 
 
-@router.post("/streams", response_class=Described, responses=events(documents.OF_JOINED))
+@router.post("/streams", response_class=Described, responses=events(documents.OF_JOINED, *documents.EVENTS))
 async def open_stream(
     request: Request, _: Caller, given: Annotated[schemas.Subscriptions, schemas.body(examples.STREAMS)]
 ) -> Response:
