@@ -234,12 +234,14 @@ class PastHulls:
         """A hull at a revision, from a kept one or anew."""
         rebuilt = self._take(hull, revision)
         self.outcomes["anew" if rebuilt is None else "kept"] += 1
+        ahead: list[Record] = []
         while rebuilt is None or rebuilt.state.counts.revision < revision:
             try:
                 if rebuilt is None:
+                    ahead = []
                     rebuilt = await self._begin(hull, revision)
                 else:
-                    await self.ask(hull.name, partial(self._step, rebuilt, revision))
+                    ahead = await self._step(rebuilt, ahead, revision)
             except _ErasedMeanwhileError:
                 rebuilt = None
             except NotStoredError:
@@ -268,16 +270,30 @@ class PastHulls:
         rebuilt: _Rebuilt = await self.ask(hull.name, begin)
         return rebuilt
 
-    def _step(self, rebuilt: _Rebuilt, revision: int) -> None:
-        """Apply the next batches."""
-        state = rebuilt.state
-        number = rebuilt.hull.row.number
-        records = self._past.gathered(number, state.counts.revision, revision)
-        if self._past.erasures(number) != rebuilt.erasures:
-            raise _ErasedMeanwhileError
+    async def _step(self, rebuilt: _Rebuilt, records: list[Record], revision: int) -> list[Record]:
+        """Apply the next batches, those that have been read if there are some. Returns others, read meanwhile."""
+        state, name = rebuilt.state, rebuilt.hull.name
+
+        def read(after: int) -> list[Record]:
+            number = rebuilt.hull.row.number
+            found = self._past.gathered(number, after, revision)
+            if self._past.erasures(number) != rebuilt.erasures:
+                raise _ErasedMeanwhileError
+            return found
+
+        if not records:
+            records = await self.ask(name, partial(read, state.counts.revision))
         rebuilt.rows += sum(1 + len(each.rows) for each in records)
         self._require_room(rebuilt.rows)
-        state.catch_up(records, self._driver.machine.clock.monotonic())
+        works = [self.ask(name, partial(state.catch_up, records, self._driver.machine.clock.monotonic()))]
+        if records[-1].revision < revision:
+            works.append(self.ask(name, partial(read, records[-1].revision)))
+        found: list[Any] = await asyncio.gather(*works, return_exceptions=True)
+        for each in found:
+            if isinstance(each, BaseException):
+                raise each
+        following: list[Record] = found[1] if len(works) > 1 else []
+        return following
 
     def require_room(self, hulls: Sequence[Hull]) -> None:
         """Raise LimitExceededError, which says why, if hulls that one reader has have too many points together."""
