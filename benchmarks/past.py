@@ -9,11 +9,13 @@ A fleet of keyed vehicles makes small steps. Parts, all of them unless `--parts`
 * as-of: a hull with a million points as it was a million batches of one move after the last state, from the journal and
   later from segments, each time the first read of this hull since the start; and again 200 batches later, five times.
 * memory: the resident memory of a server while 100 million moves become the past, no faster than segments are written:
-  the most in the second half, beside the most in the first quarter.
+  the most in the second half, beside the most in the first quarter; and the slope in the second half, which
+  `--scale 0.1` gives for a tenth of the moves.
 * day: a day of 5,000 vehicles that report every ten seconds: a replay of it as fast as it is read, the way of one
   vehicle, and the events of a fence after the fact; beside what pyarrow takes to read the same files, unchecked.
 
 Client and server share the machine. `--scale 0.01` is over in a minute. The folder should lie on the disk that counts.
+Each row has its aim beside what was found; how far a part has come is told on standard error.
 """
 
 import argparse
@@ -50,6 +52,8 @@ SEGMENT_SECONDS = 20  # after which another segment would have come
 MOVES = 2**18  # of a run of writers, and of what is weighed
 PACE = 250_000  # moves a second
 BEHIND = 5 * 10**6  # moves that segments may lack: those after the last snapshot but one are not due
+SNAPSHOT = 250_000  # points of batches between snapshots, as by default
+BAR = 20  # the width of one
 PARTS = ("writers", "bytes", "as-of", "memory", "day")
 
 
@@ -130,14 +134,16 @@ def write(served: Served, name: str, messages: list[bytes]) -> float:
     return asyncio.run(server.together(served.address, name, messages))
 
 
-def told(what: str) -> None:
-    print(f"{time.strftime('%H:%M:%S')} {what}", file=sys.stderr, flush=True)
+def told(what: str, done: float | None = None) -> None:
+    """Say what goes on, and which share of it is done, as a bar."""
+    bar = "" if done is None else f"[{'#' * round(BAR * min(done, 1)):.<{BAR}}] "
+    print(f"{time.strftime('%H:%M:%S')} {bar}{what}", file=sys.stderr, flush=True)
 
 
 def write_until_filed(served: Served, name: str, moves: int, messages: list[bytes]) -> None:
     """Write these again and again, until segments have so many moves: snapshots come once a second at most."""
     while (found := served.stub.GetHistory(pb.GetHistoryRequest(name=name)).moves) < moves:
-        told(f"{found:,} of {moves:,} moves are in segments")
+        told(f"{found:,} of {moves:,} moves are in segments", found / moves)
         write(served, name, messages)
         time.sleep(1)
 
@@ -156,7 +162,8 @@ def writers(folder: Path, scale: float, repeat: int) -> Iterator[str]:
                 time.sleep(2)  # what writes segments is loaded
                 before = served.processor
                 found[history] = write(served, "fleet", messages), served.processor - before
-        told(f"writers: {found[True][0]:,.0f} batches/s with a history, {found[False][0]:,.0f} without")
+        rates = f"{found[True][0]:,.0f} batches/s with a history, {found[False][0]:,.0f} without"
+        told(f"writers: {rates}", (number + 1) / repeat)
         pairs.append((found[True][0] / found[False][0], found[True][1] / found[False][1]))
         off.append(found[False][0])
     rate, processor = (ratio_of(column) for column in zip(*pairs, strict=True))
@@ -217,13 +224,13 @@ def as_of(folder: Path, scale: float, repeat: int) -> Iterator[str]:
 
 def looked_up(folder: Path, revision: int, repeat: int, options: tuple[str, ...], where: str) -> Iterator[str]:
     cold, near = [], []
-    for _ in range(repeat):
+    for number in range(repeat):
         with serving(folder, *options) as served:
             read_as_of(served, "small", 5)  # what reads is loaded
             time.sleep(2)
             cold.append(read_as_of(served, "large", revision))
             near += [read_as_of(served, "large", revision + step) for step in range(NEAR // 5, NEAR + 1, NEAR // 5)]
-        told(f"as-of, {where}: {cold[-1]:.3f} s, then {median(near) * 1000:.1f} ms")
+        told(f"as-of, {where}: {cold[-1]:.3f} s, then {median(near) * 1000:.1f} ms", (number + 1) / repeat)
     yield f"AS OF, batches {where}, cold, s | <= 0.6 | {median(cold):.3f}"
     yield f"AS OF, batches {where}, {NEAR // 5} later, ms | <= 5 | {median(near) * 1000:.1f}"
 
@@ -254,21 +261,25 @@ def memory(folder: Path, scale: float, _: int) -> Iterator[str]:
             while (filed := served.stub.GetHistory(pb.GetHistoryRequest(name="fleet")).moves) < moves - BEHIND:
                 time.sleep(1)
             if number % 20 == 19:
-                told(f"memory: {moves:,} moves, {filed:,} in segments, {used[-1]:.0f} MB")
+                told(f"memory: {moves:,} moves, {filed:,} in segments, {used[-1]:.0f} MB", (number + 1) / rounds)
             time.sleep(max(0.0, begun + moves / PACE - time.monotonic()))
     early, late = max(used[: max(2, rounds // 4)]), max(used[rounds // 2 :])
+    half = used[rounds // 2 :]
+    slope = np.polyfit(np.arange(len(half)) * len(messages) * VEHICLES / 10**8, half, 1)[0]
     yield f"memory after {moves:,} moves, of {early:.0f} MB after a quarter, MB | +- 50 | {late - early:+.0f}"
+    yield f"memory by which it grows in 10^8 moves, as in the second half, MB | +- 50 | {slope:+.0f}"
 
 
 def day(folder: Path, scale: float, repeat: int) -> Iterator[str]:
     """Seconds to read a day in three ways; most of it is in segments, and the rest in the journal."""
     reports = max(int(DAY * scale), 10)
     fleet = Fleet(VEHICLES)
-    with serving(folder / "day") as served:
+    options = "--snapshot-points", str(int(SNAPSHOT * min(scale, 1)))
+    with serving(folder / "day", *options) as served:
         create(served, "fleet")
         for first in range(0, reports, 100):
             write(served, "fleet", [each for _ in range(min(100, reports - first)) for each in fleet.all(VEHICLES)])
-            told(f"day: {min(first + 100, reports):,} of {reports:,} reports are written")
+            told(f"day: {min(first + 100, reports):,} of {reports:,} reports are written", (first + 100) / reports)
         wait_until_filed(served, "fleet")
         filed = served.stub.GetHistory(pb.GetHistoryRequest(name="fleet")).moves / (reports * VEHICLES)
     files = sorted(map(str, (folder / "day").rglob("*.batches.parquet")))
@@ -284,7 +295,7 @@ def day(folder: Path, scale: float, repeat: int) -> Iterator[str]:
     )
     took: dict[str, list[float]] = {"replay": [], "track": [], "fence": []}
     for _ in range(repeat):
-        with serving(folder / "day") as served:
+        with serving(folder / "day", *options) as served:
             fences = FenceServiceStub(served.channel)
             list(served.stub.Track(first))  # what reads is loaded
             calls = (served.stub.Track, tracked), (served.stub.Replay, replayed), (fences.FenceEventsBetween, fenced)
