@@ -32,6 +32,7 @@ from dynhull_client import (
     HullUnsuitableError,
     InvalidRequestError,
     KeyMissingError,
+    Prefix,
     Quarantine,
     UnavailableError,
 )
@@ -691,3 +692,26 @@ def test_an_export_has_the_rows_of_one_hull(tmp_path: Path, kind: str) -> None:
     assert many == one
     assert one[1]
     assert none == (one[0], [])
+
+
+def test_what_is_about_the_past_is_refused_by_name(client: HullClient) -> None:
+    client.create_hull("past/big", keyed="str", shards=SHARDS)
+    client.put("past/big", ["a", "b"], [(0, 0), (1, 1)])
+    square = [[0, 0], [1, 0], [1, 1]]
+    for call in (
+        lambda: client.at("past/big", 0),
+        lambda: list(client.replay("past/big")),
+        lambda: client.track("past/big", ["a"]),
+        lambda: next(client.feed("past/big", after=0)),
+        lambda: next(client.feed("past/big", consumer="c")),
+        lambda: next(client.feed(prefix="past/", after=0)),
+        lambda: client.ack_feed("past/big", consumer="c", after=0),
+        lambda: client.erase_history("past/big", ["z"]),
+        lambda: client.set_history("past/big", "1d"),
+        lambda: list(client.fence_events_between(square, "past/big")),
+        lambda: list(client.fence_events_between(square, Prefix("past/"))),
+    ):
+        with pytest.raises(HullUnsuitableError, match="'past/big' is divided among shards"):
+            call()
+    assert list(client.list_feed_consumers("past/big")) == []
+    client.delete_hull("past/big")
