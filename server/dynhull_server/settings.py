@@ -187,7 +187,7 @@ class Settings(BaseModel):
     max_replays: int = Field(
         32, ge=1, description="Largest number of simultaneous replays; each has a hull of its own."
     )
-    max_replays_per_caller: int = Field(8, ge=1, description="The same per token, or without tokens per address.")
+    max_replays_per_caller: int = Field(16, ge=1, description="The same per token, or without tokens per address.")
 
     max_feeds: int = Field(1_000, ge=1, description="Largest number of simultaneous feeds of batches.")
     max_feeds_per_caller: int = Field(100, ge=1, description="The same per token, or without tokens per address.")
