@@ -78,6 +78,10 @@ class FenceTruth:
         ever: the names of the hulls that it has ever depended on, other than by a prefix.
         droppable: the first event that may be kept as the oldest one.
         deleted: the number of commits when it was deleted, None before.
+        outside: since when expected keys are outside, None if they are inside; those not named have not moved.
+        missing: the expected keys that are missing, and their deadlines.
+        expecting: since when it expects keys, once that is known.
+        restored: whether a backup has brought it back, after which nobody follows which keys are missing.
         known: of an alarm, what is known of each hull that it watches.
         latest: the latest time that its events or what is known have.
         begun: when it was made, or the server has begun, by the server's clock.
@@ -93,6 +97,10 @@ class FenceTruth:
     ever: set[str] = field(default_factory=set)
     droppable: int = 1
     deleted: int | None = None
+    outside: dict[Key, int | None] = field(default_factory=dict)
+    missing: dict[Key, int] = field(default_factory=dict)
+    expecting: int | None = None
+    restored: bool = False
     known: dict[str, Known] = field(default_factory=dict)
     latest: int = NO_TIME
     begun: float = 0
@@ -197,7 +205,8 @@ class FenceModel:
             by_fence.setdefault(number, []).append(change)
         for number, of_fence in by_fence.items():
             made[number] = self._numbered(number, of_fence, made.get(number, []))
-        self._revised(before, made, created, by_fence)
+        others = {number: _without_expected(events) for number, events in made.items()}
+        self._revised(before, others, created, by_fence)
         for number, of_fence in by_fence.items():
             fence = self.ever[number]
             fence.events += made[number]
@@ -233,11 +242,43 @@ class FenceModel:
         times = [event.time for event in (*fence.events[-1:], *events)]
         if times != sorted(times):
             raise self._model.finds(f"the times of events of {fence.row.name} go back: {times}")
+        before, others = fence.config, _without_expected(events)
         if isinstance(first, AddFence):
-            self._began(fence, changes, events)
+            self._began(fence, changes, others)
         elif isinstance(first, ChangeFence):
-            self._replaced(fence, first.row, events)
+            self._replaced(fence, first.row, others)
+        if isinstance(first, AddFence) or expected_of(before) != expected_of(fence.config):
+            fence.outside, fence.missing, fence.expecting = {}, {}, None
+        self._expects(fence, events)
         return events
+
+    def _expects(self, fence: FenceTruth, events: list[FenceEvent]) -> None:
+        """Whether keys are missing and arrive as they should, by an age, in a fence around one hull."""
+        config, late = fence.config, dict[Key, tuple[int, int]]()
+        for event in () if fence.restored else events:
+            key = event.key
+            if key is None or key not in config.expected:
+                continue
+            match event.type:
+                case EventType.ENTER:
+                    fence.outside[key] = None
+                    if key in fence.missing:
+                        late[key] = fence.missing.pop(key), event.time
+                case EventType.EXIT:
+                    fence.outside[key] = event.time
+                case EventType.ARRIVED:
+                    if late.pop(key, None) != (event.first_time, event.time):
+                        raise self._model.finds(f"{event} of {fence.row.name} arrives without being missing")
+                case EventType.MISSING:
+                    if key not in fence.outside and fence.expecting is None:
+                        fence.expecting = event.first_time
+                    since = fence.outside.get(key, fence.expecting)
+                    due = event.first_time + config.expected_within
+                    if since != event.first_time or event.time < due or key in fence.missing:
+                        raise self._model.finds(f"{event} of {fence.row.name} is missing, and outside since {since}")
+                    fence.missing[key] = due
+        if late:
+            raise self._model.finds(f"{late} of {fence.row.name} have not arrived")
 
     def _added(self, row: FenceRow) -> None:
         if row.number in self.ever or row.number in self._model.numbers:
@@ -1100,6 +1141,16 @@ def _is_clear(config: FenceConfig, shape: Shape, entity: Entity) -> bool:
     """Whether a position decides its side, by its accuracy."""
     error = _units(accuracy_of(entity.x)) if config.by_accuracy else 0
     return not error or shape.clear(_exact(entity), error, closed=config.closed)
+
+
+def expected_of(config: FenceConfig) -> tuple[object, ...]:
+    """What a fence expects."""
+    return config.expected, config.expected_by, config.expected_within
+
+
+def _without_expected(events: list[FenceEvent]) -> list[FenceEvent]:
+    """The events but those of keys that are missing or arrive, of which `_expects` takes care."""
+    return [event for event in events if event.type not in (EventType.MISSING, EventType.ARRIVED)]
 
 
 @cache

@@ -85,6 +85,7 @@ def _begin_anew(model: "Model", before: FenceTruth, kept: KeptFence) -> None:
             f"{name} is restored with {kept.first, kept.consumers}, and should be with {lost + 1, consumers}"
         )
     begun = FenceTruth(row, [*before.events, kept.events[0]._replace(sequence=lost), *kept.events], lost + 1, consumers)
+    begun.restored = True
     begun.acknowledged, begun.inside, begun.near = before.acknowledged, before.inside, before.near
     begun.droppable = begun.first
     begun.known, begun.latest = before.known, before.latest

@@ -188,6 +188,10 @@ def _config(draw: random.Random, kind: str, subjects: str) -> dict[str, Any]:
         return config | {"margin": draw.choice((0.5, 20.0))}
     config["closed"] = "hull" in config["area"] or draw.random() < 0.7
     config["crosses"] = config["closed"] and draw.random() < 0.4
+    if kind == "hull" and draw.random() < 0.4:
+        keys = draw.sample(range(5), draw.choice((1, 3)))
+        config["expected"] = tuple(keys if subjects == "l" else map(str, keys))
+        config["expected_within"] = draw.choice((1, 100_000, 400_000, 2_000_000))
     if subjects in BY_ACCURACY:
         config |= {"by_accuracy": True, "margin": 0.0, "crosses": False}
     if draw.random() < 0.3:
