@@ -284,10 +284,10 @@ class AlarmJudge:
     def _moved(self, name: str, now: At, begun: float) -> tuple[float, float]:
         """Between which times a hull has changed last, for an alarm that was made at a time.
 
-        If commits are ahead of the server's clock, it counts from then on.
+        If commits are ahead of the server's clock, it counts from then on; so does one without batches after a restart.
         """
         first, last, commit = self._truth(name).moved[now[name]]
-        return first, inf if self._model.faulty else max(last, min(commit, begun))
+        return first, inf if self._model.faulty else max(last, min(commit, begun) if now[name] else begun)
 
     def late(self, rule: AlarmRule, known: Known, name: str, now: At, begun: float) -> float | None:
         """The time at which time raises an alarm for a hull, at the latest; None if it does not, or is not known."""
