@@ -316,9 +316,9 @@ def day(folder: Path, scale: float, repeat: int) -> Iterator[str]:
 
 
 def wait_until_filed(served: Served, name: str) -> None:
-    """Wait until no more segments come."""
+    """Wait until there are segments, and no more come."""
     before = -1
-    while (found := served.stub.GetHistory(pb.GetHistoryRequest(name=name)).moves) != before:
+    while (found := served.stub.GetHistory(pb.GetHistoryRequest(name=name)).moves) != before or not found:
         told(f"{found:,} moves are in segments")
         before = found
         time.sleep(SEGMENT_SECONDS)
