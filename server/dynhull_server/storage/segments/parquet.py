@@ -328,7 +328,8 @@ def _of_groups(file: pq.ParquetFile, groups: list[int]) -> pa.Table:
                 constant[name] = pa.DictionaryArray.from_arrays(np.zeros(count, np.int32), list(words))
     if "kind" in constant and "op" in constant:  # of a revision each key has one row
         constant["row"] = pa.array(np.zeros(count, np.int32))
-    table = file.read_row_groups(groups, columns=[name for name in ORDER if name not in constant], use_threads=False)
+    names = [name for name in schema.names if name not in constant]
+    table = file.read_row_groups(groups, columns=names, use_threads=False)
     for name, column in constant.items():
         table = table.append_column(name, column)
     return table
