@@ -162,10 +162,6 @@ class FaultyStorage:
             self._fail("read")
             yield kept
 
-    def feed_consumers(self) -> list[FeedConsumer]:
-        """The consumers of feeds; no plan has one."""
-        return self._inner.feed_consumers()
-
     def oldest(self, number: int) -> int:
         """The oldest revision of a hull."""
         self._fail("oldest")
