@@ -242,6 +242,21 @@ def test_the_events_of_a_replacement_are_in_the_order_of_keys(client):
     ]
 
 
+def test_on_the_globe_nobody_is_certainly_inside_within_the_margin(client):
+    """A perhaps that becomes one within the margin, outside of the area, is no certainty; 111 km are a degree."""
+    client.create_hull("globe", keyed="str", geographic=True, center=(0, 0))
+    client.create_fence(
+        "globe", [(-1, -1), (1, -1), (1, 1), (-1, 1)], "globe", margin=50_000, by_accuracy=True, initial="none"
+    )
+    client.put("globe", ["van"], [(0.9, 0)], accuracies=[20_000])  # perhaps inside
+    client.put("globe", ["van"], [(1.2, 0)], accuracies=[1_000])  # 22 km outside: within the margin
+    assert told(client, "globe") == []
+    client.put("globe", ["van"], [(0.9, 0)], accuracies=[1_000])
+    client.put("globe", ["van"], [(1.5, 0)], accuracies=[10_000])  # 56 km outside: perhaps beyond the margin
+    client.put("globe", ["van"], [(1.6, 0)], accuracies=[10_000])
+    assert [event[:2] for event in told(client, "globe")] == [("enter", "van"), ("exit", "van")]
+
+
 def test_an_area_that_moves_makes_subjects_certain(client):
     for name in ("pack", "yard"):
         client.create_hull(name, keyed="str")

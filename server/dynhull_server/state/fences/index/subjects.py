@@ -137,16 +137,13 @@ class Subjects:
         assert isinstance(contents, Keyed)
         return stored_times(contents.hull.times(keys)) if contents.timed else None
 
-    def clear(
-        self, leg: "FenceLeg", keys: Keys, points: Points, inside: npt.NDArray[np.bool_]
-    ) -> npt.NDArray[np.bool_]:
+    def clear(self, leg: "FenceLeg", keys: Keys, points: Points) -> npt.NDArray[np.bool_]:
         """Which keys that are there are on their side of a fence, which has been laid, by more than their accuracy.
 
         Args:
             leg: the fence after the trip, one that asks for it.
             keys: n keys.
             points: (n, 2) their positions.
-            inside: (n,) which of them are on the inner side.
         """
         contents = self.hull.state.contents
         assert isinstance(contents, Keyed)
@@ -158,8 +155,11 @@ class Subjects:
         if self.hull.state.center is None:
             clear[rows] = self.index.clear(number, points[rows], accuracies[rows])
         else:
+            frame = frame_of(self.hull.state)
+            assert frame is not None  # as there is a centre
             away = self._metres(number, config, leg.area, points[rows])
-            clear[rows] = away > accuracies[rows] + np.where(inside[rows], 0.0, config.margin)
+            held = self.index.distances(number, frame.project_all(points[rows])) == 0  # not so within the margin
+            clear[rows] = away > accuracies[rows] + np.where(held, 0.0, config.margin)
         return clear
 
     def distances(self, leg: "FenceLeg", keys: Keys, points: Points, outside: npt.NDArray[np.bool_]) -> list[float]:
@@ -200,7 +200,7 @@ class Subjects:
         return [far.get(key, 0.0) for key in key_list(keys)]
 
     def _metres(self, number: int, config: FenceConfig, area: Hull | None, places: Points) -> npt.NDArray[np.float64]:
-        """The distances of places to the area of a fence on the globe, which is farther than the index measures."""
+        """The distances of places to the boundary of a fence on the globe, also where the index measures none."""
         known, boundary = self._boundaries.get(number, (None, None))
         if boundary is None or known is not config.area or isinstance(known, HullArea):
             boundary = Boundary(chain.from_iterable(rings_of(config.area, area_vertices(config, area))))

@@ -90,8 +90,7 @@ def _certain(
     if delays is None or not doubtful:
         return []
     waiting, keys = delays.of(hull), subjects.keys(doubtful)
-    inside = np.array([waiting[key].enters for key in key_list(keys)], np.bool_)
-    clear = subjects.clear(leg, keys, keyed(subjects.hull.state).positions(keys), inside)
+    clear = subjects.clear(leg, keys, keyed(subjects.hull.state).positions(keys))
     reported, certain = set(reports), []
     for key, is_clear in zip(key_list(keys), clear.tolist(), strict=True):
         if not is_clear:
@@ -110,7 +109,7 @@ def doubt_new(leg: FenceLeg, now: int) -> None:
     for subjects in leg.fence.subjects.values() if leg.row.config.by_accuracy else ():
         keys = subjects.index.inside(leg.row.number)
         points = keyed(subjects.hull.state).positions(keys)
-        clear = subjects.clear(leg, keys, points, np.ones(len(keys), np.bool_))
+        clear = subjects.clear(leg, keys, points)
         for key in key_list(take_keys(keys, np.flatnonzero(~clear))):
             leg.put_delay((subjects.hull.name, key), Delay(True, leg.time(now), 0, int(Cause.CREATED), doubt=True))
 
@@ -223,7 +222,7 @@ def _doubtful(
     changes, gone = crossings.changes[numbers], crossings.causes[numbers] & GONE != 0
     rows = numbers[(np.abs(changes) == 1) & ~gone]
     keys, points = take_keys(crossings.keys, rows), crossings.points[rows]
-    clear = subjects.clear(leg, keys, points, crossings.changes[rows] > 0)
+    clear = subjects.clear(leg, keys, points)
     return frozenset(rows[~clear].tolist())
 
 
