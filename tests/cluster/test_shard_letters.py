@@ -40,7 +40,7 @@ MESSAGES = [
     Answer(None),
     Answer(say.Opened(1, 1, 0, TOTALS, say.Corners(POINTS, None))),
     Answer(say.Done(1, 2, (say.Effect(1, TOTALS, 1, CHANGE, Applied(1, 2, 0, 0, True, 3, held=[1]), None),))),
-    Answer(say.Answered(1, 3, keyed.Found(POINTS, np.array([True, False]), TIMES))),
+    Answer(say.Answered(1, 3, keyed.Found(POINTS, np.array([True, False]), TIMES, np.array([0.0, 2.5])))),
     Answer(say.Answered(1, 3, Contents(POINTS, STRINGS, TIMES, None))),
     Answer(say.Closed(1, 3)),
 ]

@@ -126,6 +126,7 @@ def fence(*area: Polygon | Circle, margin: float = 0.0) -> Fence:
         without_self=False,
         max_events=0,
         max_event_age=None,
+        expected=None,
         created=datetime(2026, 1, 1, tzinfo=UTC),
         uid="u",
         last_sequence=0,

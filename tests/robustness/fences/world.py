@@ -466,6 +466,7 @@ class World:
         if anew and request.config.dwell:
             fence.time = max(fence.time, self.time)
         fence.config = request.config
+        made = len(fence.events)
         if fence.config.kind == "other":
             self._look_at_pair(fence, int(Cause.CHANGED))
         for name in self.subjects(fence.config):
@@ -473,6 +474,9 @@ class World:
                 self._look_again(fence, (name, key), place)
         for subject in sorted(fence.delays, key=_in_order):
             self._end(fence, subject, int(Cause.CHANGED))
+        ordered = sorted(fence.events[made:], key=lambda event: (event.hull, (event.key or "").encode()))
+        numbers = [event.sequence for event in fence.events[made:]]
+        fence.events[made:] = [event._replace(sequence=number) for event, number in zip(ordered, numbers, strict=True)]
         if anew:
             fence.stays = dict.fromkeys(fence.inside, fence.time)
 

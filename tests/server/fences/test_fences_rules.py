@@ -482,7 +482,7 @@ def test_a_fence_replaced_by_one_with_fewer_rules_ends_what_waits(
         return words(events(fences, name)[-last:] if last else [])
 
     assert replace(5, 2) == ["EXIT a SUBJECT_MOVED FENCE_CHANGED"]
-    assert replace(7, 0)[1:] == ["ENTER c FENCE_CHANGED", "ENTER b SUBJECT_MOVED FENCE_CHANGED"]
+    assert replace(7, 0)[1:] == ["ENTER b SUBJECT_MOVED FENCE_CHANGED", "ENTER c FENCE_CHANGED"]
     assert inside(fences, name) == ["b", "c", "d"]
 
 
