@@ -1,6 +1,7 @@
 // The hull tree as a Python object: checks arguments, locks, and fills numpy arrays.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -34,10 +35,13 @@ class Hull {
  protected:
   // What `work` returns while nobody changes the tree.
   template <class Work>
-  auto reading(Work work) {
-    const ReadLock lock(lock_);
+  auto reading(Work work, std::size_t rows = ALL_ROWS) {
+    const ReadLock lock(lock_, rows);
     return work();
   }
+
+  // About how many vertices there are: where they are few, a thread that waits for the GIL does not get it meanwhile.
+  std::size_t expected_vertices() { return std::min(settled().distinct(), vertices_); }
 
   // Calls `work` with the number of each row and its point, while nobody changes the tree.
   template <class Work>
@@ -100,7 +104,9 @@ class Hull {
   }
 
   PointArray vertices() {
-    return array_of(reading([&] { return tree_.vertices(); }));
+    std::vector<Point> found = reading([&] { return tree_.vertices(); }, expected_vertices());
+    vertices_ = found.size();
+    return array_of(std::move(found));
   }
 
   SignArray locate(const nb::object& xy) {
@@ -317,6 +323,7 @@ class Hull {
 
   FramedTree tree_;
   ReadWriteLock lock_;
+  std::size_t vertices_ = ALL_ROWS;  // when they were asked for last
 
  private:
   static constexpr std::size_t LOCATE_A_THREAD = 8192;

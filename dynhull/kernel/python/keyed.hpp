@@ -161,10 +161,10 @@ class KeyedHull : public Hull {
   nb::list keys_at(const nb::object& xy) {
     const nb::object checked = as_points(xy);
     const Rows rows = nb::cast<Rows>(checked);
-    return names_of([&] { return std::vector<Point>(points_of(rows), points_of(rows) + rows.shape(0)); });
+    return names_of(rows.shape(0), [&] { return std::vector<Point>(points_of(rows), points_of(rows) + rows.shape(0)); });
   }
   nb::list vertex_keys() {
-    return names_of([&] { return tree_.vertices(); });
+    return names_of(expected_vertices(), [&] { return tree_.vertices(); });
   }
 
   KeyedHull* copy() {
@@ -289,9 +289,9 @@ class KeyedHull : public Hull {
     });
   }
 
-  // The least keys at the places that `places` returns.
+  // The least keys at the places that `places` returns, about `count`.
   template <class Places>
-  nb::list names_of(Places places) {
+  nb::list names_of(std::size_t count, Places places) {
     KeyList keys(strings());
     std::vector<std::uint32_t> slots;
     const auto answer = [&](const std::vector<Point>& asked) {
@@ -300,7 +300,7 @@ class KeyedHull : public Hull {
         if (slot != NONE) keys.add(entities_.slots(), slot);
     };
     const bool answered = [&] {
-      const ReadLock lock(lock_);
+      const ReadLock lock(lock_, count);
       const std::vector<Point> asked = places();
       if (!entities_.named(tree_, asked)) return false;
       answer(asked);
