@@ -620,8 +620,10 @@ class FenceModel:
             shape = self._shape(config, now, key)
             there = Expected(config, now, name, key, was, place, origin)
             if place is None:
-                if inside:
-                    yield there.event(EventType.EXIT, gone | cause)
+                if inside:  # where it was is not said of one that had perhaps left
+                    left = was is not None and not _is_clear(config, shape, was)
+                    left = left and shape.farther(_exact(was), _units(config.margin), closed=config.closed)
+                    yield (there._replace(was=None) if left else there).event(EventType.EXIT, gone | cause)
                 continue
             p = _exact(place)
             causes = cause | (Cause.APPEARED if was is None else Cause.MOVED if origin or _exact(was) != p else 0)
