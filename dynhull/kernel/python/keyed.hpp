@@ -161,7 +161,8 @@ class KeyedHull : public Hull {
   nb::list keys_at(const nb::object& xy) {
     const nb::object checked = as_points(xy);
     const Rows rows = nb::cast<Rows>(checked);
-    return names_of(rows.shape(0), [&] { return std::vector<Point>(points_of(rows), points_of(rows) + rows.shape(0)); });
+    return names_of(rows.shape(0),
+                    [&] { return std::vector<Point>(points_of(rows), points_of(rows) + rows.shape(0)); });
   }
   nb::list vertex_keys() {
     return names_of(expected_vertices(), [&] { return tree_.vertices(); });
