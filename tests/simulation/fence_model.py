@@ -621,7 +621,7 @@ class FenceModel:
             there = Expected(config, now, name, key, was, place, origin)
             if place is None:
                 if inside:  # where it was is not said of one that had perhaps left
-                    left = was is not None and not _is_clear(config, shape, was)
+                    left = not cause and was is not None and not _is_clear(config, shape, was)
                     left = left and shape.farther(_exact(was), _units(config.margin), closed=config.closed)
                     yield (there._replace(was=None) if left else there).event(EventType.EXIT, gone | cause)
                 continue
