@@ -225,8 +225,8 @@ async def follow_fence(
         raise ValueError("give either consumer, which knows its place, or after and conflate")
     admit(request)
     ident, exact = parted(last_event_id)
-    resume = resumed(ident)
-    uid, place = ("", after) if resume is None or consumer is not None else resume
+    resume = _resumed(ident, consumer, after)
+    uid, place = resume or ("", after)
     reading = Reading(name, consumer, uid, place, conflate, exact)
     await _require_events(client.get_fence, reading, "after" if resume is None else "Last-Event-ID")
     state = request.app.state
@@ -252,11 +252,9 @@ async def follow_alarm(
     described by the schema AlarmEvent. Also: "replaced", when another alarm has the name now, and "problem", which ends
     the stream.
     """
-    if consumer is not None and after is not None:
-        raise ValueError("give either consumer, which knows its place, or after")
+    resume = _resumed(last_event_id, consumer, after)
     admit(request)
-    resume = resumed(last_event_id)
-    uid, place = ("", after) if resume is None or consumer is not None else resume
+    uid, place = resume or ("", after)
     reading = AlarmReading(name, consumer, uid, place)
     await _require_events(client.get_alarm, reading, "after" if resume is None else "Last-Event-ID")
     state = request.app.state
@@ -304,10 +302,7 @@ async def hull_feed(
     and the `last` revision of batches that are kept no more and were not sent; "replaced", when another hull has the
     name now, whose batches follow; and "problem", which ends the stream.
     """
-    if consumer is not None and after is not None:
-        raise ValueError("give either consumer, which knows its place, or after")
-    resume = resumed(last_event_id)
-    uid, place = ("", after) if resume is None or consumer is not None else resume
+    uid, place = _resumed(last_event_id, consumer, after) or ("", after)
     return await _feed(request, client, FeedReading(name, None, uid, place, consumer))
 
 
@@ -341,6 +336,15 @@ async def _feed(request: Request, client: AsyncHullClient, reading: FeedReading)
     state = request.app.state
     texts = batches(client, reading, state.settings.keepalive_seconds)
     return EventStream(texts, state.health, state.figures)
+
+
+def _resumed(ident: str | None, consumer: str | None, after: int | None) -> tuple[str, int] | None:
+    """The uid and the number that a reader goes on after; None for one without an id, and for a consumer."""
+    if consumer is None:
+        return resumed(ident)
+    if after is not None:
+        raise ValueError("give either consumer, which knows its place, or after")
+    return None
 
 
 async def _require_keys(client: AsyncHullClient, name: str) -> None:

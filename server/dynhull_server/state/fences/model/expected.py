@@ -20,8 +20,8 @@ EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 MICROSECOND = timedelta(microseconds=1)
 # The days beside that of a time in which the next deadline is.
 DAYS_AROUND = range(-1, 9)
-# The key under which it is stored up to when deadlines have passed.
-OF_ALL = ""
+# The hull under which expected keys are stored, and the key there that says up to when deadlines have passed.
+NOWHERE = OF_ALL = ""
 
 
 @dataclass(frozen=True, slots=True)

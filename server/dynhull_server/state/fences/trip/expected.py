@@ -1,11 +1,9 @@
 """What a trip makes of the keys that a fence expects inside: those missing at a deadline, and those that arrive."""
 
 from ...records import NO_TIME
-from ..model.expected import OF_ALL, expectations_of
+from ..model.expected import NOWHERE, OF_ALL, expectations_of
 from ..model.records import Cause, EventType, FenceEvent, Key
 from .leg import FenceLeg
-
-NOWHERE = ""
 
 
 def begin(leg: FenceLeg, now: int) -> None:

@@ -17,6 +17,7 @@ from ..events.sequences import Swap, caused
 from ..index.pair import Pair
 from ..index.subjects import Subjects, keyed
 from ..model.dwell import Dwelling
+from ..model.expected import NOWHERE
 from ..model.fence import Fence
 from ..model.records import (
     AddFence,
@@ -224,7 +225,7 @@ class FenceLeg:
         """Put what is stored of an expected key in the place of what was; None where nothing is new."""
         if stored is not None:
             self._time = max(self._time, stored.since)
-            self.delays["", key] = stored
+            self.delays[NOWHERE, key] = stored
 
     def place(self, subjects: Subjects, key: Key) -> tuple[Position, float, int] | None:
         """Where a key is that is outside as the events say, its distance, and the time; None if it is not there."""
