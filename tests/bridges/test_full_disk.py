@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 from patience import wait_until
-from receiver import Receiver, receiver
+from receiver import Receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
 from server_process import Server, server_process
 
@@ -15,12 +14,6 @@ from dynhull_client import HullClient, LimitExceededError
 
 SMALL_DISK = 'mount -t tmpfs -o size=4m none "$0" && exec "$@"'
 PLAIN = ("--unsigned", "--allow-private", *FAST)
-
-
-@pytest.fixture
-def endpoint() -> Iterator[Receiver]:
-    with receiver() as running:
-        yield running
 
 
 @contextmanager

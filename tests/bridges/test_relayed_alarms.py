@@ -27,12 +27,6 @@ PLAIN = ("--unsigned", "--allow-private", *FAST)
 
 
 @pytest.fixture
-def endpoint() -> Iterator[Receiver]:
-    with receiver() as running:
-        yield running
-
-
-@pytest.fixture
 def client(address: str, name: str) -> Iterator[HullClient]:
     with HullClient(address) as client:
         alarm(client, name)

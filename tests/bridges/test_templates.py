@@ -11,7 +11,7 @@ from brokers import broker, mosquitto
 from command_line import dynhull
 from patience import wait_until
 from ports import free_port
-from receiver import Receiver, receiver
+from receiver import Receiver
 from relay_process import FAST, acknowledged, alarm, fence, grow_and_shrink, relay_process
 from server_process import run
 from subscriber import Subscriber
@@ -220,12 +220,6 @@ def test_tokens_in_paths_are_not_shown() -> None:
     assert shown.startswith("https://hooks.slack.com/services/T0/B0/…")
     assert token not in shown
     assert shown != without_secrets(f"https://hooks.slack.com/services/T0/B0/{token.lower()}")
-
-
-@pytest.fixture
-def endpoint() -> Iterator[Receiver]:
-    with receiver() as running:
-        yield running
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import pytest
 from command_line import dynhull
 from metrics import scrape
 from patience import PATIENCE, wait_until
-from receiver import Received, Receiver, receiver
+from receiver import Received, Receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
 from server_process import run, server_process
 from standardwebhooks import Webhook
@@ -25,12 +25,6 @@ from dynhull_client import HullClient
 KEYS = [f"truck-{i}" for i in range(5)]
 OLD, NEW = (f"whsec_{base64.b64encode(bytes([i]) * 32).decode()}" for i in (1, 2))
 PLAIN = ("--unsigned", "--allow-private", *FAST)
-
-
-@pytest.fixture
-def endpoint() -> Iterator[Receiver]:
-    with receiver() as running:
-        yield running
 
 
 @pytest.fixture

@@ -18,10 +18,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import Counter, defaultdict
-from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import pairwise
@@ -30,12 +28,13 @@ from typing import Any
 
 sys.path += [str(Path(__file__).parents[2] / "support")]
 from cluster import processes
-from forked import COMMAND, Process
+from forked import COMMAND
 from mortal_server import MortalServer
 from patience import wait_until
 from ports import free_port
 from postgresql import PostgreSQL, postgresql, query
 from relay_process import acknowledged
+from torturers import PAUSE, Killed, Writer
 
 from dynhull_client import DynhullError, HullClient
 
@@ -43,73 +42,25 @@ ALARMS = ["area", "near"]
 HULLS = [f"fleet/{name}" for name in "abc"]
 PORT = "fleet/port"
 LARGE, BETWEEN, SMALL = [[0, 6]], [[0, 4.8]], [[0, 1]]  # where the third point is: areas of 12, 9.6 and 2
-PAUSE = 0.02
 DELIVERED_WITHIN = 180  # seconds
 
 
-class Writer(threading.Thread):
-    """Grows and shrinks hulls, and counts it.
-
-    A put that repeats one changes nothing: without an answer it is sent again.
-    """
+class GrowingWriter(Writer):
+    """Grows and shrinks hulls, and counts it."""
 
     def __init__(self, server: MortalServer, seed: int) -> None:
-        super().__init__()
+        super().__init__(server, seed)
         self.raised: Counter[str] = Counter()
         self.large: set[str] = set()
-        self.failure: BaseException | None = None
-        self._server = server
-        self._rng = random.Random(f"{seed}/writer")
-        self._ending = threading.Event()
 
-    def stop(self) -> None:
-        self._ending.set()
-        self.join()
-        if self.failure is not None:
-            raise self.failure
-
-    def run(self) -> None:
-        try:
-            with HullClient(self._server.address) as client:
-                while not self._ending.is_set():
-                    hull = self._rng.choice(HULLS)
-                    is_large = hull in self.large
-                    self._put(client, hull, SMALL if is_large else LARGE)
-                    self.raised[hull] += not is_large
-                    self.large ^= {hull}
-                    if not is_large and self._rng.random() < 0.5:  # it stays raised
-                        self._put(client, hull, BETWEEN)
-                    time.sleep(self._rng.uniform(0, PAUSE))
-        except BaseException as error:  # for the thread that waits for this one
-            self.failure = error
-
-    def _put(self, client: HullClient, hull: str, points: list[list[float]]) -> None:
-        while True:
-            self._server.up.wait()
-            try:
-                client.put(hull, ["c"], points, timeout=20)
-                return
-            except DynhullError:
-                time.sleep(PAUSE)
-
-
-class Killed:
-    """A process that is killed and started again."""
-
-    def __init__(self, command: Sequence[object], log: Path) -> None:
-        self._command = [*map(str, command)]
-        self._log = log
-        self.start()
-
-    def start(self) -> None:
-        with self._log.open("ab") as log:
-            self._process = Process(self._command, stdout=subprocess.DEVNULL, stderr=log, text=True)
-
-    def kill(self) -> None:
-        code = self._process.poll()
-        assert code is None, f"{self._command[1]} has ended with {code}: {self._log.read_text()[-2000:]}"
-        self._process.kill()
-        self._process.wait()
+    def step(self, client: HullClient) -> None:
+        hull = self.rng.choice(HULLS)
+        is_large = hull in self.large
+        self.put(client, hull, ["c"], SMALL if is_large else LARGE)
+        self.raised[hull] += not is_large
+        self.large ^= {hull}
+        if not is_large and self.rng.random() < 0.5:  # it stays raised
+            self.put(client, hull, ["c"], BETWEEN)
 
 
 class Torture:
@@ -137,7 +88,7 @@ class Torture:
         relay += ["--to", f"http://127.0.0.1:{port}/", "--state", folder / "relay", "--unsigned", "--allow-private"]
         relay += ["--first-pause", "10ms", "--longest-pause", "200ms", "--timeout", "5s"]
         self._relay = Killed(relay, folder / "relay.log")
-        self._writer = Writer(self._server, seed)
+        self._writer = GrowingWriter(self._server, seed)
 
     def run(self, faults: int) -> None:
         """Let that many things happen."""

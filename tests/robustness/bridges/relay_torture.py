@@ -11,10 +11,8 @@ one id. Without --patience the relay tries again after 10 to 200 ms, so that a s
 import argparse
 import random
 import shutil
-import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import Counter
 from contextlib import suppress
@@ -22,11 +20,12 @@ from itertools import pairwise
 from pathlib import Path
 
 sys.path += [str(Path(__file__).parents[2] / "support")]
-from forked import COMMAND, Process
+from forked import COMMAND
 from mortal_server import MortalServer
 from patience import wait_until
 from receiver import Receiver
 from relay_process import INSIDE, OUTSIDE, acknowledged, fence
+from torturers import PAUSE, Killed, Writer
 
 from dynhull_client import DynhullError, HullClient
 
@@ -35,77 +34,33 @@ KEYS = [f"é{number}" for number in range(8)]
 PATIENCE = ["10ms", "200ms"]
 # Seconds between two kills, at most.
 BETWEEN = 1.0
-PAUSE = 0.02
 # Seconds in which what has waited for the endpoint arrives, besides those of the last pause and of a long backlog.
 DELIVERED_WITHIN = 120
 
 
-class Relay:
-    """`dynhull relay` with a folder for its state."""
-
-    def __init__(self, address: str, to: str, folder: Path, patience: list[str]) -> None:
-        first, longest = patience
-        command = [COMMAND, "relay", *FENCES, "--address", address, "--consumer", "torture", "--to", to]
-        command += ["--state", str(folder / "relay"), "--unsigned", "--allow-private"]
-        self._command = [*command, "--first-pause", first, "--longest-pause", longest]
-        self._log = folder / "relay.log"
-        self.start()
-
-    def start(self) -> None:
-        with self._log.open("ab") as log:
-            self._process = Process(self._command, stdout=subprocess.DEVNULL, stderr=log, text=True)
-
-    def kill(self) -> None:
-        code = self._process.poll()
-        assert code is None, f"the relay has ended with {code}: {self._log.read_text()[-2000:]}"
-        self._process.kill()
-        self._process.wait()
-
-
-class Writer(threading.Thread):
-    """Lets subjects go in and out, and keeps which events follow from that.
-
-    A put that repeats one changes nothing: without an answer it is sent again.
-    """
+class CrossingWriter(Writer):
+    """Lets subjects go in and out, and keeps which events follow from that."""
 
     def __init__(self, server: MortalServer, seed: int) -> None:
-        super().__init__()
+        super().__init__(server, seed)
         self.expected: dict[str, list[tuple[str, str]]] = {name: [] for name in FENCES}
-        self.failure: BaseException | None = None
-        self._server = server
-        self._rng = random.Random(f"{seed}/writer")
-        self._ending = threading.Event()
+        self._inside: set[tuple[str, str]] = set()
 
-    def stop(self) -> None:
-        self._ending.set()
-        self.join()
-        if self.failure is not None:
-            raise self.failure
+    def step(self, client: HullClient) -> None:
+        name, keys = self.rng.choice(FENCES), sorted(self.rng.sample(KEYS, self.rng.randint(1, 3)))
+        leaves = (name, keys[0]) in self._inside
+        keys = [key for key in keys if ((name, key) in self._inside) == leaves]
+        self.put(client, name, keys, (OUTSIDE if leaves else INSIDE) * len(keys))
+        self.expected[name] += [("exit" if leaves else "enter", key) for key in keys]
+        self._inside ^= {(name, key) for key in keys}
 
-    def run(self) -> None:
-        inside: set[tuple[str, str]] = set()
-        try:
-            with HullClient(self._server.address) as client:
-                while not self._ending.is_set():
-                    name, keys = self._rng.choice(FENCES), sorted(self._rng.sample(KEYS, self._rng.randint(1, 3)))
-                    leaves = (name, keys[0]) in inside
-                    keys = [key for key in keys if ((name, key) in inside) == leaves]
-                    self._put(client, name, keys, (OUTSIDE if leaves else INSIDE) * len(keys))
-                    self.expected[name] += [("exit" if leaves else "enter", key) for key in keys]
-                    inside ^= {(name, key) for key in keys}
-                    time.sleep(self._rng.uniform(0, PAUSE))
-        except BaseException as error:  # for the thread that waits for this one
-            self.failure = error
 
-    def _put(self, client: HullClient, name: str, keys: list[str], points: list[list[int]]) -> None:
-        while True:
-            self._server.up.wait()
-            try:
-                client.put(name, keys, points)
-                return
-            except DynhullError:
-                if self._server.up.is_set():
-                    time.sleep(PAUSE)
+def _relay(address: str, to: str, folder: Path, patience: list[str]) -> Killed:
+    """`dynhull relay` with a folder for its state."""
+    first, longest = patience
+    command = [COMMAND, "relay", *FENCES, "--address", address, "--consumer", "torture", "--to", to]
+    command += ["--state", str(folder / "relay"), "--unsigned", "--allow-private"]
+    return Killed([*command, "--first-pause", first, "--longest-pause", longest], folder / "relay.log")
 
 
 def run(downs: int, down: float, kills: int, patience: list[str], seed: int, folder: Path) -> Counter[str]:
@@ -117,8 +72,8 @@ def run(downs: int, down: float, kills: int, patience: list[str], seed: int, fol
     with HullClient(server.address) as client:
         for name in FENCES:
             fence(client, name)
-        relay = Relay(server.address, endpoint.url, folder, patience)
-        writer = Writer(server, seed)
+        relay = _relay(server.address, endpoint.url, folder, patience)
+        writer = CrossingWriter(server, seed)
         writer.start()
         try:
             for number in range(1, downs + 1):
@@ -150,7 +105,7 @@ def run(downs: int, down: float, kills: int, patience: list[str], seed: int, fol
     return counts
 
 
-def _arrive(client: HullClient, writer: Writer, within: float) -> None:
+def _arrive(client: HullClient, writer: CrossingWriter, within: float) -> None:
     """Wait until the relay has acknowledged all events up to now, at most `within` seconds."""
     up_to = {name: len(writer.expected[name]) for name in FENCES}
     end = time.monotonic() + within
