@@ -2,13 +2,14 @@
 
 import json
 import subprocess
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 import pytest
 from gateway_process import Gateway, gateway_process
+from pacing import pause
 from peers import program
 from server_process import server_process
 
@@ -112,6 +113,20 @@ def test_times_reach_the_past_of_a_hull_that_keeps_it(tmp_path: Path) -> None:
             extent = gateway.get("/collections/entities:kept", **bearer).json["extent"]["temporal"]
             assert extent["interval"] == [[client.history("kept").first_time.isoformat().replace("+00:00", "Z"), None]]
             assert "temporal" not in gateway.get("/collections/entities:brief", **bearer).json["extent"]
+            pause(0.002)  # GDAL counts milliseconds
+            between = datetime.now(UTC).isoformat(timespec="milliseconds")
+            client.put("kept", KEYS[:20], [(3, 50)] * 20)
+            read = [
+                program("ogrinfo"),
+                "-al",
+                f"OAPIF:{gateway.url}",
+                "entities:kept",
+                "-where",
+                f"time <= '{between}'",
+            ]
+            known = ["--config", "GDAL_HTTP_HEADERS", "Authorization: Bearer all"]
+            shown = subprocess.run([*read, *known], capture_output=True, text=True, check=True, timeout=60).stdout
+            assert shown.count("POINT (2 50)") == 20
             for when, status in ((moments[0], 403), (f"{moments[0]}/..", 200)):
                 path = f"/collections/entities:kept/items?datetime={when}"
                 assert gateway.get(path, Authorization="Bearer now").status == status
