@@ -174,6 +174,14 @@ def test_a_name_that_is_nearly_a_command() -> None:
     assert "Did you mean" not in dynhull("xyzzy").stderr
 
 
+def test_an_option_of_a_command_before_its_name() -> None:
+    done = dynhull("--address", "127.0.0.1:1", "list")
+    assert done.exit_code == 2
+    told = " ".join(done.stderr.replace("│", " ").split())
+    assert "Options of a command come after its name: dynhull list --address" in told
+    assert "come after" not in dynhull("list", "--frob").stderr
+
+
 @pytest.mark.parametrize(
     ("command", "message"),
     [

@@ -108,6 +108,17 @@ class InstalledCommands(Flags, TyperGroup):
         """The command of that name, or None."""
         return Deferred(_installed()[cmd_name]) if cmd_name in _installed() else None
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments that are left; an option of a command that is before its name is told where it belongs."""
+        named = next((each for each in args if each in _installed()), "COMMAND")
+        try:
+            return super().parse_args(ctx, args)
+        except typer.TyperException as error:
+            option = getattr(error, "option_name", None)  # of NoSuchOption, which typer does not export
+            if option is not None:
+                error.message += f". Options of a command come after its name: dynhull {named} {option} ..."
+            raise
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the arguments name. Where there is none, the error names those that are written like it."""
         near = [] if args[0] in _installed() else get_close_matches(args[0], self.list_commands(ctx))
