@@ -1,8 +1,8 @@
-"""Restarts with many small hulls: `python benchmarks/restarts.py [--folder .] [--repeat 5] [--hulls 10000]`.
+"""Restarts with many hulls: `python benchmarks/restarts.py [--keyed str] [--hulls 10000] [--repeat 5] [--folder .]`.
 
-Each hull has 100 points, in one batch of the journal. A server with all of them and one without any start in turn, with
-cached bytecode, as installed packages have it. Columns: seconds from the start of the process to its line "serving",
-those of processor time until then, and the resident memory.
+Each hull has 100 points, or keys with their positions, in one batch of the journal. A server with all of them and one
+without any start in turn, with cached bytecode, as installed packages have it. Columns: seconds from the start of the
+process to its line "serving", those of processor time until then, and the resident memory.
 """
 
 import argparse
@@ -15,30 +15,31 @@ import time
 from pathlib import Path
 from statistics import median
 
-import grpc
 import numpy as np
 from durability import OPTIONS, serving
 
-import server
-from dynhull_proto.v1 import batch_pb2
-from dynhull_proto.v1 import hull_service_pb2 as pb
+from dynhull_client import AsyncHullClient
 
 POINTS = 100
 AT_ONCE = 100  # hulls that are filled side by side
 
 
-async def fill(address: str, hulls: int) -> None:
+async def fill(address: str, hulls: int, keyed: str | None) -> None:
     """Create the hulls."""
     random = np.random.default_rng(3)
-    async with grpc.aio.insecure_channel(address) as channel:
-        apply = channel.unary_unary(f"{server.SERVICE}Apply")
+    async with AsyncHullClient(address) as client:
 
-        async def make(name: str) -> None:
-            batch = batch_pb2.Batch(inserts=server.packed(random.random((POINTS, 2))))
-            await apply(pb.ApplyRequest(name=name, batch=batch).SerializeToString())
+        async def make(number: int) -> None:
+            name, points = f"hull-{number}", random.random((POINTS, 2))
+            await client.create_hull(name, keyed=keyed)
+            if keyed is None:
+                await client.apply(name, insert=points)
+            else:
+                keys = range(number * POINTS, (number + 1) * POINTS)
+                await client.put(name, [f"vehicle-{key}" for key in keys] if keyed == "str" else keys, points)
 
         for first in range(0, hulls, AT_ONCE):
-            await asyncio.gather(*(make(f"hull-{each}") for each in range(first, min(first + AT_ONCE, hulls))))
+            await asyncio.gather(*(make(each) for each in range(first, min(first + AT_ONCE, hulls))))
 
 
 def start(*options: str) -> tuple[float, float, float]:
@@ -62,12 +63,15 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path(), help="where to put the data (default: here)")
     parser.add_argument("--repeat", type=int, default=5, help="restarts of each; medians are printed (default 5)")
     parser.add_argument("--hulls", type=int, default=10_000, help="number of hulls (default 10,000)")
+    parser.add_argument(
+        "--keyed", choices=("str", "int"), help="keyed hulls, with keys of this kind (default: without)"
+    )
     options = parser.parse_args()
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:
         kept, none = (("--data", f"{folder}/{name}") for name in ("kept", "none"))
-        with serving(*kept, "--durability", "none", "--create-on-write") as address:
-            asyncio.run(fill(address, options.hulls))
+        with serving(*kept, "--durability", "none") as address:
+            asyncio.run(fill(address, options.hulls, options.keyed))
         works = {f"{options.hulls:,} hulls": kept, "no hulls": none}
         for each in works.values():
             start(*each)  # files into memory, bytecode onto the disk
