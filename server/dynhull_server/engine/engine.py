@@ -14,7 +14,7 @@ from .fence_keeping import FenceKeeping
 from .fences import Fences
 from .housekeeping import Housekeeping
 from .hulls import Hulls
-from .loading import Loader
+from .loading import Loader, without_collections
 from .past_fences import PastFences
 from .positions import incarnation_of
 from .series import LOOK_SECONDS
@@ -86,16 +86,17 @@ class Engine:
         """
         driver, storage = self.driver, self._storage
         driver.begin()
-        contents: StoredContents = await driver.on_disk(partial(self._open, progress))
-        driver.core = Core(
-            driver.limits,
-            contents.next_number,
-            driver.machine.clock.monotonic(),
-            immediate=storage.immediate,
-            keeps=storage.keeps,
-        )
-        await self._loader.load(contents, progress)
-        self._loader.restore(driver.core)
+        with without_collections():
+            contents: StoredContents = await driver.on_disk(partial(self._open, progress))
+            driver.core = Core(
+                driver.limits,
+                contents.next_number,
+                driver.machine.clock.monotonic(),
+                immediate=storage.immediate,
+                keeps=storage.keeps,
+            )
+            await self._loader.load(contents, progress)
+            self._loader.restore(driver.core)
         await driver.in_turn(partial(self._restore_fences, contents))
         self.hulls.feed_consumers.restore(await driver.on_disk(storage.feed_consumers))
         if storage.keeps:
