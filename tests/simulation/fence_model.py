@@ -348,7 +348,7 @@ class FenceModel:
         for name, truth in self._subjects(config):
             places = truth.held[now[name]]
             changes = [(key, place, place, 0) for key, place in sorted(places.items())]
-            looked = list(self._look(config, now, state, name, changes, Cause.CHANGED))
+            looked = list(self._look(config, now, state, name, changes, Cause.CHANGED, now))
             expected += [event for event in looked if event.type is not EventType.CROSS]
         if not self._as_expected(expected, events):
             raise self._model.finds(f"{fence.row.name} is replaced with {events}, and should be with {expected}")
@@ -429,6 +429,8 @@ class FenceModel:
         if self._model.faulty or self._model.stopping:
             return ""
         for name, (_, last) in step.to.items():
+            if not fence.config.concerns(name):  # it may have come while the alarm had something under way
+                continue
             sent = self._model.sent(self._model.alive[name].attempts[last])
             if sent is None or sent[1].get(PREFIX + fence.row.name, (0, 0))[0] != fence.row.number:
                 continue
@@ -582,7 +584,7 @@ class FenceModel:
                 for key, before, place, why in changes
                 if (name, key) not in moved.values()
             ]
-            yield from self._look(config, now, state, name, changes, Cause.AREA if area_moved else 0, moved)
+            yield from self._look(config, now, state, name, changes, Cause.AREA if area_moved else 0, at, moved)
 
     def _transfers(self, config: FenceConfig, step: Step, at: dict[str, int]) -> dict[Subject, Subject]:
         """The subjects that batches which came together have moved to another hull, and who they were before."""
@@ -610,9 +612,10 @@ class FenceModel:
         name: str,
         changes: Iterable[Change],
         cause: int,
+        at: dict[str, int],
         moved: dict[Subject, Subject] | None = None,
     ) -> "Iterator[FenceEvent]":
-        """The events of one hull's keys; `cause` is why the area is another one, or 0."""
+        """The events of one hull's keys; `cause` is why the area is another one than `at` revisions before, or 0."""
         for key, was, place, gone in changes:
             former = (moved or {}).get((name, key), (name, key))
             origin = Origin(former[0], now[former[0]]) if former[0] != name else None
@@ -621,8 +624,9 @@ class FenceModel:
             there = Expected(config, now, name, key, was, place, origin)
             if place is None:
                 if inside:  # where it was is not said of one that had perhaps left
-                    left = not cause and was is not None and not _is_clear(config, shape, was)
-                    left = left and shape.farther(_exact(was), _units(config.margin), closed=config.closed)
+                    before = self._shape(config, at, key)
+                    left = was is not None and not _is_clear(config, before, was)
+                    left = left and before.farther(_exact(was), _units(config.margin), closed=config.closed)
                     yield (there._replace(was=None) if left else there).event(EventType.EXIT, gone | cause)
                 continue
             p = _exact(place)
