@@ -1,7 +1,6 @@
 """What a worker or a gateway runs, in the process that the supervisor has started for it."""
 
 import asyncio
-import gc
 import os
 import socket
 from contextlib import suppress
@@ -12,6 +11,7 @@ from prometheus_client import generate_latest
 
 from dynhull_server import event_loop, logs
 from dynhull_server.failure import code_of, fail, text_of
+from dynhull_server.garbage import few_collections
 from dynhull_server.malloc import return_large_blocks
 from dynhull_server.process import allow_connections, share_processors, stop_signal
 from dynhull_server.settings import Settings
@@ -52,15 +52,14 @@ async def _run(end: socket.socket) -> None:
             if server is None:
                 return
             served.set_result(server)
-            try:
-                gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
-                line.send({"serving": server.address})
-                await stop.wait()
-            finally:
-                await server.drain()
+            with few_collections():
+                try:
+                    line.send({"serving": server.address})
+                    await stop.wait()
+                finally:
+                    await server.drain()
         finally:
             listening.cancel()
-    gc.unfreeze()
 
 
 async def _made(settings: Settings, begin: Begin) -> Serving:

@@ -1,7 +1,6 @@
 """The process of the server: it serves until SIGTERM or SIGINT."""
 
 import asyncio
-import gc
 import logging
 import os
 import resource
@@ -15,6 +14,7 @@ from dynhull import set_threads
 
 from . import event_loop, logs
 from .failure import code_of, fail, text_of
+from .garbage import few_collections
 from .malloc import return_large_blocks
 from .progress import progress_bar
 from .setting_sources import warn_of_service_links
@@ -92,15 +92,14 @@ async def _serve(settings: Settings, make: Callable[[], Awaitable[Alone]]) -> No
             server = await started(make, lambda made: made.start(progress), stop, settings.start_patience)
         if server is None:
             return
-        try:
-            gc.freeze()  # otherwise collections of modules and hulls would delay calls by 50 ms
-            print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # output of the command
-            if server.metrics_url:
-                print(f"metrics on {server.metrics_url}", flush=True)  # noqa: T201  # likewise
-            await stop.wait()
-        finally:
-            await server.drain()
-    gc.unfreeze()
+        with few_collections():
+            try:
+                print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # output of the command
+                if server.metrics_url:
+                    print(f"metrics on {server.metrics_url}", flush=True)  # noqa: T201  # likewise
+                await stop.wait()
+            finally:
+                await server.drain()
 
 
 @contextmanager
