@@ -166,7 +166,7 @@ robustness-cluster: .venv/.test  ## SCHEDULES of one hull over shards: lost mess
 	$(BIN)/python tests/robustness/cluster/postgres_torture.py --faults 100 --workers
 	$(BIN)/python tests/robustness/cluster/machines_torture.py --faults 100
 	$(BIN)/python tests/robustness/cluster/planned.py --changes 300
-	$(BIN)/python tests/robustness/bridges/alarm_torture.py --faults 100 --moves
+	$(BIN)/python tests/robustness/bridges/alarm_torture.py --faults 300 --moves
 
 FAULTS ?= 25
 

@@ -5,9 +5,10 @@
 Hulls grow and shrink under a prefix; one alarm is about their area, and one about their distance to another hull.
 Meanwhile server, relay and receiver get SIGKILL at random, one or several of them; with --moves the hulls are in a
 PostgreSQL database, and their partition moves to another worker, too, while a worker may be killed. The receiver is a
-process that writes each event to a file before it answers. In the end the file must have every number of each alarm,
-with one content and under one id, none before its predecessor; and for each hull exactly one "raised" between two
-"cleared", as often as the hull has grown and shrunk.
+process that writes each event to a file before it answers. Before every other fault it has received something since
+the last one, so that the relay is also killed at work, and not only at its start. In the end the file must have every
+number of each alarm, with one content and under one id, none before its predecessor; and for each hull exactly one
+"raised" between two "cleared", as often as the hull has grown and shrunk.
 """
 
 import argparse
@@ -15,7 +16,6 @@ import json
 import os
 import random
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -37,11 +37,15 @@ from relay_process import acknowledged
 from torturers import PAUSE, Killed, Writer
 
 from dynhull_client import DynhullError, HullClient
+from dynhull_cluster.machines.command import move
+from dynhull_cluster.placement import worker_of
+from dynhull_cluster.postgres.processes import is_known_dead
 
 ALARMS = ["area", "near"]
 HULLS = [f"fleet/{name}" for name in "abc"]
 PORT = "fleet/port"
 LARGE, BETWEEN, SMALL = [[0, 6]], [[0, 4.8]], [[0, 1]]  # where the third point is: areas of 12, 9.6 and 2
+PARTITIONS, MOVES = 2, 0.7  # the share of faults that are moves
 DELIVERED_WITHIN = 180  # seconds
 
 
@@ -76,7 +80,7 @@ class Torture:
         self.counts: Counter[str] = Counter()
         self._rng = random.Random(seed)
         self._url = None if database is None else database.new_database()
-        journal = ("--workers", "2", "--partitions", "2", "--journal", str(self._url))
+        journal = ("--workers", "2", "--partitions", str(PARTITIONS), "--journal", str(self._url))
         self._server = MortalServer(folder, *(() if database is None else journal))
         self._arrived = folder / "arrived"
         port = free_port()
@@ -96,8 +100,7 @@ class Torture:
         self._writer.start()
         try:
             while self.counts.total() < faults:
-                before = self._writer.raised.total()
-                wait_until(lambda before=before: self._writer.raised.total() > before or self._writer.failure)
+                self._work()
                 self._fault()
                 if self.counts.total() % 20 < 2:
                     print(f"{time.monotonic() - begun:.0f} s: {dict(self.counts)}", flush=True)
@@ -107,9 +110,18 @@ class Torture:
         for each in (self._relay, self._receiver, self._server):
             each.kill()
 
+    def _work(self) -> None:
+        """Until a hull has grown since the last fault, and every other time until something has arrived since."""
+        writer, raised, size = self._writer, self._writer.raised.total(), self._size()
+        arrives = self._rng.random() < 0.5
+        wait_until(lambda: (writer.raised.total() > raised and (not arrives or self._size() > size)) or writer.failure)
+
+    def _size(self) -> int:
+        return self._arrived.stat().st_size if self._arrived.exists() else 0
+
     def _fault(self) -> None:
-        if self._url is not None and self._rng.random() < 0.4:
-            return self._move()
+        if self._url is not None and self._rng.random() < MOVES:
+            return self._move(self._url)
         who: dict[str, Any] = {"server": self._server, "relay": self._relay, "receiver": self._receiver}
         names = self._rng.sample(sorted(who), self._rng.choice([1, 1, 1, 2, 3]))
         for name in names:
@@ -120,22 +132,29 @@ class Torture:
             self.counts[f"kills of the {name}"] += 1
         return None
 
-    def _move(self) -> None:
-        """The partition of the hulls goes to a worker, which may be killed meanwhile, or to any."""
-        workers = [worker for (worker,) in query(str(self._url), "SELECT worker FROM workers ORDER BY worker")]
-        for partition in (0, 1):
-            to = self._rng.choice([*workers, "anywhere"])
-            command = [COMMAND, "cluster", "move", str(partition), to, "--journal", str(self._url)]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            ended = "no worker of the cluster has this name" in done.stderr
-            assert done.returncode == 0 or ended, done.stderr
-            self.counts["moves"] += not ended
-        if self._rng.random() < 0.3:
-            time.sleep(self._rng.uniform(0, 0.5))
+    def _move(self, url: str) -> None:
+        """The partition of the hulls goes to the other worker, and one of the two may be killed meanwhile."""
+        partition = worker_of(PORT, PARTITIONS)
+
+        def owner() -> tuple[int, str]:
+            [found] = query(url, "SELECT epoch, worker FROM owners WHERE partition = %s", partition)
+            return found
+
+        def others() -> list[str]:
+            workers = query(url, "SELECT worker, process FROM workers WHERE worker <> %s", owner()[1])
+            return [worker for worker, process in workers if not is_known_dead(process)]
+
+        before = owner()
+        wait_until(others)
+        move(partition, others()[0], url)
+        killed = self._rng.random() < 0.3
+        if killed:
+            time.sleep(self._rng.uniform(0, 0.8))
             living = processes(self._server._process.pid)
-            with suppress(ProcessLookupError):
-                os.kill(self._rng.choice([number for name, number in living.items() if "worker" in name]), 9)
-                self.counts["kills of a worker"] += 1
+            os.kill(self._rng.choice([number for name, number in living.items() if "worker" in name]), 9)
+            self.counts["kills of a worker"] += 1
+        wait_until(lambda: owner()[0] > before[0] or killed)
+        self.counts["moves"] += owner()[1] != before[1]
 
     def _wait(self) -> None:
         """Until the relay has acknowledged all events."""
