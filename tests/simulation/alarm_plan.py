@@ -9,8 +9,8 @@ from .cluster_plan import Operation, Plan
 from .globe import GLOBE
 from .operations import TIMED, puts_of
 
-# The share of plans with alarms.
-WITH_ALARMS = 0.12
+# The share of plans with alarms, and of those of clusters.
+WITH_ALARMS, WITH_ALARMS_IN_CLUSTER = 0.12, 0.25
 ALARMS = tuple(map(marked, "xyz"))
 # How often each is asked for; "move" changes the outline of a hull that is watched.
 ASKED = {"move": 30, "pass": 14, "follow": 6, "ack": 5, "unack": 1, "take": 8, "mute": 6, "unfence": 2, "inside": 2}
@@ -50,7 +50,7 @@ def add_alarms(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
     beginning = [_created(draw, alarm, hulls) for alarm in alarms]
     for hull in hulls:
         if draw.random() < 0.8:
-            beginning.insert(0, _moved(draw, hull))
+            beginning.insert(0, _moved(draw, hull, streams=True))
     at = next((place for place, op in enumerate(clients[0]) if op["do"] not in ("create", "fence")), len(clients[0]))
     clients[0][at:at] = beginning
     for life in plan["lives"]:
@@ -64,6 +64,21 @@ def add_alarms(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
             life["clients"].append([_asked(draw, plan, asked, alarms, hulls) for _ in range(draw.randint(4, 16))])
 
 
+def add_alarms_to_cluster(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
+    """Alarms at some hulls of a cluster, and clients of the database, and of its copy, that change these and follow."""
+    plan["alarms"] = True
+    alarms = ALARMS[: draw.choice((1, 1, 2))]
+    asked = {do: often * draw.choice((0, 1, 1, 3)) for do, often in ASKED.items()} | {"move": 60, "pass": 10}
+    beginning = [_moved(draw, hull, streams=False) for hull in names if draw.random() < 0.8]
+    plan["clients"][0][:0] = beginning + [_created(draw, alarm, names) for alarm in alarms]
+    begun = len(beginning) + len(alarms)
+    for site in ("clients", "copied"):
+        for client in plan[site]:
+            for _ in range(draw.choice((2, 4, 8))):
+                place = draw.randint(begun if client is plan["clients"][0] else 0, len(client))
+                client.insert(place, _asked(draw, plan, asked, alarms, names))
+
+
 def _asked(
     draw: random.Random, plan: Plan, asked: dict[str, int], alarms: tuple[str, ...], hulls: tuple[str, ...]
 ) -> Operation:
@@ -72,14 +87,16 @@ def _asked(
     op: Operation = {"do": do, "name": name, "rows": draw.choice((1, 1, 200, 5_000))}
     match do:
         case "move":
-            return _moved(draw, hull)
+            return _moved(draw, hull, streams=plan["layer"] != "cluster")
         case "pass":
             seconds = draw.choice((0.0, 0.05, 0.1, 0.4, 1.0, 3.0))
-            return {"do": "tick" if plan["layer"] == "core" else "rest", "name": hull, "seconds": seconds}
+            return {"do": "tick" if plan["layer"] in ("core", "cluster") else "rest", "name": hull, "seconds": seconds}
         case "unfence" if draw.random() < 0.5:
             return _created(draw, name, hulls)
         case "take" | "mute":
-            op |= {"hull": hull, "until": draw.choice((-1_000_000, 1, 300_000, 10_000_000))}
+            # Of a cluster, the clocks differ by seconds.
+            later = (10**9,) if plan["layer"] == "cluster" else (1, 300_000, 10_000_000)
+            op |= {"hull": hull, "until": draw.choice((-1_000_000, *later))}
         case "ack" | "unack":
             op |= {"consumer": draw.choice(("x", "x", "y")), "back": draw.choice((None, 0, 0, 1, 3))}
         case _:
@@ -89,8 +106,8 @@ def _asked(
     return op
 
 
-def _moved(draw: random.Random, hull: str) -> Operation:
-    """A batch that changes the outline of a hull, as a rule."""
+def _moved(draw: random.Random, hull: str, *, streams: bool) -> Operation:
+    """A batch that changes the outline of a hull, as a rule; perhaps a stream of them."""
     batch: Operation = {"name": hull, "create": hull not in ("w", *GLOBE), "numbered": draw.random() < 0.2, "rows": 1}
     if hull not in TIMED:
         batch |= {"do": "write"}
@@ -101,7 +118,7 @@ def _moved(draw: random.Random, hull: str) -> Operation:
         removes = draw.sample(range(4), draw.choice((0, 0, 1, 2, 3)))
         batch |= {"do": "put"} | (puts_of(draw) if draw.random() < 0.2 else {}) | keys | {"removes": removes}
         batch["lift"] = draw.choice((0, 0, 2, 30))
-    if draw.random() < 0.2:
+    if streams and draw.random() < 0.2:
         batch |= {"do": "stream", "batches": draw.randint(1, 5), "window": draw.randint(1, 5), "message": 2}
     return batch
 

@@ -21,15 +21,17 @@ from dynhull_cluster.machines.board import Owner, Tables
 from dynhull_cluster.machines.entrance import proof_of
 from dynhull_cluster.postgres import ownership, processes
 from dynhull_cluster.postgres.ownership import LOOK, REQUIRE, Leases, Ownership, taken_over, writer_name
+from dynhull_server.state.admission import TICK
 from dynhull_server.state.errors import NotStoredError, OutcomeUnknownError
+from dynhull_server.state.fences.model.fence import Fence
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NotCommittedError, Progress, StorageError, StoredContents, TakenOverError
 
-from .clients import Client, probe
+from .clients import Client, probe, probe_fence
 from .cluster_plan import Operation, Plan
-from .core_life import ClientActor, Condition, CoreServer, Wait, compare
+from .core_life import EPOCH, MOMENT, ClientActor, Condition, CoreServer, StoppedClock, Wait, compare
 from .hidden import Entry, Place, Proc, System
 from .machine import SimulatedThreads
 from .model import Model
@@ -57,6 +59,15 @@ class Site:
         self.commits = commits
         self.addresses = Addresses(SECRET, None, 1.0)
         self.told: list[tuple[Any, ...]] = []
+        self._epoch = 0
+
+    def begins(self, process: "Process") -> None:
+        """Whoever is the owner is about to commit. With the first one of an epoch, a life of its alarms begins."""
+        if process.ownership.epoch != self._epoch:
+            assert process.core is not None  # it commits
+            core, self._epoch = process.core, process.ownership.epoch
+            self.model.clock = lambda: core.time()
+            self.model.fences.new_life()
 
     def copied(self, name: str) -> "Site":
         """The same, as of the last commits: nothing tells the two apart but who is connected."""
@@ -108,6 +119,7 @@ class OwnedStorage:
             raise NotCommittedError(str(error)) from error
         self._process.give_way()
         if session.open:
+            self._site.begins(self._process)
             commit = self._site.store.commit(changes, now)
             self._site.commits += 1
             self._site.database.carry_out(session, "COMMIT", [])
@@ -217,7 +229,11 @@ class Process:
             except StorageError:  # as long as another server renews its lease, too
                 self.wait(lambda: False, LOOK)
         storage: Any = OwnedStorage(self)
-        self.core = CoreServer(self.world.limits, storage, self.site.model, self, self._threads)  # type: ignore[arg-type]
+        clock = WorldClock(self.world, self.random.uniform(0, 10))
+        self.core = CoreServer(self.world.limits, storage, self.site.model, self, self._threads, clock)  # type: ignore[arg-type]
+        if self.world.alarmed:
+            self.core.look()
+            self.actor("clock", self.core.is_behind, self.core.look)
         self.port = self.world.listen(self)
         while True:
             try:
@@ -262,6 +278,22 @@ class Process:
             self._threads.kill()
 
 
+class WorldClock(StoppedClock):
+    """The clock of a server, which is ahead of others by some seconds."""
+
+    def __init__(self, world: "World", begun: float) -> None:
+        self._world, self._begun = world, begun
+
+    @property
+    def now(self) -> float:  # type: ignore[override]
+        """The time of the world: when it passes for one, it does for all."""
+        return self._world.now
+
+    @now.setter
+    def now(self, now: float) -> None:
+        self._world.now = now
+
+
 class Gateway:
     """What clients of a site call: passes each request on to the server that it takes for the owner."""
 
@@ -270,7 +302,18 @@ class Gateway:
 
     def time(self) -> int:
         """Microseconds since 1970."""
-        return int(self._world.now * 1e6)
+        return int((EPOCH + self._world.now) * 1e6)
+
+    def fence(self, name: str) -> Fence:
+        """What the owner has."""
+        process = self._owner()
+        if process is None or not process.runs or process.core is None or not process.ownership.holds():
+            raise NotStoredError("nobody serves the partition")
+        return process.core.fence(name)
+
+    async def special(self, _: Client, op: Operation) -> None:
+        """Time passes, for everybody."""
+        self._world.now += op["seconds"]
 
     def __getattr__(self, name: str) -> Any:
         async def call(*arguments: Any, **named: Any) -> Any:
@@ -327,6 +370,7 @@ class World:
 
     Attributes:
         now: the time in seconds, by all clocks.
+        alarmed: whether there may be alarms.
         current: the process whose turn it is.
         listening: who listens, by port.
     """
@@ -336,7 +380,7 @@ class World:
         self.now = 0.0
         self.listening: dict[int, Process] = {}
         self.current: Process | None = None
-        self.calm = False
+        self.calm, self.alarmed = False, plan.get("alarms", False)
         self._alarms: list[float] = []
         self._plan = plan
         self._places = [Place(f"boot{each}", "1") for each in range(plan["machines"])]
@@ -457,7 +501,19 @@ class World:
             compare(owner.core.core, site.model)
             for name in sorted({*site.model.alive, "a"}):
                 self._probe(site, name)
+            for name in sorted(site.model.fences.alive):
+                self._probe_fence(site, name)
+            if self.alarmed:
+                self._pass_alarms(site)
             compare(self._settled(site).core.core, site.model)
+
+    def _pass_alarms(self, site: Site) -> None:
+        """Time passes, and raises the alarms that it should."""
+        self.now += MOMENT
+        core = self._settled(site).core
+        self._until(lambda: not core.is_behind(), "the clock")
+        if late := site.model.fences.overdue(self._settled(site).core.time() - TICK):
+            raise site.model.finds(f"{late} should have been raised by time")
 
     def _settled(self, site: Site) -> Process:
         """Who serves a site, and has nothing left to do, once those that leave have ended."""
@@ -475,7 +531,13 @@ class World:
 
     def _probe(self, site: Site, name: str) -> None:
         gateway: Any = Gateway(self, site)
-        work = probe(gateway, site.model, name, anew=self.schedule.random.random() < 0.3)
+        self._finish(probe(gateway, site.model, name, anew=self.schedule.random.random() < 0.3))
+
+    def _probe_fence(self, site: Site, name: str) -> None:
+        gateway: Any = Gateway(self, site)
+        self._finish(probe_fence(gateway, site.model, name, anew=self.schedule.random.random() < 0.3))
+
+    def _finish(self, work: Any) -> None:
         condition: Condition | None = None
         while True:
             try:

@@ -165,7 +165,13 @@ class CoreServer:
     """Drives a Core as Engine does, an event a turn. Commits take one turn, unless there are `threads` for them."""
 
     def __init__(
-        self, limits: Limits, storage: Storage, model: Model, schedule: Schedule, threads: Threads | None = None
+        self,
+        limits: Limits,
+        storage: Storage,
+        model: Model,
+        schedule: Schedule,
+        threads: Threads | None = None,
+        clock: StoppedClock | None = None,
     ) -> None:
         self.model = model
         self.schedule = schedule
@@ -185,7 +191,8 @@ class CoreServer:
         self._events: deque[Event] = deque()
         self._stepping = False
         self._published: CommitStamp | None = None
-        self._clock = StoppedClock(schedule.random.uniform(0, 10))
+        self._clock = clock or StoppedClock(schedule.random.uniform(0, 10))
+        self._looked = self._clock.now
         latest = self.core.latest_time
         self._time = ServerTime(self._clock, latest)
         self._commit_time = ServerTime(self._clock, max(latest or 0, contents.committed))
@@ -466,7 +473,15 @@ class CoreServer:
     def begin(self) -> None:
         """Look at the clock, as the engine does when it starts."""
         if self.model.fences.alarmed:
-            self._pass(0.0)
+            self.look()
+
+    def look(self) -> None:
+        """Look at the clock."""
+        self._pass(0.0)
+
+    def is_behind(self) -> bool:
+        """Whether time has passed since the last look."""
+        return self._clock.now > self._looked
 
     def client(self, client: Client, operations: list[Operation]) -> None:
         """Add a client."""
@@ -505,6 +520,7 @@ class CoreServer:
 
     def _pass(self, seconds: float) -> None:
         self._clock.now += seconds
+        self._looked = self._clock.now
         self.dispatch(Tick(self._clock.now, self.time(), Answer()))
 
     def let_leave(self) -> None:

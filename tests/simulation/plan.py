@@ -14,7 +14,8 @@ An operation names what to do and to which hull; with `leave` its caller disconn
 import random
 from typing import Any
 
-from .alarm_plan import WITH_ALARMS, add_alarms
+from .alarm_plan import WITH_ALARMS, WITH_ALARMS_IN_CLUSTER, add_alarms, add_alarms_to_cluster
+from .cluster_plan import NAMES as NAMES_IN_CLUSTER
 from .cluster_plan import Plan, random_cluster_plan
 from .link_plan import random_link_plan
 from .operations import (
@@ -124,7 +125,7 @@ ENDS = ("kill", "kill", "stop")
 def random_plan(seed: int, layer: str) -> Plan:
     """A plan that anything may be in."""
     if layer == "cluster":
-        return random_cluster_plan(seed)
+        return _cluster_plan(seed)
     if layer == "links":
         return random_link_plan(seed)
     with_past = WITH_PAST.get(layer, 0.0)
@@ -219,6 +220,13 @@ def random_plan(seed: int, layer: str) -> Plan:
     alarms = random.Random(f"alarms {seed}")
     if alarms.random() < WITH_ALARMS:
         add_alarms(alarms, plan, (*names, *timed))
+    return plan
+
+
+def _cluster_plan(seed: int) -> Plan:
+    plan, alarms = random_cluster_plan(seed), random.Random(f"alarms {seed}")
+    if alarms.random() < WITH_ALARMS_IN_CLUSTER:
+        add_alarms_to_cluster(alarms, plan, (*NAMES_IN_CLUSTER, "k"))
     return plan
 
 
