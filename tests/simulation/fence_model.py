@@ -224,6 +224,11 @@ class FenceModel:
         """Whether there are alarms."""
         return any(fence.config.rule is not None for fence in self.alive.values())
 
+    @property
+    def watched(self) -> int:
+        """The number of hulls that alarms watch, each counted once for each alarm."""
+        return sum(len(fence.known) for fence in self.alive.values())
+
     def told(self, number: int, revision: int) -> list[tuple[FenceTruth, int]]:
         """The fences that a revision concerned, and their events when it was committed."""
         return self._told.get((number, revision), [])

@@ -283,6 +283,8 @@ class Model:
                 truth.bonds.append((revision, together))
         if of_fences or self.fences.alive:
             self.fences.landed(of_fences, before, created)
+        if self.fences.watched > self._limits.fences.max_alarm_hulls:
+            raise self.finds(f"alarms watch {self.fences.watched} hulls")
 
     def _create(self, row: HullRow) -> None:
         if row.number in self.numbers:

@@ -42,7 +42,7 @@ class Registry:
         self.tallies = Tallies()
         self.recent = RecentEvents(limits.fences.fence_event_bytes)
         self._next_number = next_number
-        self._creating = self._fencing = 0
+        self._creating = self._fencing = self._to_watch = 0
         self.alarms: dict[int, Fence] = {}
 
     def get(self, name: str) -> Hull:
@@ -112,14 +112,21 @@ class Registry:
         """The number of hulls that alarms watch, each counted once for each alarm. O(alarms)."""
         return sum(len(fence.watched) for fence in self.alarms.values() if fence.watched is not None)
 
+    def reserve_watched(self, most: int) -> int:
+        """Room for hulls that alarms are to watch: `most`, or what there is. Give it back later."""
+        room = min(most, max(self.limits.fences.max_alarm_hulls - self.watched - self._to_watch, 0)) if most else 0
+        self._to_watch += room
+        return room
+
     def number_of_shard(self) -> int:
         """A number for a shard that is created."""
         return self._new_number()
 
-    def give_back(self, hulls: int, fences: int = 0) -> None:
+    def give_back(self, hulls: int, fences: int = 0, watched: int = 0) -> None:
         """Give back places that were reserved."""
         self._creating -= hulls
         self._fencing -= fences
+        self._to_watch -= watched
 
     def _new_number(self) -> int:
         number = self._next_number

@@ -77,10 +77,10 @@ class FenceCore:
         places = {name: self._registry.reserve_hull() for name in sorted(births) if name not in hulls}
         legs = {name: Leg(name, hulls.get(name), keeps=self._keeps, fenced=True) for name in names}
         lines = [queue.line for queue in queues if queue.line is not None]
-        limits = self._registry.limits.fences
-        creates = any(isinstance(request, CreateFence) and request.config.rule is not None for request in requests)
-        room = limits.max_alarm_hulls - (self._registry.watched if creates or births else 0)
-        ground = Ground(legs, lines, fences, numbers, self._registry.tallies, limits, room)
+        watched = sum(_watches(request) for request in requests if isinstance(request, CreateFence))
+        watched += sum(line.watches_new(name) for line in lines for name in places)
+        room = self._registry.reserve_watched(watched)
+        ground = Ground(legs, lines, fences, numbers, self._registry.tallies, self._registry.limits.fences, room)
         return Trip(legs, requests, now, pause, places, FencePart(ground, requests))
 
     def quiet_hull(self, line: Line, request: Request) -> Hull | None:
@@ -128,6 +128,8 @@ class FenceCore:
 
     def ran(self, part: FencePart) -> None:
         """Let the requests that a trip has left wait before the others."""
+        if not part.creates:  # new hulls are counted from now on
+            self._leave_room(part)
         for request in reversed(part.left):
             if not request.abandoned:
                 for queue in self._queues.at(request.names):
@@ -138,10 +140,15 @@ class FenceCore:
         if part.creates:
             self._queues.end_creation(trip, part)
             self._registry.give_back(0, part.creates)
+        self._leave_room(part)
         looked_at = [request.fence for request in trip.requests if isinstance(request, PassTime)]  # perhaps too early
         for fence in (*(leg.fence for leg in part.legs.values()), *looked_at):
             if self._registry.fences.get(fence.name) is fence:
                 self._schedule.plan_fence(fence)
+
+    def _leave_room(self, part: FencePart) -> None:
+        self._registry.give_back(0, watched=part.room)
+        part.room = 0
 
     # Commits
 
@@ -203,3 +210,11 @@ class FenceCore:
         # It is looked at again even if the request is refused, because the storage cannot be read.
         self._schedule.look_again(fence, time)
         return PassTime(to, fence.name, time, fence, rows=min(fence.waiting, MOST_DUE))
+
+
+def _watches(request: CreateFence) -> int:
+    """The number of hulls that a fence watches if it is an alarm, at most."""
+    config = request.config
+    if config.rule is None:
+        return 0
+    return sum(map(config.compares, request.names[1:])) if config.kind == "prefix" else 1

@@ -169,6 +169,10 @@ class Line:
                 found.append(fence)
         return found
 
+    def watches_new(self, name: str) -> int:
+        """The number of alarms that are to watch a new hull, at most."""
+        return sum(fence.watched is not None for fence in self._prefixes(name))
+
     def admit(self, hull: Hull) -> None:
         """Compare the keys of a new hull with the areas of the fences whose prefix its name has, and watch it."""
         fences = [fence for fence in self._prefixes(hull.name) if fence.watched is None]

@@ -43,7 +43,7 @@ class Ground:
         numbers: the numbers of new fences, by name; those without one are too many.
         tallies: what is counted of fences, as of the last commit.
         limits: the limits on fences.
-        room: how many more hulls alarms may watch, if it creates alarms or hulls.
+        room: how many more hulls alarms may watch, which is reserved for it if it creates alarms or hulls.
     """
 
     hulls: Mapping[str, Leg]

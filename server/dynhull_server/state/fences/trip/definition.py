@@ -111,12 +111,12 @@ class Definition:
         hulls, watching = self._watched(config, rule, fence.area), watched_hulls(fence)
         watching.other = fence.area
         leg = FenceLeg(fence, created=True)
-        self._watching += len(hulls)
-        if self._watching > self._ground.room:
+        if self._watching + len(hulls) > self._ground.room:
             raise LimitExceededError("max_alarm_hulls", self._ground.limits.max_alarm_hulls)
         for hull in hulls:
             _require_area(hull, rule)
             look(leg, watching.add(hull, request.time), Cause.CREATED, request.time)
+        self._watching += len(hulls)
         self._comparison.legs[number] = leg
         return fence
 

@@ -63,6 +63,7 @@ class FencePart:
         creates: the number of fences that it creates, at most.
         events: all events that it has made, also the last ones of fences that it deletes; None for none.
         examined: the numbers of the fences that are examined after a failure.
+        room: how many more hulls alarms may watch, which is reserved for it.
     """
 
     __slots__ = (
@@ -74,6 +75,7 @@ class FencePart:
         "creates",
         "events",
         "examined",
+        "room",
         "structural",
     )
 
@@ -82,6 +84,7 @@ class FencePart:
         self.creates = len(requests) if requests and isinstance(requests[0], CreateFence) else 0
         self.events: EventBlock | None = None
         self.examined: list[int] = []
+        self.room = ground.room
         self._ground = ground
         self._comparison = Comparison(ground)
         self._definition = Definition(ground, self._comparison)
