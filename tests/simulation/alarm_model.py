@@ -16,7 +16,7 @@ from support.sides import Disk, Point, Rings, Shape, apart, edges, segment_dista
 from dynhull.keys import key_list
 from dynhull_server.state.alarms.conditions import Condition
 from dynhull_server.state.alarms.places import Circle, Place
-from dynhull_server.state.alarms.rule import MARK, AlarmRule
+from dynhull_server.state.alarms.rule import AlarmRule
 from dynhull_server.state.fences.model.records import AlarmStanding, Cause, Delay, EventType, FenceEvent
 from dynhull_server.state.records import NO_TIME
 
@@ -358,8 +358,3 @@ def alike(real: Delay | None, expected: Delay | None) -> bool:
         and real._replace(causes=0, standing=None) == expected._replace(causes=0, standing=None)
         and real.standing._replace(previous=None) == expected.standing._replace(previous=None)
     )
-
-
-def is_alarm(name: str) -> bool:
-    """Whether a name is that of an alarm."""
-    return name.startswith(MARK)

@@ -595,7 +595,7 @@ class Client:
     def fence_refused(self, op: Operation, asked: Asked, error: Exception) -> None:
         """A request about a fence failed: there must be a reason."""
         reasons: list[type[Exception]] = []
-        match op["do"]:
+        match do := op["do"]:
             case "fence":
                 reasons = [FenceExistsError, HullNotFoundError, LimitExceededError, HullUnsuitableError]
             case "refence":
@@ -605,9 +605,11 @@ class Client:
             case "unack":
                 reasons = [FenceNotFoundError, ConsumerNotFoundError]
             case "take" | "mute":
-                reasons = [FenceNotFoundError, HullNotFoundError, AlarmNotRaisedError]
+                reasons = [FenceNotFoundError, AlarmNotRaisedError if do == "take" else HullUnsuitableError]
                 if isinstance(error, AlarmNotRaisedError):
                     self.model.not_raised(asked, op["hull"])
+                elif isinstance(error, HullUnsuitableError):
+                    self.model.not_watched(asked, op["hull"])
             case _:
                 reasons = [FenceNotFoundError]
         if isinstance(error, SequenceAheadError):

@@ -44,7 +44,6 @@ from dynhull_server.state.records import (
 )
 from dynhull_server.storage.rows.group import EraseKeys, SetHistory
 
-from .alarm_model import is_alarm
 from .entities import Effect, Entities, Entity, Key
 from .fence_model import FENCE_CHANGES, PREFIX, UNIT, FenceModel
 from .globe import FAR, GLOBE, mean, points
@@ -633,12 +632,15 @@ class Model:
 
     def unsure(self, name: str, asked: Asked) -> None:
         """A request about a fence did not find a hull: there must have been a time without it."""
-        truth, fence = self.alive.get(name), self.fences.alive.get(asked.name.removeprefix(PREFIX))
-        known = fence is not None and fence.row.number == asked.floor[0] and name in fence.known
-        if is_alarm(asked.name.removeprefix(PREFIX)) and not asked.makes and not known:
-            return  # what an alarm does not watch is not there for it
+        truth = self.alive.get(name)
         if truth is not None and truth.since <= asked.commits and not self._open[name, "delete"]:
             raise self.finds(f"{name} is there, and was not found for {asked.name}")
+
+    def not_watched(self, asked: Asked, hull: str) -> None:
+        """An alarm is said not to watch a hull: there must have been a time when it did not."""
+        fence = self.fences.alive.get(asked.name.removeprefix(PREFIX))
+        if fence is not None and fence.row.number == asked.floor[0] and hull in fence.known:
+            self.unsure(hull, asked)
 
     def fenced(self, asked: Asked) -> None:
         """A hull cannot be deleted, because a fence depends on it."""

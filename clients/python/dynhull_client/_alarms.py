@@ -116,7 +116,7 @@ def mute_alarm(
 
     Args:
         name: the alarm.
-        hull: the hull.
+        hull: the hull; HullUnsuitableError if the alarm does not watch it.
         until: a datetime or ISO 8601 with a time zone; None, or a time that has passed, for no longer.
         timeout: seconds, instead of the client's.
     """

@@ -37,8 +37,9 @@ class AlarmServiceStub:
     an alarm only knows by its prefix can: if the alarm is raised for it, that is cleared.
 
     A caller with a token needs the right to write for the name of the alarm, and the right to read for the hull or the prefix,
-    and for the other hull that its condition names, to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
-    name for all else.
+    and for the other hull that its condition names, to create or delete it; the right to write for its name, and the right to
+    read for the hull, to acknowledge or mute it for a hull; the right to read for its name for all else: its events and
+    statuses name its hulls, and have their measures.
     """
 
     @_typing.overload
@@ -66,7 +67,9 @@ class AlarmServiceStub:
     reason ALARM_NOT_RAISED, if it is not raised for the hull.
     """
     MuteAlarm: _grpc.UnaryUnaryMultiCallable[_alarm_service_pb2.MuteAlarmRequest, _alarm_service_pb2.MuteAlarmResponse]
-    """Mutes an alarm for a hull until a time, for who shows alarms: its events are made and sent as before."""
+    """Mutes an alarm for a hull until a time, for who shows alarms: its events are made and sent as before.
+    FAILED_PRECONDITION, reason HULL_UNSUITABLE, if the alarm does not watch the hull.
+    """
 
 @_typing.type_check_only
 class AlarmServiceAsyncStub(AlarmServiceStub):
@@ -80,8 +83,9 @@ class AlarmServiceAsyncStub(AlarmServiceStub):
     an alarm only knows by its prefix can: if the alarm is raised for it, that is cleared.
 
     A caller with a token needs the right to write for the name of the alarm, and the right to read for the hull or the prefix,
-    and for the other hull that its condition names, to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
-    name for all else.
+    and for the other hull that its condition names, to create or delete it; the right to write for its name, and the right to
+    read for the hull, to acknowledge or mute it for a hull; the right to read for its name for all else: its events and
+    statuses name its hulls, and have their measures.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -106,7 +110,9 @@ class AlarmServiceAsyncStub(AlarmServiceStub):
     reason ALARM_NOT_RAISED, if it is not raised for the hull.
     """
     MuteAlarm: _aio.UnaryUnaryMultiCallable[_alarm_service_pb2.MuteAlarmRequest, _alarm_service_pb2.MuteAlarmResponse]  # type: ignore[assignment]
-    """Mutes an alarm for a hull until a time, for who shows alarms: its events are made and sent as before."""
+    """Mutes an alarm for a hull until a time, for who shows alarms: its events are made and sent as before.
+    FAILED_PRECONDITION, reason HULL_UNSUITABLE, if the alarm does not watch the hull.
+    """
 
 class AlarmServiceServicer(metaclass=_abc_1.ABCMeta):
     """Alarms: exact events when a measure of an outline passes a bound, a hull falls silent, two hulls meet, or a vertex reaches
@@ -119,8 +125,9 @@ class AlarmServiceServicer(metaclass=_abc_1.ABCMeta):
     an alarm only knows by its prefix can: if the alarm is raised for it, that is cleared.
 
     A caller with a token needs the right to write for the name of the alarm, and the right to read for the hull or the prefix,
-    and for the other hull that its condition names, to create or delete it; the right to write for its name to acknowledge or mute it for a hull; the right to read for its
-    name for all else.
+    and for the other hull that its condition names, to create or delete it; the right to write for its name, and the right to
+    read for the hull, to acknowledge or mute it for a hull; the right to read for its name for all else: its events and
+    statuses name its hulls, and have their measures.
     """
 
     @_abc_1.abstractmethod
@@ -197,6 +204,8 @@ class AlarmServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _alarm_service_pb2.MuteAlarmRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_alarm_service_pb2.MuteAlarmResponse, _abc.Awaitable[_alarm_service_pb2.MuteAlarmResponse]]:
-        """Mutes an alarm for a hull until a time, for who shows alarms: its events are made and sent as before."""
+        """Mutes an alarm for a hull until a time, for who shows alarms: its events are made and sent as before.
+        FAILED_PRECONDITION, reason HULL_UNSUITABLE, if the alarm does not watch the hull.
+        """
 
 def add_AlarmServiceServicer_to_server(servicer: AlarmServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

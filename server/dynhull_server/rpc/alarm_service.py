@@ -98,10 +98,12 @@ class AlarmService:
         return pb.MuteAlarmResponse(status=encode_status(await self._alarms.mute(name, hull, until)))
 
     def _written(self, call: Call, request: pb.AcknowledgeAlarmRequest | pb.MuteAlarmRequest) -> tuple[str, str]:
-        """The names of an alarm that the caller may write, and of a hull."""
+        """The names of an alarm that the caller may write, and of a hull that it may read."""
         name = decode_alarm_name(request.name)
         call.access.require_write(name)
-        return name, decode.decode_name(request.hull, "hull")
+        hull = decode.decode_name(request.hull, "hull")
+        call.access.require_read(hull)
+        return name, hull
 
     def _read(self, call: Call, name: str) -> LiveFence:
         name = decode_alarm_name(name)

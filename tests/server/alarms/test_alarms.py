@@ -172,8 +172,12 @@ def test_somebody_takes_care_of_it(client: HullClient, name: str) -> None:
     assert (status.raised, status.acknowledged, status.muted_until) == (False, None, until)
     assert client.mute_alarm(name, name, None).muted_until is None
     assert client.get_alarm(name).statuses == ()
-    with pytest.raises(HullNotFoundError):
-        client.mute_alarm(name, f"{name}/other", None)
+    client.create_hull(f"{name}/other")
+    for other in (f"{name}/other", f"{name}/none"):
+        with pytest.raises(HullUnsuitableError, match="is not one that the alarm"):
+            client.mute_alarm(name, other, None)
+        with pytest.raises(AlarmNotRaisedError):
+            client.acknowledge_alarm(name, other)
 
 
 def test_consumers_have_their_places(client: HullClient, name: str) -> None:

@@ -200,6 +200,13 @@ def test_alarms_need_rights_on_their_name_and_on_their_hulls(guarded: Server) ->
             with pytest.raises(PermissionDeniedError):
                 refused()
         fleet.acknowledge_alarm("fleet/truck-a", "fleet/van-1")
+        for hull in ("plane", "nobody"):  # whether there is one is not told
+            for refused in (
+                lambda hull=hull: fleet.acknowledge_alarm("fleet/truck-a", hull),
+                lambda hull=hull: fleet.mute_alarm("fleet/truck-a", hull, None),
+            ):
+                with pytest.raises(PermissionDeniedError, match=f"may not read '{hull}'"):
+                    refused()
         with pytest.raises(HullFencedError) as fenced:
             root.delete_hull("fleet/van-1")
         assert fenced.value.alarm == "fleet/truck-a"

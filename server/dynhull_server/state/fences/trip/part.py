@@ -12,7 +12,6 @@ from ...errors import (
     AlarmNotRaisedError,
     FenceNotFoundError,
     HullFencedError,
-    HullNotFoundError,
     HullUnsuitableError,
     LimitExceededError,
 )
@@ -265,14 +264,15 @@ class FencePart:
         return None
 
     def _put_standing(self, request: AcknowledgeAlarm | MuteAlarm, fence: Fence) -> AlarmStatus:
-        watched = None if fence.watched is None else fence.watched.of.get(request.hull)
+        name, hull = unmarked(fence.name), request.hull
+        watched = None if fence.watched is None else fence.watched.of.get(hull)
+        if isinstance(request, AcknowledgeAlarm) and (watched is None or not watched.raised):
+            raise AlarmNotRaisedError(name, hull)
         if watched is None:
-            raise HullNotFoundError(request.hull)
+            raise HullUnsuitableError(hull, f"is not one that the alarm {name!r} watches", field="hull")
         leg = self._comparison.leg(fence)
         if isinstance(request, MuteAlarm):
             put_standing(leg, watched, muted=request.until if request.until > request.time else NO_TIME)
-        elif not watched.raised:
-            raise AlarmNotRaisedError(unmarked(fence.name), request.hull)
         else:
             put_standing(leg, watched, acknowledged=leg.time(request.time))
         self._comparison.applied = True
