@@ -201,8 +201,16 @@ build/kafka/.jars: tests/bridges/kafka/pom.xml
 objects: .venv/.test  ## servers that keep the past of hulls in an object store, which fails, hangs and answers in halves
 	OBJECTS_CASES=all $(BIN)/pytest tests/storage/test_objects.py tests/server/lives/test_object_store.py
 
-languages: .venv/.test  ## the programs in Go, Java and Rust on their pages, each where its tools are: built, and run beside a server that is killed
-	PATH="$(CURDIR)/$(BIN):$$PATH" LANGUAGES_CASES=all $(BIN)/pytest tests/docs/test_languages.py
+build/openapi/.tools: tests/docs/openapi/package-lock.json tests/docs/openapi/pom.xml
+	mkdir -p $(@D)
+	cp tests/docs/openapi/package*.json $(@D)
+	npm ci --prefix $(@D) --no-audit --no-fund --ignore-scripts --loglevel=error || echo 'openapi-typescript and redocly are not tried: no npm'
+	mvn -q -B -f tests/docs/openapi/pom.xml dependency:copy-dependencies -DincludeScope=runtime -DoutputDirectory=$(CURDIR)/$(@D) \
+	|| echo 'openapi-generator is not tried: no Maven'
+	touch $@
+
+languages: .venv/.test build/openapi/.tools  ## the programs in Go, Java and Rust on their pages, each where its tools are: built, and run beside a server that is killed; what programs make of the gateway's description
+	PATH="$(CURDIR)/$(BIN):$$PATH" LANGUAGES_CASES=all $(BIN)/pytest tests/docs/test_languages.py tests/docs/test_openapi.py
 
 kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, and a relay to one that is killed, which Maven brings (Debian: maven, default-jre-headless)
 	KAFKA_CASES=all $(BIN)/pytest tests/bridges/test_kafka.py tests/bridges/test_kafka_target.py

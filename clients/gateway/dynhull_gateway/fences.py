@@ -117,11 +117,11 @@ def _shown(fence: Fence) -> schemas.Fence:
 def _shown_area(area: Any) -> Any:
     match area:
         case str():
-            return schemas.HullArea(hull=area)
+            return {"hull": area}
         case Circle():
-            return schemas.CircleArea(center=[area.x, area.y], radius=area.r)
+            return {"center": [area.x, area.y], "radius": area.r}
         case Polygon():
-            return schemas.PolygonArea(exterior=area.exterior.tolist(), holes=[hole.tolist() for hole in area.holes])
+            return {"exterior": area.exterior.tolist(), "holes": [hole.tolist() for hole in area.holes]}
         case [*parts]:
             return [_shown_area(each) for each in parts]
         case _:

@@ -21,6 +21,7 @@ from pydantic import (
     Tag,
     model_validator,
 )
+from typing_extensions import TypeAliasType
 
 import dynhull_client as sdk
 from dynhull_surface import settings as surface
@@ -700,14 +701,22 @@ def _form_of_area(area: Any) -> str:
     return "hull" if "hull" in fields else "circle" if {"center", "radius"} & set(fields) else "polygon"
 
 
+class PolygonPart(PolygonArea):
+    """One of several polygons that are an area together."""
+
+    # A type of its own: what openapi-generator makes of a choice of a type and a list of the same names it twice.
+
+
 OwnForms = (
     Annotated[HullArea, Tag("hull")]
     | Annotated[CircleArea, Tag("circle")]
     | Annotated[PolygonArea, Tag("polygon")]
-    | Annotated[list[PolygonArea], Tag("polygons")]
+    | Annotated[list[PolygonPart], Tag("polygons")]
 )
-Area = Annotated[OwnForms, Discriminator(_form_of_area)]
-GivenArea = Annotated[OwnForms | Annotated[GeometryArea, Tag("geometry")], Discriminator(_form_of_area)]
+Area = TypeAliasType("Area", Annotated[OwnForms, Discriminator(_form_of_area)])
+GivenArea = TypeAliasType(
+    "GivenArea", Annotated[OwnForms | Annotated[GeometryArea, Tag("geometry")], Discriminator(_form_of_area)]
+)
 
 
 @with_settings(surface.FenceSettings)
