@@ -91,12 +91,12 @@ class RangeSearch:
         near = self._points[rows]
         with np.errstate(all="ignore"):
             distances = np.hypot(*(near - at).T)
+            size = np.abs(near).max(axis=1, initial=max(map(abs, center))) + sum(lengths)
 
         def holds(row: int) -> bool:
             square = squared_length(center, as_tuples(near[row : row + 1])[0])
             return square < most**2 if strict else square <= most**2
 
-        size = np.abs(near).max(axis=1, initial=max(map(abs, center))) + sum(lengths)
         return np.sort(rows[_at_most(distances, sum(lengths), size, holds)])
 
     def hull(self, vertices: npt.ArrayLike, *, closed: bool = True, margin: float = 0.0) -> Rows:
@@ -166,7 +166,7 @@ def _decide_near(points: Points, a: Points, b: Points, margin: float, p: Rows, e
         share = (from_start * way).sum(axis=1) / (way * way).sum(axis=1)
         away = from_start - np.clip(np.nan_to_num(share), 0, 1)[:, None] * way
         distances = np.hypot(*away.T)
-    size = np.abs(np.hstack([at, start, end])).max(axis=1, initial=0) + margin
+        size = np.abs(np.hstack([at, start, end])).max(axis=1, initial=0) + margin
     limit = Fraction(margin) ** 2
 
     def holds(row: int) -> bool:

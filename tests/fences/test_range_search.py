@@ -11,7 +11,7 @@ from dynhull.range_search import RangeSearch
 
 HOLED = [[[0, 0], [6, 0], [6, 6], [0, 6]], [[1, 1], [3, 1], [3, 3], [1, 3]]]
 FLAG = [[[6, 2], [9, 2], [8, 3], [9, 5], [6, 5]]]
-SCALES = [1.0, 0.1, 1e-200, 1e200]
+SCALES = [1.0, 0.1, 1e-200, 1e200, 1.6e307]
 PLACES = st.lists(st.tuples(st.integers(-2, 11), st.integers(-2, 11)), min_size=1, max_size=40)
 
 

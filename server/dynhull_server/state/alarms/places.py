@@ -4,7 +4,8 @@ import math
 import re
 from dataclasses import dataclass
 
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+# Digits are taken at once (++): where each could also belong to the next part, a long number would take its square.
+NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
 HULL = re.compile(r"[A-Za-z0-9._/-]+")
 CIRCLE = re.compile(rf"circle\s*\(\s*({NUMBER})\s*,\s*({NUMBER})\s*,\s*({NUMBER})\s*\)")
 POLYGON = re.compile(r"polygon\s*\(([^()]*)\)")
