@@ -9,6 +9,8 @@ one hull the points have keys.
   whose caller disconnected is there once or not at all, and does not change once a reader has seen it. Batches that
   one call applies to two hulls are in both or in none.
 * Of the hulls that are created and deleted all the time: at the end each can be created, written, read and deleted.
+* Alarms over both are created, deleted, watched and taken care of meanwhile: of each that is left no event is missing,
+  it was raised once between two clears, and is raised as its hulls say.
 * Others write to another hull meanwhile: every one of their batches is acknowledged.
 """
 
@@ -27,6 +29,7 @@ import grpc
 import numpy as np
 
 sys.path.append(str(Path(__file__).parents[2] / "support"))
+from alarm_calls import AlarmCalls
 from forked import COMMAND, Process
 from pacing import pause_async
 from patience import PATIENCE
@@ -120,7 +123,8 @@ class Callers:
         self._server = server
         self._random = random.Random(seed)
         self._model = Model()
-        self.calls = self.gone = self.acknowledged = self.steady = 0
+        self._alarms = AlarmCalls(self._random, [*KEPT, *CHURNED])
+        self.calls = self.gone = self.acknowledged = self.steady = self.events = 0
         self.outcomes: Counter[str] = Counter()
 
     async def run(self, calls: int, kills: int) -> None:
@@ -129,26 +133,29 @@ class Callers:
             async with grpc.aio.insecure_channel(f"127.0.0.1:{self._server.port}", OWN) as channel:
                 stub = HullServiceStub(channel)
                 await self._check(stub)
+                self.events += await self._alarms.check(channel)
                 end = calls * (life + 1) // (kills + 1)
                 steady = asyncio.create_task(self._write_steadily(stub))
                 async with asyncio.TaskGroup() as group:
                     for _ in range(CALLERS):
-                        group.create_task(self._call_until(stub, end))
+                        group.create_task(self._call_until(channel, stub, end))
                 steady.cancel()
                 await asyncio.gather(steady, return_exceptions=True)
                 if not steady.cancelled() and (error := steady.exception()) is not None:
                     raise error
                 if life < kills:
-                    burst = [asyncio.create_task(self._call_until(stub, end + 2 * CALLERS)) for _ in range(CALLERS)]
+                    last = end + 2 * CALLERS
+                    burst = [asyncio.create_task(self._call_until(channel, stub, last)) for _ in range(CALLERS)]
                     await pause_async(self._random.uniform(0, 0.03))
                     self._server.kill()
                     await asyncio.gather(*burst, return_exceptions=True)
                 else:
                     await self._check(stub)
+                    self.events += await self._alarms.check(channel)
                     await self._probe(stub)
         require(self._server.stop() == 0, "the server did not end in peace")
 
-    async def _call_until(self, stub: HullServiceStub, calls: int) -> None:
+    async def _call_until(self, channel: grpc.aio.Channel, stub: HullServiceStub, calls: int) -> None:
         while self.calls < calls:
             self.calls += 1
             name = self._random.choice(KEPT * 2 + CHURNED * 3)
@@ -157,7 +164,8 @@ class Callers:
                 make = self._together
             if name in CHURNED and self._random.random() < 0.3:
                 make = self._delete
-            doing = asyncio.create_task(make(stub, name))
+            of_alarm = self._random.random() < 0.2
+            doing = asyncio.create_task(self._alarms.call(channel) if of_alarm else make(stub, name))
             if self._random.random() < 0.8:
                 await asyncio.wait([doing], timeout=self._random.random() ** 3 * LONGEST_STAY)
                 self.gone += not doing.done()
@@ -286,7 +294,8 @@ def callers(folder: Path, calls: int, kills: int, seed: int) -> str:
         server.kill()
     return (
         f"calls: {run.calls}, their callers went away in {run.gone}; kills: {kills}; batches acknowledged: "
-        f"{run.acknowledged}, and {run.steady} of a steady writer; lost: 0, doubled: 0, zombies: 0; "
+        f"{run.acknowledged}, and {run.steady} of a steady writer; lost: 0, doubled: 0, zombies: 0; events of alarms: "
+        f"{run.events}; "
         f"other ends: {dict(run.outcomes.most_common())}"
     )
 
