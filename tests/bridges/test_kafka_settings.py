@@ -58,6 +58,24 @@ def test_bad_settings(text: str, complaint: str, tmp_path: Path) -> None:
     assert "s3cret" not in said.replace(str(tmp_path), "")
 
 
+@pytest.mark.parametrize(
+    ("url", "text", "complaint"),
+    [
+        ("kafka://user:word@a/t", "", "kafka://a/t: user and password are settings of --kafka-config"),
+        ("kafka://a/t", "s3cret", "config:1: no NAME=VALUE: there are security.protocol"),
+        ("nats://a/t", "", "--kafka-config is for kafka://"),
+    ],
+)
+def test_an_ingest_has_the_same_settings(url: str, text: str, complaint: str, tmp_path: Path) -> None:
+    file = tmp_path / "config"
+    file.write_text(text)
+    done = dynhull("ingest", url, "--hull", "h", "--key", "$.id", "--address", "127.0.0.1:1", "--kafka-config", file)
+    assert done.exit_code == 2
+    assert complaint in done.stderr
+    assert "s3cret" not in done.stderr.replace(str(tmp_path), "")
+    assert "word@" not in done.stderr
+
+
 def test_settings(tmp_path: Path) -> None:
     file = tmp_path / "config"
     lines = ("security.protocol=SASL_PLAINTEXT", "sasl.mechanism=SCRAM-SHA-512", "sasl.username=a", "sasl.password=b=c")

@@ -17,6 +17,7 @@ from aiokafka.helpers import create_ssl_context
 from brokers import broker, kafka
 from command_line import dynhull
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, load_pem_private_key
+from ingest_process import ingest_process, ingested
 from mortal_server import MortalServer
 from patience import PATIENCE, wait_until
 from ports import free_port
@@ -254,7 +255,14 @@ def test_encryption_and_passwords(client: HullClient, address: str, name: str, t
         with relay_process(address, tmp_path, *to, "--kafka-config", good):
             wait_until(lambda: acknowledged(client, name, "alarm") == 2)
         found = records(f"127.0.0.1:{port}", topic, **reached)
+        source = (f"kafka://127.0.0.1:{port}/{topic}", "--plane", "--x", "$.data.sequence", "--y", "$.data.value")
+        source += ("--hull", f"{name}/values")
+        with ingest_process(address, *source, "--kafka-config", bad) as ingest:
+            said = ingest.wait_for("no messages from the broker, trying again")["error"]
+        assert said == f"Kafka: no broker answers at 127.0.0.1:{port}, or it refuses the settings of --kafka-config"
+        ingested(address, *source, "--kafka-config", good)
     assert events(found) == [("raised", 1), ("cleared", 2)]
+    assert client.get_hull(f"{name}/values").vertices.tolist() == [[1, 12], [2, 2]]
 
 
 def test_a_broker_that_is_silent(

@@ -34,7 +34,8 @@ def made(servers: str, topic: str, partitions: int = 1, **settings: object) -> N
 
 
 def known_id(servers: str, topic: str) -> bytes | None:
+    reached = {"bootstrap_servers": servers, "request_timeout_ms": 1000 * PATIENCE}
     try:
-        return asyncio.run(topic_id(servers, topic, 1000 * PATIENCE))
+        return asyncio.run(topic_id(topic, reached))
     except UnknownTopicOrPartitionError:
         return None

@@ -13,7 +13,7 @@ from dynhull_cli.reading.time_forms import AMBIGUOUS, FORMAT, ZONE, Ambiguous, T
 from dynhull_surface.described import option_of
 from dynhull_surface.reasons import Exit
 
-from ..command import LogForm
+from ..command import KafkaConfig, LogForm
 
 if TYPE_CHECKING:
     from collections.abc import Coroutine
@@ -115,6 +115,7 @@ def ingest(
     to_end: Annotated[
         bool, typer.Option("--to-end", help="NATS, Kafka: end when no message is left, rather than wait.")
     ] = False,
+    kafka_config: KafkaConfig = None,
     patience: Annotated[
         str | None,
         typer.Option(
@@ -183,7 +184,12 @@ def ingest(
 
     async def serve() -> bool:
         options = FeedOptions(
-            hull=hull, producer=producer, mapping=mapping, to_end=to_end, ping_interval=connect.ping_interval
+            hull=hull,
+            producer=producer,
+            mapping=mapping,
+            to_end=to_end,
+            ping_interval=connect.ping_interval,
+            kafka_config=kafka_config,
         )
         find = feeds_of(source, options)
         async with connect(AsyncHullClient) as client:

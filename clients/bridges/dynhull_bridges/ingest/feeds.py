@@ -2,6 +2,7 @@
 
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from .feed import Feed, check_producer
@@ -20,6 +21,7 @@ class FeedOptions:
         mapping: what of a message is a point.
         to_end: whether to end at what is the end now.
         ping_interval: the seconds between questions whether the broker is still there.
+        kafka_config: a file of settings for Kafka.
     """
 
     hull: str
@@ -27,13 +29,14 @@ class FeedOptions:
     mapping: Mapping
     to_end: bool
     ping_interval: float
+    kafka_config: Path | None = None
 
 
 def feeds_of(url: str, options: FeedOptions) -> Find:
     """Finds the feeds that a URL stands for; it raises FeedError if the broker, which has to be asked, does not answer.
 
     Raises:
-        ValueError: there are none, or an option does not suit them.
+        ValueError: there are none, or an option does not suit them. OSError: there is no such file.
     """
     if options.producer is not None:
         check_producer(options.producer)
@@ -43,6 +46,8 @@ def feeds_of(url: str, options: FeedOptions) -> Find:
             f"the URL begins with {f'{scheme}:' if scheme else 'no scheme'}; there are mqtt(s)://HOST/FILTER, "
             "nats://HOST/STREAM[/SUBJECT] (tls:// encrypts) and kafka://HOST:PORT/TOPIC"
         )
+    if scheme != "kafka" and options.kafka_config is not None:
+        raise ValueError("--kafka-config is for kafka://")
     return FEEDS[scheme](url, options)
 
 
@@ -68,9 +73,11 @@ def _jetstream(url: str, options: FeedOptions) -> Find:
 
 
 def _kafka(url: str, options: FeedOptions) -> Find:
+    from ..kafka_settings import read_settings
     from .kafka import Topic
 
-    return Topic(url, options.producer, options.mapping.digest, options.ping_interval).partitions
+    settings = read_settings(options.kafka_config)
+    return Topic(url, options.producer, options.mapping.digest, settings, options.ping_interval).partitions
 
 
 def _known(feeds: Sequence[Feed]) -> Find:

@@ -1,7 +1,8 @@
 """A partition of a Kafka topic as a log: the number of a message is its offset, plus one."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from time import monotonic
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from aiokafka import AIOKafkaConsumer, TopicPartition
@@ -29,6 +30,7 @@ class Kafka:
         partition: the number of the partition.
         producer: the name under which hulls count the offsets; None for one of topic and partition.
         group: the group that keeps the offset.
+        settings: what aiokafka needs to reach the hosts beside their names.
         ping_interval: seconds. The broker answers twice a second while nothing comes; the connection is lost when it
             has been silent for half as long again. Other requests may take three times as long.
     """
@@ -40,9 +42,10 @@ class Kafka:
         partition: int,
         producer: str | None,
         group: str,
+        settings: Mapping[str, Any] | None = None,
         ping_interval: float = PING_INTERVAL,
     ) -> None:
-        self._timeout = _request_timeout(ping_interval)
+        self._reached = _reached(servers, settings, ping_interval)
         self._silence = 1.5 * ping_interval
         self._wait = min(WAIT, round(250 * ping_interval))
         self._heard = 0.0  # when the broker was heard last
@@ -50,7 +53,6 @@ class Kafka:
         self.name = f"kafka/{topic}/{partition}"
         self.producer: str | None = producer or producer_name("kafka", topic, str(partition))
         self._group = group
-        self._servers = servers
         self._partition = TopicPartition(topic, partition)
         self._captures = (topic,)
         self._consumer: AIOKafkaConsumer | None = None
@@ -61,12 +63,11 @@ class Kafka:
     async def begin(self, known: int | None) -> Beginning:
         """Connect; see `Feed.begin`."""
         consumer = AIOKafkaConsumer(
-            bootstrap_servers=self._servers,
+            **self._reached,
             group_id=self._group,  # only keeps the offset: the partition is not shared with other members
             enable_auto_commit=False,
             auto_offset_reset="none",
             isolation_level="read_committed",
-            request_timeout_ms=self._timeout,
         )
         self._consumer = consumer
         partition = self._partition
@@ -88,7 +89,7 @@ class Kafka:
 
     async def _id(self) -> int:
         """The id of the topic as a number of a batch: 63 of its bits, most of them random; 0 if it has none."""
-        found = await topic_id(self._servers, self._partition.topic, self._timeout)
+        found = await topic_id(self._partition.topic, self._reached)
         return 0 if found is None else int.from_bytes(found[:8]) >> 1
 
     async def read(self) -> Sequence[Message]:
@@ -160,14 +161,22 @@ class Topic:
         url: the URL; without partitions it is about all of them.
         producer: the name under which hulls count the offsets, followed by the partition; None for one of the topic.
         mapping: the digest of the mapping. Each has its own place in the topic.
+        settings: as for `Kafka`.
         ping_interval: as for `Kafka`.
 
     Raises:
-        ValueError: the URL names no topic, or a partition that is no number.
+        ValueError: the URL names no topic, has a password, or a partition that is no number.
     """
 
-    def __init__(self, url: str, producer: str | None, mapping: str, ping_interval: float = PING_INTERVAL) -> None:
-        self._ping_interval = ping_interval
+    def __init__(
+        self,
+        url: str,
+        producer: str | None,
+        mapping: str,
+        settings: Mapping[str, Any] | None = None,
+        ping_interval: float = PING_INTERVAL,
+    ) -> None:
+        self._settings, self._ping_interval = settings, ping_interval
         parts = urlsplit(url)
         self._servers = parts.netloc
         self._name = unquote(parts.path).strip("/")
@@ -175,6 +184,8 @@ class Topic:
         self._group = ".".join((GROUP, mapping, *([producer] if producer else [])))
         if not self._servers or not self._name or "/" in self._name:
             raise ValueError(f"{without_secrets(url)}: give kafka://HOST:PORT/TOPIC")
+        if "@" in self._servers:
+            raise ValueError(f"{without_secrets(url)}: user and password are settings of --kafka-config")
         asked = options_of(url, ("partition",)).get("partition", [])
         if wrong := [each for each in asked if not each.isdecimal()]:
             raise ValueError(f"{without_secrets(url)}: partition is {wrong[0]!r}, not a number from 0")
@@ -188,13 +199,14 @@ class Topic:
             ValueError: the topic has no such partition, or the broker refuses for good.
             FeedError: no broker answers, or it refuses for now.
         """
-        timeout = _request_timeout(self._ping_interval)
-        admin = AIOKafkaAdminClient(bootstrap_servers=self._servers, request_timeout_ms=timeout)
+        admin = AIOKafkaAdminClient(**_reached(self._servers, self._settings, self._ping_interval))
         try:
             await admin.start()
             (described,) = await admin.describe_topics([self._name])
         except KafkaConnectionError:
-            raise FeedError(f"Kafka: no broker answers at {self._servers}") from None
+            # aiokafka says no more where it was refused.
+            more = ", or it refuses the settings of --kafka-config" if self._settings else ""
+            raise FeedError(f"Kafka: no broker answers at {self._servers}{more}") from None
         except (KafkaError, OSError) as error:
             raise _failure(error) from None
         finally:
@@ -211,12 +223,12 @@ class Topic:
 
     def _partition(self, number: int) -> Kafka:
         producer = f"{self._producer}/{number}" if self._producer else None
-        return Kafka(self._servers, self._name, number, producer, self._group, self._ping_interval)
+        return Kafka(self._servers, self._name, number, producer, self._group, self._settings, self._ping_interval)
 
 
-def _request_timeout(ping_interval: float) -> int:
-    """Milliseconds that a request may take."""
-    return round(3000 * ping_interval)
+def _reached(servers: str, settings: Mapping[str, Any] | None, ping_interval: float) -> dict[str, Any]:
+    """How the hosts are reached, and how many milliseconds a request may take."""
+    return {"bootstrap_servers": servers, "request_timeout_ms": round(3000 * ping_interval), **(settings or {})}
 
 
 def _failure(error: KafkaError | OSError) -> Exception:

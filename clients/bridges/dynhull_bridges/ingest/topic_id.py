@@ -1,5 +1,6 @@
 """The id of a Kafka topic, which aiokafka does not ask for: Metadata of version 10, of Kafka 2.8 and later."""
 
+from collections.abc import Mapping
 from io import BytesIO
 from typing import Any
 
@@ -87,13 +88,13 @@ class _Describe(Request[_DescribeStruct]):  # type: ignore[misc]
         return request_struct_class([(bytes(LENGTH), self._topic, {})], False, False, False, {})
 
 
-async def topic_id(servers: str, topic: str, timeout: int) -> bytes | None:
-    """The id of a topic; None where the broker is older than ids. Each request may take `timeout` milliseconds.
+async def topic_id(topic: str, reached: Mapping[str, Any]) -> bytes | None:
+    """The id of a topic of the brokers that are reached so; None where they are older than ids.
 
     Raises:
         KafkaError, OSError: the broker cannot be reached, or refuses, as where it has no such topic.
     """
-    client = AIOKafkaClient(bootstrap_servers=servers, request_timeout_ms=timeout)
+    client = AIOKafkaClient(**reached)
     try:
         await client.bootstrap()
         answer: Any = await client.send(client.get_random_node(), _Describe(topic))
