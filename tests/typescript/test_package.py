@@ -2,7 +2,10 @@
 
 import gzip
 import json
+import os
+import shutil
 import subprocess
+import tarfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -42,12 +45,24 @@ def gateway(server: MortalServer) -> Iterator[Gateway]:
         yield running
 
 
-def node(*words: str, **environment: str) -> str:
-    """What a program of Node prints in the package's folder."""
-    command = ["env", *(f"{name}={value}" for name, value in environment.items()), program("node"), *words]
-    done = subprocess.run(command, cwd=typescript(), capture_output=True, text=True, timeout=PATIENCE, check=False)
+def run(folder: Path, *command: str, **environment: str) -> str:
+    """What a command prints in a folder."""
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def node(*words: str, **environment: str) -> str:
+    """What a program of Node prints in the package's folder."""
+    return run(typescript(), program("node"), *words, **environment)
 
 
 def blocks(kind: str) -> list[str]:
@@ -62,12 +77,26 @@ def test_its_own_tests(gateway: Gateway) -> None:
     assert "\n# skipped 0\n" in said
 
 
-def test_it_packs() -> None:
-    command = [program("npm"), "pack", "--dry-run", "--json", "--ignore-scripts"]
-    packed = subprocess.run(command, cwd=typescript(), capture_output=True, text=True, check=True, timeout=PATIENCE)
-    files = {each["path"] for each in json.loads(packed.stdout)[0]["files"]}
-    sources = {str(each.relative_to(typescript())) for each in (typescript() / "src").rglob("*.js")}
-    assert files == sources | {"package.json", "README.md", "LICENSES.md"}
+def test_it_packs(tmp_path: Path) -> None:
+    """What is packed and installed in an empty folder runs, and its types are those that a strict program needs."""
+    packed = run(
+        typescript(), program("npm"), "pack", "--silent", "--offline", "--pack-destination", str(tmp_path)
+    ).strip()
+    installed = tmp_path / "node_modules" / "dynhull"
+    with tarfile.open(tmp_path / packed) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (tmp_path / "node_modules").mkdir()
+    (tmp_path / "package").rename(installed)
+    locked = json.loads((typescript() / "package-lock.json").read_text())["packages"]
+    for path in (each for each, about in locked.items() if each and not {"dev", "peer"} & about.keys()):
+        shutil.copytree(typescript() / path, tmp_path / path)
+    licences = (installed / "LICENSES.md").read_text()
+    assert all(Path(path).name in licences for path in locked if (tmp_path / path).is_dir() and path)
+    assert (installed / "LICENSE").read_text() == (HERE.parents[1] / "LICENSE").read_text()
+    for name in ("program.mjs", "program.ts", "tsconfig.json"):
+        shutil.copy(HERE / "installed" / name, tmp_path)
+    assert run(tmp_path, program("node"), "program.mjs") == "6 1\n"
+    run(tmp_path, str(typescript() / "node_modules" / ".bin" / "tsc"))
 
 
 def test_python_has_the_same_cases() -> None:

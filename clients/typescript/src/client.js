@@ -35,7 +35,8 @@ const SILENCE = 45
  * @property {number} held
  * @property {number | null} shards
  * @property {bigint | null} changed
- * @property {boolean} restored
+ * @property {boolean} restored whether a backup has brought it back, without the batches after it
+ * @property {boolean} erased of the past, whether it may lack keys that it had then, since they were erased
  *
  * @typedef {object} Applied the effect of a batch
  * @property {bigint} revision
@@ -117,10 +118,23 @@ const SILENCE = 45
  * @property {number} [layer]
  * @property {number} [maxEvents]
  * @property {number} [maxEventAge]
+ * @property {readonly AnyKey[]} [expected] keys that should be inside
+ * @property {string} [expectedBy] by this time of day, such as "18:00 Europe/Berlin Mon-Fri",
+ * @property {number} [expectedWithin] or for the last time so many seconds ago
  *
  * @typedef {FenceSettings & {name: string, created: bigint, uid: string, lastSequence: bigint, firstSequence: bigint,
  *   inside: number, subjectCount: number, consumers: Consumer[]}} Fence
  * @typedef {{name: string, acknowledged: bigint, backlog: number, oldest: bigint | null, lost: number}} Consumer
+ *
+ * @typedef {object} FeedConsumer a durable reader of the feed of a hull, or of a prefix
+ * @property {string} name
+ * @property {string | null} hull
+ * @property {string | null} prefix
+ * @property {bigint | string} after the revision that it has acknowledged; of a prefix, the position, empty for none
+ * @property {string} uid of the hull with that revision
+ * @property {number} backlog
+ * @property {number} lost how many of them are kept no more
+ * @property {boolean} replaced whether the hull, or the data of the prefix, is another one since then
  *
  * @typedef {object} NewAlarm
  * @property {string} [hull] the hull that is watched,
@@ -234,6 +248,20 @@ export class Client extends Streams {
     yield* this.#pages("/hulls", "hulls", prefix, options)
   }
 
+  /**
+   * Wait until there is a hull of that name, at that revision or a later one.
+   * @param {string} name
+   * @param {{minRevision?: bigint | number} & Abortable} [options]
+   * @returns {Promise<HullInfo>}
+   */
+  async waitForHull(name, { minRevision = 0, signal } = {}) {
+    for await (const { type, revision } of this.watch(name, { signal })) {
+      if (type !== "deleted" && revision >= minRevision) break
+    }
+    signal?.throwIfAborted()
+    return (await this.getHull(name, { signal })).info
+  }
+
   // Writes
 
   /**
@@ -257,6 +285,28 @@ export class Client extends Streams {
    */
   remove(name, keys, options = {}) {
     return this.apply(name, { missing: "count", remove: keys, ...options })
+  }
+
+  /**
+   * Let keys in quarantine in, at the positions that are held.
+   * @param {string} name
+   * @param {readonly AnyKey[]} keys
+   * @param {{drop?: readonly AnyKey[]} & Numbering & Abortable} [options] `drop`: keys whose held positions are dropped
+   * @returns {Promise<Applied>}
+   */
+  release(name, keys, options = {}) {
+    return this.apply(name, { release: keys, ...options })
+  }
+
+  /**
+   * Drop the positions of keys in quarantine.
+   * @param {string} name
+   * @param {readonly AnyKey[]} keys
+   * @param {Numbering & Abortable} [options]
+   * @returns {Promise<Applied>}
+   */
+  drop(name, keys, options = {}) {
+    return this.apply(name, { drop: keys, ...options })
   }
 
   /**
@@ -367,11 +417,12 @@ export class Client extends Streams {
    * The distance of two hulls, or the depth of their overlap.
    * @param {string} name
    * @param {string} other
-   * @param {Abortable} [options]
+   * @param {{minRevision?: bigint | number, otherMinRevision?: bigint | number} & Abortable} [options]
    * @returns {Promise<Record<string, any>>}
    */
-  async separate(name, other, options = {}) {
-    const call = { query: { other }, repeatable: true, ...options }
+  async separate(name, other, { minRevision, otherMinRevision, signal } = {}) {
+    const query = { other, min_revision: minRevision, other_min_revision: otherMinRevision }
+    const call = { query, repeatable: true, signal }
     return fromWire(await this.#connection.ask(path`/hulls/${name}/separation`, call))
   }
 
@@ -379,22 +430,22 @@ export class Client extends Streams {
    * The hull as a binary phase diagram: its points are compositions from 0 to 1 and energies.
    * @param {string} name
    * @param {readonly Point[]} [entries]
-   * @param {Abortable} [options]
+   * @param {{minRevision?: bigint | number} & Abortable} [options]
    * @returns {Promise<{revision: bigint, stable: Point[], energiesAboveHull: (number | null)[], phases: [Point, Point][]}>}
    */
-  async phaseDiagram(name, entries = [], options = {}) {
-    const call = { method: "POST", body: { entries }, repeatable: true, ...options }
+  async phaseDiagram(name, entries = [], { minRevision, signal } = {}) {
+    const call = { method: "POST", body: { entries }, query: { min_revision: minRevision }, repeatable: true, signal }
     return fromWire(await this.#connection.ask(path`/hulls/${name}/phase-diagram`, call))
   }
 
   /**
    * The hull as an efficient frontier: its points are risks and returns.
    * @param {string} name
-   * @param {{points?: readonly Point[], rates?: readonly number[]} & Abortable} [options]
+   * @param {{points?: readonly Point[], rates?: readonly number[], minRevision?: bigint | number} & Abortable} [options]
    * @returns {Promise<Record<string, any>>}
    */
-  async frontier(name, { points = [], rates = [], signal } = {}) {
-    const call = { method: "POST", body: { points, rates }, repeatable: true, signal }
+  async frontier(name, { points = [], rates = [], minRevision, signal } = {}) {
+    const call = { method: "POST", body: { points, rates }, query: { min_revision: minRevision }, repeatable: true, signal }
     return fromWire(await this.#connection.ask(path`/hulls/${name}/frontier`, call))
   }
 
@@ -461,6 +512,64 @@ export class Client extends Streams {
     const query = { key: keys.map(String), from: momentOf(start), to: momentOf(end), every }
     const { tracks } = await this.#connection.ask(path`/hulls/${name}/tracks`, { query, repeatable: true, signal })
     return new Map(tracks.map(trackOf))
+  }
+
+  // Consumers of feeds
+
+  /**
+   * The consumers of feeds whose hulls or prefixes begin so, by what they read.
+   * @param {string} [prefix]
+   * @param {Abortable} [options]
+   * @returns {AsyncGenerator<FeedConsumer, void, undefined>}
+   */
+  async *listFeedConsumers(prefix = "", options = {}) {
+    yield* this.#pages("/feed/consumers", "consumers", prefix, options)
+  }
+
+  /**
+   * Acknowledge the batches of a hull up to a revision: a feed of that consumer begins after it. A new one is created.
+   * @param {string} name
+   * @param {string} consumer
+   * @param {bigint | number} revision
+   * @param {{uid?: string} & Abortable} [options] `uid` of the hull, to notice that it was replaced
+   * @returns {Promise<FeedConsumer>}
+   */
+  async ackFeed(name, consumer, revision, { uid = "", signal } = {}) {
+    const call = { method: "PUT", body: { revision, uid }, repeatable: true, signal }
+    return consumerOf(await this.#connection.ask(path`/hulls/${name}/feed/consumers/${consumer}`, call))
+  }
+
+  /**
+   * Acknowledge the batches of the hulls of a prefix up to the position of an event. A new consumer is created.
+   * @param {string} prefix
+   * @param {string} consumer
+   * @param {string} position empty for the beginning
+   * @param {Abortable} [options]
+   * @returns {Promise<FeedConsumer>}
+   */
+  async ackFeedMany(prefix, consumer, position, options = {}) {
+    const call = { method: "PUT", query: { prefix }, body: { position }, repeatable: true, ...options }
+    return consumerOf(await this.#connection.ask(path`/feed/consumers/${consumer}`, call))
+  }
+
+  /**
+   * Forget a consumer of the feed of a hull, also of one that is not there any more.
+   * @param {string} name
+   * @param {string} consumer
+   * @param {Abortable} [options]
+   */
+  async deleteFeedConsumer(name, consumer, options = {}) {
+    await this.#connection.ask(path`/hulls/${name}/feed/consumers/${consumer}`, { method: "DELETE", ...options })
+  }
+
+  /**
+   * Forget a consumer of the feed of a prefix.
+   * @param {string} prefix
+   * @param {string} consumer
+   * @param {Abortable} [options]
+   */
+  async deleteFeedManyConsumer(prefix, consumer, options = {}) {
+    await this.#connection.ask(path`/feed/consumers/${consumer}`, { method: "DELETE", query: { prefix }, ...options })
   }
 
   // Fences
@@ -642,7 +751,7 @@ export class Client extends Streams {
 
   /**
    * @param {string} at
-   * @param {"hulls" | "fences" | "alarms" | "held"} rows
+   * @param {"hulls" | "fences" | "alarms" | "held" | "consumers"} rows
    * @param {string | undefined} prefix
    * @param {Abortable} options
    * @returns {AsyncGenerator<any, void, undefined>}
@@ -652,10 +761,16 @@ export class Client extends Streams {
     let after = null
     do {
       const page = await this.#connection.ask(at, { query: { prefix, after }, repeatable: true, ...options })
-      yield* page[rows].map({ hulls: fromWire, fences: fenceOf, alarms: alarmOf, held: fromWire }[rows])
+      yield* page[rows].map({ hulls: fromWire, fences: fenceOf, alarms: alarmOf, held: fromWire, consumers: consumerOf }[rows])
       after = page.next
     } while (after !== null)
   }
+}
+
+/** Of a hull, it has acknowledged a revision. @param {any} consumer @returns {FeedConsumer} */
+function consumerOf(consumer) {
+  const read = fromWire(consumer)
+  return { ...read, after: read.prefix === null ? BigInt(read.after) : read.after }
 }
 
 /** A fence; the area is as it was given. @param {any} fence @returns {Fence} */

@@ -18,7 +18,7 @@ import { Reads } from "./reads.js"
  * @returns {Past}
  */
 export function pastOf(name, info, ask) {
-  const reads = new Reads((_, what, call) => ask(what, { ...call, query: { ...call.query, at: info.revision } }))
+  const reads = new Reads((_, what, call) => ask(what, { ...call, query: { ...call.query, at: info.revision, at_uid: info.uid } }))
   const methods = Object.getOwnPropertyNames(Reads.prototype).filter((method) => method !== "constructor")
   const bound = methods.map((method) => {
     const read = /** @type {any} */ (reads)[method]

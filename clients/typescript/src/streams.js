@@ -143,23 +143,24 @@ export class Streams extends Reads {
   /**
    * Every batch of a hull with its rows, each once and in order, without end.
    * @param {string} name
-   * @param {Following & {after?: bigint | number}} [options] begin after this revision; 0: with the oldest that is kept;
-   *   default: with the next
+   * @param {Following & {consumer?: string, after?: bigint | number}} [options] begin after the last revision that a
+   *   consumer has acknowledged, or after this one; 0: with the oldest that is kept; default: with the next
    * @returns {AsyncGenerator<FeedEvent, void, undefined>}
    */
-  async *feed(name, { after, ...following } = {}) {
-    yield* batches(this.#joined.follow(path`/hulls/${name}/feed`, { after }, following))
+  async *feed(name, { consumer, after, ...following } = {}) {
+    yield* batches(this.#joined.follow(path`/hulls/${name}/feed`, { consumer, after }, following))
   }
 
   /**
    * Every batch of all hulls whose names begin with a prefix, each once, by their commits.
    * @param {string} prefix
-   * @param {Following & {begin?: boolean, position?: string}} [options] `begin`: with the oldest that is kept;
-   *   `position`: after an event that had it
+   * @param {Following & {consumer?: string, begin?: boolean, position?: string}} [options] `consumer`: after the last
+   *   event that it has acknowledged; `begin`: with the oldest that is kept; `position`: after an event that had it
    * @returns {AsyncGenerator<FeedEvent, void, undefined>}
    */
-  async *feedMany(prefix, { begin, position, ...following } = {}) {
-    yield* batches(this.#joined.follow("/feed", { prefix, begin: begin || undefined }, following, position))
+  async *feedMany(prefix, { consumer, begin, position, ...following } = {}) {
+    const query = { prefix, consumer, begin: begin || undefined }
+    yield* batches(this.#joined.follow("/feed", query, following, position))
   }
 }
 

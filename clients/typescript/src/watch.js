@@ -76,6 +76,11 @@ import { fromWire } from "./json.js"
  * @property {bigint | null} time
  * @property {bigint | null} firstTime
  * @property {{hull: string, keys: Key[], revision: bigint}[]} inside
+ * @property {bigint} first of `lost`, the first sequence that was dropped
+ * @property {bigint} last
+ * @property {number} conflated how many events before this one were left out, because they cancel each other
+ * @property {string} previousHull of a subject that one batch has moved from another hull, its name
+ * @property {bigint} previousHullRevision
  *
  * @typedef {object} AlarmEvent
  * @property {string} type raised, cleared, snapshot, closed, lost or replaced
@@ -114,6 +119,12 @@ import { fromWire } from "./json.js"
  * @property {(bigint | null)[]} [times]
  * @property {(bigint | null)[]} [expireTimes]
  * @property {number} [expired]
+ * @property {bigint} [expiredUntil]
+ * @property {number[]} [accuracies]
+ * @property {"absent" | "present"} [only] whether the batch put only new keys, or only known ones
+ * @property {boolean} [lenient] whether some deletes are of points that the hull did not have
+ * @property {Point} [center] the new centre of a geographic hull
+ * @property {boolean} [more] whether the next batch of the feed of many hulls was committed together with this one
  * @property {bigint} [clock]
  * @property {object} [held]
  * @property {bigint} [first] of `lost`
@@ -125,6 +136,9 @@ import { fromWire } from "./json.js"
  * @property {string} uid
  * @property {bigint} revision
  * @property {number} points
+ * @property {number} distinct
+ * @property {number} held
+ * @property {bigint | null} clock
  * @property {number} vertexCount
  * @property {Measures | null} measures
  * @property {bigint | null} changed
@@ -142,6 +156,7 @@ import { fromWire } from "./json.js"
 
 /** What events leave out. */
 const ABSENT = { vertexKeys: null, center: null, measures: null, changed: null, error: null, clock: null, erased: false }
+const NOTHING_YET = { distinct: 0, held: 0, clock: null, measures: null, changed: null, center: null, vertices: null, error: null }
 const UNCHANGED = { addedKeys: null, renamedRows: null, renamedKeys: null }
 
 /**
@@ -156,8 +171,9 @@ export function hullEvent(type, data) {
 /** @param {string} type @param {any} data @returns {FenceEvent} */
 export function fenceEvent(type, data) {
   const absent = { key: null, position: null, previousPosition: null, distance: null, eventTime: null, firstTime: null }
-  const numbers = { sequence: 0n, revision: 0n, areaRevision: 0n }
-  return { type, cause: [], inside: [], fence: "", uid: "", hull: "", time: null, ...numbers, ...absent, ...data }
+  const numbers = { sequence: 0n, revision: 0n, areaRevision: 0n, first: 0n, last: 0n, conflated: 0 }
+  const before = { previousHull: "", previousHullRevision: 0n }
+  return { type, cause: [], inside: [], fence: "", uid: "", hull: "", time: null, ...before, ...numbers, ...absent, ...data }
 }
 
 /** @param {string} type @param {any} data @returns {AlarmEvent} */
@@ -169,5 +185,5 @@ export function alarmEvent(type, data) {
 
 /** The newest state of one of many hulls. @param {any} hull @returns {HullNow} */
 export function hullNow(hull) {
-  return { measures: null, changed: null, center: null, vertices: null, error: null, ...fromWire(hull) }
+  return { ...NOTHING_YET, ...fromWire(hull) }
 }

@@ -107,7 +107,10 @@ test("the other questions are answered", options, async () => {
   const held = []
   for await (const each of client.listHeld(a)) held.push(each.key)
   assert.deepEqual(held, ["a"])
-  assert.equal((await client.separate(a, b)).revision, 3n)
+  assert.equal((await client.drop(a, ["a"])).dropped, 1)
+  assert.equal((await client.release(a, ["b"])).released, 0)
+  assert.equal((await client.waitForHull(a, { minRevision: 1 })).held, 0)
+  assert.equal((await client.separate(a, b, { minRevision: 5 })).revision, 5n)
   assert.equal((await client.series(b)).times.length > 0, true)
   assert.equal((await client.phaseDiagram(b, [[0.25, 0]])).stable.length, 3)
   assert.equal((await client.frontier(b, { rates: [0.5] })).revision, 1n)
@@ -183,19 +186,39 @@ test("the past is replayed, followed and asked", options, async () => {
   assert.deepEqual(batches[1], ["batch", 2n, [large], [[1e-310, 5e-324]], undefined])
   assert.deepEqual(batches[2].at(-1), [2n])
   const all = []
+  let position = ""
   for await (const batch of client.feedMany(hull, { begin: true })) {
     all.push(batch.revision)
+    position = batch.position || position
     if (batch.revision === 3n) break
   }
   assert.deepEqual(all, [1n, 2n, 3n])
+  assert.equal((await client.ackFeed(hull, "store", 2n)).after, 2n)
+  for await (const { revision } of client.feed(hull, { consumer: "store" })) {
+    assert.equal(revision, 3n)
+    break
+  }
+  assert.equal((await client.ackFeedMany(hull, "all", position)).after, position)
+  await client.put(hull, [2], [[1, 1]])
+  for await (const { type, revision } of client.feedMany(hull, { consumer: "all" })) {
+    if (type !== "batch") continue
+    assert.equal(revision, 4n)
+    break
+  }
+  const consumers = []
+  for await (const each of client.listFeedConsumers(hull)) consumers.push([each.name, each.hull, each.prefix, each.backlog])
+  assert.deepEqual(consumers.map((each) => each.slice(0, 3)), [["store", hull, null], ["all", null, hull]])
+  await client.deleteFeedConsumer(hull, "store")
+  await client.deleteFeedManyConsumer(hull, "all")
+  assert.deepEqual(await client.listFeedConsumers(hull).next(), { done: true, value: undefined })
   const area = { exterior: [[3, -1], [5, -1], [5, 5], [3, 5]] }
   const crossed = []
-  for await (const event of client.fenceEventsBetween({ area, subjects: hull, start: 1, initial: "none" })) {
+  for await (const event of client.fenceEventsBetween({ area, subjects: hull, start: 1, end: 3, initial: "none" })) {
     crossed.push([event.type, event.key, event.sequence])
   }
   assert.deepEqual(crossed, [["exit", large, 1n], ["exit", 2n, 2n]])
   const kept = await client.history(hull)
-  assert.deepEqual([kept.firstRevision <= 1n, kept.lastRevision, kept.history], [true, 3n, true])
+  assert.deepEqual([kept.firstRevision <= 1n, kept.lastRevision, kept.history], [true, 4n, true])
   assert.equal((await client.setHistory(hull, "30d")).name, hull)
   assert.equal((await client.history(hull)).history, 2592000)
   assert.equal(await client.eraseHistory(hull, [5]), null)
