@@ -210,7 +210,7 @@ build/openapi/.tools: tests/docs/openapi/package-lock.json tests/docs/openapi/po
 	touch $@
 
 languages: .venv/.test build/openapi/.tools  ## the programs in Go, Java and Rust on their pages, each where its tools are: built, and run beside a server that is killed; what programs make of the gateway's description
-	PATH="$(CURDIR)/$(BIN):$$PATH" LANGUAGES_CASES=all $(BIN)/pytest tests/docs/test_languages.py tests/docs/test_openapi.py
+	PATH="$(CURDIR)/$(BIN):$$PATH" LANGUAGES_CASES=all $(BIN)/pytest tests/docs/test_languages.py tests/docs/test_openapi.py tests/typescript/test_package.py::test_points_beside_edges
 
 kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, and a relay to one that is killed, which Maven brings (Debian: maven, default-jre-headless)
 	KAFKA_CASES=all $(BIN)/pytest tests/bridges/test_kafka.py tests/bridges/test_kafka_target.py

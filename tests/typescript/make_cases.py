@@ -1,4 +1,7 @@
-"""Writes clients/typescript/test/cases.json: questions to copies of hulls, with the exact answers, for every language.
+"""Writes clients/typescript/test/cases.json, for every language.
+
+`hulls`: questions to copies of hulls, with the exact answers. `values`: batches of a hull with integers as keys
+and with event times: numbers at the ends of what doubles and integers of 64 bits can be.
 
 Run it from the root of the project: python tests/typescript/make_cases.py
 """
@@ -70,9 +73,21 @@ def case(dice: Random, points: list[tuple[float, float]]) -> dict[str, object]:
     }
 
 
+def values() -> dict[str, object]:
+    """Keys beside 2**53 and 2**64, sequences up to 2**63, microseconds, zeros with signs, subnormal doubles."""
+    keys = [0, 1, 2**53 - 1, 2**53, 2**53 + 1, 2**63 - 1, 2**63, 2**64 - 2, 2**64 - 1]
+    numbers = [0.0, -0.0, TINY, -TINY, 1e-310, 0.1 + 0.2, 2.0**53 + 2, HUGE, -HUGE]
+    times = [-1, 1, 1_700_000_000_000_001, 1_700_000_000_999_999, 8_999_999_999_999_999]
+    steps: list[dict[str, object]] = []
+    for step, sequence in enumerate([1, 2**53 - 1, 2**53 + 1, 2**63 - 2, 2**63 - 1]):
+        points = [[numbers[(row + step) % 9], numbers[(2 * row + step) % 9]] for row in range(len(keys))]
+        steps.append({"sequence": sequence, "keys": keys, "points": points, "times": [times[step]] * len(keys)})
+    return {"keys": [*keys, 2**53 + 3], "batches": steps}
+
+
 def main() -> None:
     dice = Random(41)
-    cases = [case(dice, points) for points in shapes(dice)]
+    cases = {"values": values(), "hulls": [case(dice, points) for points in shapes(dice)]}
     CASES.write_text(
         json.dumps(cases, allow_nan=False, separators=(",", ":")).replace('{"vertices"', '\n{"vertices"') + "\n"
     )

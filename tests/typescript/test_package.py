@@ -27,8 +27,9 @@ from dynhull_client import HullClient, HullCopy, Snapshot
 
 HERE = Path(__file__).parent
 KILLS = 2
-POINTS = 20_000
+FEW, MANY = 20_000, 1_000_000  # points
 ONE_SCRIPT = 60_000  # bytes, compressed
+CASES = json.loads((HERE.parents[1] / "clients" / "typescript" / "test" / "cases.json").read_text())
 DEPENDENCIES = "lossless-json", "robust-predicates", "d3-geo", "d3-array", "internmap", "topojson-client"
 
 
@@ -100,8 +101,7 @@ def test_it_packs(tmp_path: Path) -> None:
 
 
 def test_python_has_the_same_cases() -> None:
-    cases = json.loads((typescript() / "test" / "cases.json").read_text())
-    for case in cases:
+    for case in CASES["hulls"]:
         vertices = np.array(case["vertices"], float).reshape(-1, 2)
         copy = HullCopy()
         copy.update(Snapshot(1, len(vertices), vertices, None))
@@ -112,13 +112,37 @@ def test_python_has_the_same_cases() -> None:
             assert copy.support(case["directions"]).tolist() == case["support"]
 
 
-def test_points_beside_edges(tmp_path: Path) -> None:
+def test_python_has_the_same_values(server: MortalServer) -> None:
+    name, values = "typescript/values", CASES["values"]
+    keys = np.array(values["keys"], np.uint64)
+    with HullClient(server.address) as client:
+        client.create_hull(name, keyed="int", ordering="event_time")
+        for step, batch in enumerate(values["batches"]):
+            times = np.array(batch["times"], "datetime64[us]")
+            applied = client.put(
+                name, keys[:-1], batch["points"], times, producer="cases", sequence=batch["sequence"], may_skip=True
+            )
+            assert applied.revision == step + 1
+            assert client.last_sequence(name, "cases") == batch["sequence"]
+            found = client.positions(name, keys)
+            kept = np.array(batch["points"], float) + 0.0  # -0.0 is 0.0 to a server
+            assert found.positions[:-1].tobytes() == kept.tobytes()
+            assert found.present.tolist() == [True] * len(times) + [False]
+            assert found.times is not None
+            assert np.array_equal(found.times[:-1], times)
+            assert np.array_equal(np.sort(client.entities(name).keys), keys[:-1])
+
+
+@pytest.mark.parametrize(
+    "count", [FEW, pytest.param(MANY, marks=[pytest.mark.long, pytest.mark.only_with("LANGUAGES_CASES")])]
+)
+def test_points_beside_edges(count: int, tmp_path: Path) -> None:
     """Each verdict beside edges is that of the library."""
     dice = np.random.default_rng(41)
     angles = np.sort(dice.uniform(0, 2 * np.pi, 300))
     hull = DynamicHull(np.column_stack([np.cos(angles), np.sin(angles)]) * 10 + 3)
     vertices = hull.vertices()
-    edges, part = dice.integers(len(vertices), size=POINTS), dice.uniform(size=(POINTS, 1))
+    edges, part = dice.integers(len(vertices), size=count), dice.uniform(size=(count, 1))
     points = vertices[edges] * part + np.roll(vertices, -1, axis=0)[edges] * (1 - part)
     points += np.spacing(points) * dice.integers(-3, 4, size=points.shape)
     points[: len(vertices)] = vertices

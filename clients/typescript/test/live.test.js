@@ -1,7 +1,9 @@
 import assert from "node:assert/strict"
+import { readFile } from "node:fs/promises"
 import { test } from "node:test"
 
 import { Client, DynhullError, HullCopies, HullCopy } from "../src/index.js"
+import { fromJson } from "../src/json.js"
 
 const url = process.env.DYNHULL_GATEWAY ?? ""
 const options = { skip: url ? false : "DYNHULL_GATEWAY names no gateway" }
@@ -239,6 +241,25 @@ test("whatever a client follows takes one connection", options, async () => {
   assert.equal((await later.next()).value?.type, "snapshot")
   assert.deepEqual(counted.slice(1).map((each) => each.replace(/streams\/[^/]+/, "streams/S")), [`PUT ${url}/streams/S/subscriptions/14`])
   for (const each of [...watches, many, later]) await each.return()
+})
+
+test("numbers at the ends of what they can be come back as they are", options, async () => {
+  const { values } = fromJson(await readFile(new URL("cases.json", import.meta.url), "utf8"))
+  const hull = name("values")
+  await client.createHull(hull, { keyed: "int", ordering: "event_time" })
+  for (const [step, { keys, points, times, sequence }] of values.batches.entries()) {
+    const numbered = { producer: "cases", sequence: BigInt(sequence), maySkip: true }
+    const { revision } = await client.put(hull, keys, points, { times: times.map(BigInt), ...numbered })
+    assert.equal(revision, BigInt(step + 1))
+    assert.equal(await client.lastSequence(hull, "cases"), BigInt(sequence))
+    const found = await client.positions(hull, values.keys)
+    const kept = points.map((/** @type {number[]} */ point) => point.map((each) => each + 0)) // -0 is 0 to a server
+    assert.deepEqual(found.positions, [...kept, [null, null]])
+    assert.deepEqual(found.times, [...times.map(BigInt), null])
+    const all = await client.entities(hull)
+    const sorted = all.keys.map(BigInt).sort((a, b) => (a < b ? -1 : 1))
+    assert.deepEqual(sorted, keys.map(BigInt))
+  }
 })
 
 test("a writer gathers, waits for room, and stops where the server refuses", options, async () => {
