@@ -12,6 +12,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from contextvars import Context
 from functools import partial
+from threading import get_ident
 from typing import Any
 
 from greenlet import GreenletExit, getcurrent, greenlet
@@ -179,7 +180,10 @@ class SimulatedThreads(Threads):
         current = getcurrent()
         if current is self._hub:
             return None
-        return next(thread for thread in reversed(self._all) if thread.owns(current))
+        for thread in reversed(self._all):
+            if thread.owns(current):
+                return thread
+        raise self._model.finds(f"{current} in {get_ident()} is no thread of this life")
 
     def wait(self, condition: Callable[[], object]) -> None:
         """Let the current thread wait."""

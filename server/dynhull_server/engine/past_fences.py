@@ -194,7 +194,7 @@ class _Run:
             return 0
         last, sifted = found
         self._following = self._fence.follow(batches.hull, sifted, last)
-        return next(self._following)
+        return next(self._following, 0)
 
 
 def _take(batches: _Batches, number: int, records: list[Record]) -> int:
