@@ -10,7 +10,6 @@ from ..engine.feed import FeedPart
 from ..engine.feed_consumers import ConsumerState, standing_of
 from ..engine.feed_many import Gap, ManyFeedPart, OfHull
 from ..engine.positions import BEGINNING, encode_standings
-from ..state.contents.accuracies import above_zero
 from ..state.feed_consumers import ConsumerId
 from ..state.records import FOREVER, NO_TIME, Cause, Condition, Expiry, HeldChange, KeyRows, PointRows, Record
 from .encode import (
@@ -133,9 +132,8 @@ def _write_keys(rows: KeyRows, batch: batch_pb2.Batch, encoding: points_pb2.Poin
     if rows.deadlines is not None and (rows.deadlines != FOREVER).any():
         known = np.where(rows.deadlines == FOREVER, NO_TIME, rows.deadlines)
         puts.expire_times.CopyFrom(encode_times(known, encoding))
-    accuracies = above_zero(rows.accuracies)  # at first, journals had the zeros of requests
-    if accuracies is not None:
-        puts.accuracies.CopyFrom(encode_accuracies(accuracies, encoding))
+    if rows.accuracies is not None:
+        puts.accuracies.CopyFrom(encode_accuracies(rows.accuracies, encoding))
     batch.removes.CopyFrom(encode_keys(rows.removes, encoding))
 
 

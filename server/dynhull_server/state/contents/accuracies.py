@@ -8,11 +8,6 @@ from ..records import Accuracies
 from .deadlines import Key
 
 
-def above_zero(accuracies: Accuracies | None) -> Accuracies | None:
-    """The errors of positions; None where all are 0, which is how a batch without any is told."""
-    return accuracies if accuracies is not None and accuracies.any() else None
-
-
 class AccuracyTable:
     """The errors of the positions of keys, above 0. O(1) a key.
 

@@ -14,7 +14,6 @@ from ..batch import KeyedBatch
 from ..errors import InvalidBatchError, KeyRepeatedError
 from ..frames import Globe
 from ..records import FOREVER, NO_TIME, HeldChange, HeldRows, HullSettings, KeyRows, QuarantineRules
-from .accuracies import above_zero
 from .judging import Plane, Sphere
 from .key_rows import no_keys, of_kind, selected
 from .live import AnyKeyedHull
@@ -110,7 +109,7 @@ class Gate:
             points=found.points,
             times=found.times if has_times or self._settings.by_event_time else None,
             deadlines=found.deadlines if has_deadlines else None,
-            accuracies=above_zero(found.accuracies),
+            accuracies=found.accuracies if found.accuracies.any() else None,
         )
 
     def judge(

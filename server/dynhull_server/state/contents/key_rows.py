@@ -11,7 +11,6 @@ from dynhull.keys import PackedKeys, key_list
 
 from ..errors import KeyRepeatedError
 from ..records import NO_TIME, Contents, KeyRows, Keys, Times
-from .accuracies import above_zero
 from .deadlines import Key
 from .live import AnyKeyedHull
 
@@ -49,7 +48,7 @@ def selected(rows: KeyRows, which: npt.NDArray[np.bool_]) -> KeyRows:
     """The puts of some rows, and all removes."""
     times = None if rows.times is None else rows.times[which]
     deadlines = None if rows.deadlines is None else rows.deadlines[which]
-    accuracies = None if rows.accuracies is None else above_zero(rows.accuracies[which])
+    accuracies = None if rows.accuracies is None else rows.accuracies[which]
     keys = select_keys(rows.keys, which)
     return KeyRows(keys, rows.points[which], rows.removes, times, deadlines, rows.condition, accuracies=accuracies)
 
@@ -98,7 +97,7 @@ def merged(group: list[KeyRows]) -> KeyRows:
     accuracies = None
     if any(rows.accuracies is not None for rows in group):
         columns = [np.zeros(len(rows.keys)) if rows.accuracies is None else rows.accuracies for rows in group]
-        accuracies = above_zero(np.concatenate(columns)[chosen])
+        accuracies = np.concatenate(columns)[chosen]
     return KeyRows(of_kind(put, kind), points, of_kind(removed, kind), times, accuracies=accuracies)
 
 

@@ -29,7 +29,7 @@ from ..records import (
     Record,
     Times,
 )
-from .accuracies import AccuracyTable, above_zero
+from .accuracies import AccuracyTable
 from .deadlines import Deadlines, Key
 from .gate import NOTHING_HELD, AdmittedPuts, Gate
 from .key_rows import (
@@ -152,7 +152,7 @@ class Keyed:
             batch = self._gate.opened(batch, self.globe)
         quarantine = self.quarantine
         rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
-        rows.accuracies = above_zero(batch.accuracies)
+        rows.accuracies = batch.accuracies
         held, puts = batch.of_quarantine, len(batch.keys)
         admission = admit(self._settings, batch.times, puts, "puts.times", arrived, self.clock, held=held)
         rows.times = admission.times
@@ -303,7 +303,8 @@ class Keyed:
 
     def accuracies(self, keys: Keys) -> Accuracies | None:
         """The errors of the positions of keys that are there; None where all are 0."""
-        return above_zero(self._accuracies.of(key_list(keys))) if len(self._accuracies) else None
+        found = self._accuracies.of(key_list(keys)) if len(self._accuracies) else None
+        return found if found is not None and found.any() else None
 
     def in_plane(self) -> KeyedHull:
         """The keys as points of a plane: those of a geographic hull at their projections. O(n log n) the first time."""
