@@ -90,8 +90,10 @@ def plain(value: object, *, erased: bool = False) -> object:
 def _without(rows: Any) -> object:
     """A batch of keys without `ERASED`."""
     left = _left(rows["keys"])
-    for name in ("keys", "points", "times", "deadlines"):
+    for name in ("keys", "points", "times", "deadlines", "accuracies"):
         rows[name] = _picked(rows[name], left)
+    if rows["accuracies"] is not None and not any(map(float, rows["accuracies"])):
+        rows["accuracies"] = None
     rows["removes"] = _picked(rows["removes"], _left(rows["removes"]))
     held = rows["held"]
     if held is not None:

@@ -155,6 +155,14 @@ def test_keys_of_two_kinds_are_refused():
         encode([Record(1, rows)])
 
 
+def test_errors_that_are_all_zero_are_none():
+    rows = KeyRows(PackedKeys.pack(["a"]), np.zeros((1, 2)), PackedKeys.pack([]), accuracies=np.zeros(1))
+    assert rows.accuracies is None
+    rows.accuracies = np.zeros(1)  # as earlier versions wrote them
+    (found,) = decode(encode([Record(1, rows)]), 1)
+    assert found.rows.accuracies is None
+
+
 @given(contents(), st.sampled_from([300, 1000, 2**19]))
 def test_contents_come_back_from_chunks(given, size):
     with pytest.MonkeyPatch.context() as patch:

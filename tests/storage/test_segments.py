@@ -378,6 +378,7 @@ def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():
         KeyRows(some, hard[:3], none, times, deadlines, "absent"),
         KeyRows(some, hard[1:], none, np.full(3, NO_TIME), np.full(3, FOREVER)),
         KeyRows(some, hard[1:], none, accuracies=np.array([0.1 + 0.2, 0, 1e308])),
+        KeyRows(some, hard[1:], none, accuracies=np.zeros(3)),
         KeyRows(none, hard[:0], some, held=HeldChange(held, some, QuarantineRules(max_growth=2.0))),
         KeyRows(none, hard[:0], none, held=HeldChange(held, none)),
         Expiry(None, 3),

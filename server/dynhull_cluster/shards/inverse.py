@@ -56,8 +56,9 @@ def _of_keys(rows: KeyRows, contents: keyed.Keyed) -> Inverse:
                 which = found.present & ((times != NO_TIME) == dated)
                 if which.any():
                     put = select_keys(keys, which)
-                    back = KeyRows(put, found.points[which], nothing, times[which] if dated else None)
-                    back.accuracies = None if found.accuracies is None else found.accuracies[which]
+                    errors = None if found.accuracies is None else found.accuracies[which]
+                    put_times = times[which] if dated else None
+                    back = KeyRows(put, found.points[which], nothing, put_times, accuracies=errors)
                     _apply(contents, back)
         return contents
 

@@ -214,7 +214,8 @@ class KeyRows:
         condition: which keys are put: all, or only those that are absent or present.
         removes: keys removed; missing ones are ignored.
         held: what it changes in the quarantine, or None.
-        accuracies: (n,) the errors of the positions, or None: 0 for all.
+        accuracies: (n,) the errors of the positions, or None: 0 for all. Given as zeros they are None, so that a batch
+            is the same wherever it is read from.
     """
 
     keys: Keys
@@ -225,6 +226,10 @@ class KeyRows:
     condition: Condition | None = None
     held: HeldChange | None = None
     accuracies: Accuracies | None = None
+
+    def __post_init__(self) -> None:
+        if self.accuracies is not None and not self.accuracies.any():
+            self.accuracies = None
 
     def __len__(self) -> int:
         return len(self.keys) + len(self.removes)

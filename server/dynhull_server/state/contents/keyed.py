@@ -151,8 +151,8 @@ class Keyed:
         if batch.of_quarantine:
             batch = self._gate.opened(batch, self.globe)
         quarantine = self.quarantine
-        rows = KeyRows(batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition)
-        rows.accuracies = batch.accuracies
+        columns = batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition
+        rows = KeyRows(*columns, accuracies=batch.accuracies)
         held, puts = batch.of_quarantine, len(batch.keys)
         admission = admit(self._settings, batch.times, puts, "puts.times", arrived, self.clock, held=held)
         rows.times = admission.times

@@ -9,6 +9,7 @@ byte of the length of the name, which was always 0.
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -99,7 +100,7 @@ def decode(payload: bytes, revision: int) -> Iterator[Record]:
         if further & HAS_ACCURACIES:
             if not isinstance(rows, KeyRows):
                 raise ValueError("points without keys have accuracies")
-            rows.accuracies = cursor.accuracies(added)
+            rows = replace(rows, accuracies=cursor.accuracies(added))
         if further & HAS_HELD:
             if not isinstance(rows, KeyRows):
                 raise ValueError("points without keys are in quarantine")

@@ -114,7 +114,7 @@ def _keys(batches: Batches, settings: HullSettings, first: int, last: int) -> Ro
         select_keys(keys, leaves),
         times[stays] if _dated(times[put], NO_TIME) else None,
         deadlines[stays] if _dated(deadlines[put], FOREVER) else None,
-        accuracies=accuracies[stays] if accuracies[stays].any() else None,
+        accuracies=accuracies[stays],
     )
 
 
