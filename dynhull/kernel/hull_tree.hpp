@@ -120,6 +120,16 @@ class HullTree {
                   [&](std::size_t extra_leaves) { return apply(plan, extra_leaves, together); });
   }
 
+  // Takes points in place of all of its own: as a new tree, but that it counts the change. Throws before anything
+  // changes.
+  void replace(const Point* points, std::size_t count) {
+    HullTree fresh(points, count);
+    fresh.changes = changes;
+    fresh.version_ = version_;
+    if (chain(UPPER) != fresh.chain(UPPER) || chain(LOWER) != fresh.chain(LOWER)) fresh.changed();
+    *this = std::move(fresh);
+  }
+
   // Takes over the points of another tree.
   void become(HullTree other) {
     other.changes = changes;

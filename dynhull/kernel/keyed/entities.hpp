@@ -96,7 +96,7 @@ class Entities {
       }
     }
     try {
-      changes.apply(tree, change, counts.moved == 0);
+      apply(tree, changes, change, counts);
     } catch (...) {
       for (std::size_t i = 0; i < count; ++i)
         if (batch[i].slot != NONE) slots_[batch[i].slot].place = puts.place(i);
@@ -211,6 +211,7 @@ class Entities {
  private:
   static constexpr std::size_t TOGETHER = 16;   // keys whose cache misses overlap
   static constexpr std::size_t LOOKAHEAD = 16;  // rows whose slot is being prefetched
+  static constexpr std::size_t MOST = 3;        // of so many slots one moves from which on the tree is built anew
 
   // A NaN that is the time of no entity.
   static constexpr std::uint64_t MARK = 0x7ff8000000000001;
@@ -322,6 +323,16 @@ class Entities {
     });
     for (std::size_t i = 0; i < count; ++i)
       if (slot(i) != NONE) forget(slot(i), slots_.tag(slot(i)));
+  }
+
+  // Applies the rows of a batch of puts to the tree. If it moves most entities, a new tree of all of them takes less.
+  void apply(FramedTree& tree, const Changes& changes, std::size_t count, const Counts& counts) const {
+    if (static_cast<std::size_t>(counts.moved) * MOST < slots_.end() || counts.moved == 0 || tree.frame().on_globe())
+      return changes.apply(tree, count, counts.moved == 0);
+    const Scratch<Point> places(slots_.size());
+    std::size_t next = 0;
+    slots_.for_each([&](std::uint32_t slot) { places[next++] = slots_[slot].place; });
+    tree.plane().replace(places.data(), next);
   }
 
   template <class Rows>
