@@ -526,6 +526,7 @@ class KeyTrack(Response):
     points: Rows
     revisions: list[int]
     event_times: list[str | None] | None = Field(description="What was sent with the positions; null for none at all.")
+    accuracies: Numbers | None = Field(None, description="As for `Positions`.")
 
 
 class Tracks(Response):

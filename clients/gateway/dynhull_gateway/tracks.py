@@ -84,4 +84,5 @@ def _shown(key: str | int, track: Track) -> dict[str, Any]:
         "points": track.points,
         "revisions": track.revisions.tolist(),
         "event_times": sent,
+        "accuracies": track.accuracies,
     }

@@ -10,6 +10,7 @@ import numpy as np
 from dynhull._value import Value
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
+from ._accuracies import decode_accuracies
 from ._calls import Call
 from ._keys import checked_keys, encode_keys, plain_keys
 from ._messages import decode_points
@@ -40,12 +41,15 @@ class Track(Value):
         points: (n, 2) the places; NaN from where on the key was not there.
         revisions: (n,) uint64, the revision of each row.
         event_times: (n,) int64, the times that were sent with the positions; 0 for none. None if there are none at all.
+        accuracies: (n,) how far each place may be from where the key really was, in units of the coordinates, or metres
+            on the globe; 0 for not at all. None if all are exact.
     """
 
     times: npt.NDArray[np.int64]
     points: Points
     revisions: npt.NDArray[np.uint64]
     event_times: npt.NDArray[np.int64] | None = None
+    accuracies: npt.NDArray[np.float64] | None = None
 
     def __iter__(self) -> Iterator[Any]:
         yield self.times
@@ -105,17 +109,24 @@ def _decoded(parts: Iterable[pb.TrackResponse], names: tuple[Any, ...]) -> dict[
     times = np.concatenate([decode_times(part.times).view(np.int64) for part in received])[order]
     points = np.concatenate([decode_points(part.positions) for part in received])[order]
     revisions = np.concatenate([np.array(part.revisions, np.uint64) for part in received])[order]
-    dated = [_event_times(part) for part in received] if any(part.HasField("event_times") for part in received) else []
-    event_times = np.concatenate(dated)[order] if dated else None
+    event_times = np.concatenate([_event_times(part) for part in received])[order]
+    accuracies = np.concatenate([_accuracies(part) for part in received])[order]
     ends = np.searchsorted(rows[order], np.arange(len(names) + 1))
     found: dict[str | int, Track] = {}
     for row, key in enumerate(names):
         own = slice(ends[row], ends[row + 1])
-        of_key = None if event_times is None else event_times[own]
-        found[key] = Track(
-            times[own], points[own], revisions[own], of_key if of_key is not None and of_key.any() else None
-        )
+        found[key] = Track(times[own], points[own], revisions[own], _any(event_times[own]), _any(accuracies[own]))
     return found
+
+
+def _any(column: Any) -> Any:
+    """The column; None where it says nothing."""
+    return column if column.any() else None
+
+
+def _accuracies(part: pb.TrackResponse) -> npt.NDArray[np.float64]:
+    found = decode_accuracies(part)
+    return np.zeros(len(part.key_indices)) if found is None else found
 
 
 def _event_times(part: pb.TrackResponse) -> npt.NDArray[np.int64]:

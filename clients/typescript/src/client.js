@@ -191,6 +191,7 @@ const SILENCE = 45
  * @property {(Point | null)[]} points null where the key left the hull
  * @property {bigint[]} revisions
  * @property {(bigint | null)[] | null} eventTimes
+ * @property {number[] | null} accuracies how far each place may be from where the key was; null if all are exact
  */
 
 /**

@@ -1325,18 +1325,20 @@ class TrackRequest(_message.Message):
     def __init__(self, name: _Optional[str] = ..., start_revision: _Optional[int] = ..., start_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end_revision: _Optional[int] = ..., end_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., keys: _Optional[_Union[_points_pb2.Keys, _Mapping]] = ..., every: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., encoding: _Optional[_Union[_points_pb2.PointEncoding, str]] = ...) -> None: ...
 
 class TrackResponse(_message.Message):
-    __slots__ = ("key_indices", "times", "positions", "event_times", "revisions")
+    __slots__ = ("key_indices", "times", "positions", "event_times", "revisions", "accuracies")
     KEY_INDICES_FIELD_NUMBER: _ClassVar[int]
     TIMES_FIELD_NUMBER: _ClassVar[int]
     POSITIONS_FIELD_NUMBER: _ClassVar[int]
     EVENT_TIMES_FIELD_NUMBER: _ClassVar[int]
     REVISIONS_FIELD_NUMBER: _ClassVar[int]
+    ACCURACIES_FIELD_NUMBER: _ClassVar[int]
     key_indices: _containers.RepeatedScalarFieldContainer[int]
     times: _points_pb2.Times
     positions: _points_pb2.Points
     event_times: _points_pb2.Times
     revisions: _containers.RepeatedScalarFieldContainer[int]
-    def __init__(self, key_indices: _Optional[_Iterable[int]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., event_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., revisions: _Optional[_Iterable[int]] = ...) -> None: ...
+    accuracies: _points_pb2.Accuracies
+    def __init__(self, key_indices: _Optional[_Iterable[int]] = ..., times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., positions: _Optional[_Union[_points_pb2.Points, _Mapping]] = ..., event_times: _Optional[_Union[_points_pb2.Times, _Mapping]] = ..., revisions: _Optional[_Iterable[int]] = ..., accuracies: _Optional[_Union[_points_pb2.Accuracies, _Mapping]] = ...) -> None: ...
 
 class HullSnapshot(_message.Message):
     __slots__ = ("vertices", "uid", "vertex_keys")

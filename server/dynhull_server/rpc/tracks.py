@@ -85,4 +85,5 @@ def encode_moves(moves: Moves, encoding: points_pb2.PointEncoding) -> pb.TrackRe
         positions=encode.encode_points(np.ascontiguousarray(moves.points), encoding),
         event_times=encode.encode_times(moves.event_times, encoding) if timed else None,
         revisions=moves.revisions.tolist(),
+        accuracies=encode.encode_accuracies(moves.accuracies, encoding) if moves.accuracies.any() else None,
     )

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from dynhull.arrays import Points
 
-from .records import FOREVER, NO_TIME, Condition, Contents, HullSettings, Times
+from .records import FOREVER, NO_TIME, Accuracies, Condition, Contents, HullSettings, Times
 
 PUT, REMOVE, EXPIRE = range(3)
 NO_KEY = -1
@@ -24,6 +24,7 @@ class Moves:
         times: (n,) when it was committed, in microseconds since 1970; NO_TIME where that is not known.
         points: (n, 2) where it was; NaN from where on it was not in the hull.
         event_times: (n,) the time of the position; NO_TIME for none.
+        accuracies: (n,) how far the position may be from where the key was; 0 for not at all.
     """
 
     rows: npt.NDArray[np.int32]
@@ -31,13 +32,19 @@ class Moves:
     times: Times
     points: Points
     event_times: Times
+    accuracies: Accuracies
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def __getitem__(self, which: slice | npt.NDArray[np.bool_]) -> "Moves":
         return Moves(
-            self.rows[which], self.revisions[which], self.times[which], self.points[which], self.event_times[which]
+            self.rows[which],
+            self.revisions[which],
+            self.times[which],
+            self.points[which],
+            self.event_times[which],
+            self.accuracies[which],
         )
 
 
@@ -51,10 +58,11 @@ def joined(parts: Sequence[Moves]) -> Moves:
         np.concatenate([NO_TIMES, *(part.times for part in parts)]),
         np.concatenate([np.empty((0, 2)), *(part.points for part in parts)]),
         np.concatenate([NO_TIMES, *(part.event_times for part in parts)]),
+        np.concatenate([EXACT, *(part.accuracies for part in parts)]),
     )
 
 
-NO_ROWS, NO_TIMES = np.empty(0, np.int32), np.empty(0, np.int64)
+NO_ROWS, NO_TIMES, EXACT = np.empty(0, np.int32), np.empty(0, np.int64), np.empty(0)
 
 
 @dataclass(slots=True)
@@ -69,6 +77,7 @@ class KeyChanges:
         points: (n, 2) the position put.
         event_times: (n,) its time, NO_TIME for none; of EXPIRE the time up to which keys leave.
         deadlines: (n,) when the key leaves, FOREVER for never.
+        accuracies: (n,) how far the position put may be from where the key was.
         clocks: (n,) the clock of the hull after the revision; NO_TIME for none.
         conditions: by revision, which keys are put, where that is not all.
     """
@@ -80,6 +89,7 @@ class KeyChanges:
     points: Points
     event_times: Times
     deadlines: Times
+    accuracies: Accuracies
     clocks: Times
     conditions: dict[int, Condition]
 
@@ -103,18 +113,22 @@ class Tracker:
         self._points = np.full((keys, 2), np.nan)
         self._times = np.full(keys, NO_TIME)
         self._deadlines = np.full(keys, FOREVER)
+        self._accuracies = np.zeros(keys)
         self._there[rows] = True
         self._points[rows] = contents.points
         if contents.times is not None:
             self._times[rows] = contents.times
         if contents.deadlines is not None:
             self._deadlines[rows] = contents.deadlines
+        if contents.accuracies is not None:
+            self._accuracies[rows] = contents.accuracies
 
     def standing(self, revision: int, time: int) -> Moves:
         """Where the keys are that are there, as if they had been put there at a time."""
         rows = np.flatnonzero(self._there).astype(np.int32)
         count = len(rows)
-        return Moves(rows, np.full(count, revision), np.full(count, time), self._points[rows], self._times[rows])
+        at = np.full(count, revision), np.full(count, time)
+        return Moves(rows, *at, self._points[rows], self._times[rows], self._accuracies[rows])
 
     def moves(self, changes: KeyChanges) -> Moves:
         """Go over batches, and return what they have done."""
@@ -140,6 +154,7 @@ class Tracker:
         of_last = rows[last]
         self._there[of_last] = put[last]
         self._points[of_last], self._times[of_last] = changes.points[last], changes.event_times[last]
+        self._accuracies[of_last] = changes.accuracies[last]
         return _moves(changes, np.flatnonzero(put | before))
 
     def _one_by_one(self, changes: KeyChanges) -> Moves:
@@ -160,6 +175,7 @@ class Tracker:
             elif self._counts(changes, place, row):
                 there[row] = True
                 self._points[row], times[row] = changes.points[place], changes.event_times[place]
+                self._accuracies[row] = changes.accuracies[place]
                 deadlines[row] = changes.deadlines[place]
                 written.append(place)
         return joined([*parts, _moves(changes, written)])
@@ -185,19 +201,19 @@ def _moves(changes: KeyChanges, which: "list[int] | npt.NDArray[np.intp]") -> Mo
     if not len(which):
         return NOTHING
     gone = changes.ops[which] != PUT
-    points, event_times = changes.points[which], changes.event_times[which]
-    points[gone], event_times[gone] = np.nan, NO_TIME
-    return Moves(changes.rows[which], changes.revisions[which], changes.times[which], points, event_times)
+    points, event_times, accuracies = changes.points[which], changes.event_times[which], changes.accuracies[which]
+    points[gone], event_times[gone], accuracies[gone] = np.nan, NO_TIME, 0
+    return Moves(changes.rows[which], changes.revisions[which], changes.times[which], points, event_times, accuracies)
 
 
 def _left(changes: KeyChanges, place: int, rows: npt.NDArray[np.int32]) -> Moves:
     """Keys that have left by time."""
     count = len(rows)
     at = np.full(count, changes.revisions[place]), np.full(count, changes.times[place])
-    return Moves(rows, *at, np.full((count, 2), np.nan), np.full(count, NO_TIME))
+    return Moves(rows, *at, np.full((count, 2), np.nan), np.full(count, NO_TIME), np.zeros(count))
 
 
-NOTHING = Moves(NO_ROWS, NO_TIMES, NO_TIMES, np.empty((0, 2)), NO_TIMES)
+NOTHING = Moves(NO_ROWS, NO_TIMES, NO_TIMES, np.empty((0, 2)), NO_TIMES, EXACT)
 
 
 class Thinning:

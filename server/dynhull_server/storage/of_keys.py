@@ -16,13 +16,14 @@ from .segments.gathered import key_codes
 
 
 def contents_of_keys(contents: Contents, keys: Keys) -> tuple[npt.NDArray[np.int32], Contents]:
-    """Which of some keys are there, and their points, times and deadlines."""
+    """Which of some keys are there, and their points, times, deadlines and accuracies."""
     if contents.keys is None:
         return np.empty(0, np.int32), Contents()
     places = _places(contents.keys, keys)
     chosen = places != NO_KEY
     times, deadlines = _rows(contents.times, chosen), _rows(contents.deadlines, chosen)
-    return places[chosen], Contents(contents.points[chosen], None, times, deadlines)
+    accuracies = None if contents.accuracies is None else contents.accuracies[chosen]
+    return places[chosen], Contents(contents.points[chosen], None, times, deadlines, accuracies=accuracies)
 
 
 def changes_of_keys(columns: SegmentColumns, keys: Keys) -> KeyChanges:
@@ -44,6 +45,7 @@ def changes_of_keys(columns: SegmentColumns, keys: Keys) -> KeyChanges:
         columns.points[chosen],
         columns.event_time[chosen],
         columns.expire_time[chosen],
+        columns.accuracy[chosen],
         columns.clock[chosen],
         {revision: each["condition"] for revision, each in words.items() if "condition" in each},
     )

@@ -48,6 +48,8 @@ KINDS = {
     "recent-keyed": {"max_age": 20.0, "clock": "data", "keyed": "str"},
     "quarantine": {"keyed": "str", "quarantine": Quarantine(max_growth=1.5)},
 }
+# Hulls whose positions have accuracies.
+INEXACT = {"keyed", "globe-keyed", "recent-keyed", "quarantine"}
 START = datetime(2026, 1, 1, tzinfo=UTC)
 XY = np.random.default_rng(7).normal(size=(12, 2))
 
@@ -60,7 +62,7 @@ def write(client, name, rng, second):
     if "keyed" in KINDS[name]:
         keys = rng.permutation(15)[:n].tolist()
         keys = [f"k{key}" for key in keys] if KINDS[name]["keyed"] == "str" else keys
-        client.put(name, keys, xy, times)
+        client.put(name, keys, xy, times, accuracies=np.arange(n) % 3 if name in INEXACT else None)
         if rng.random() < 0.2:
             client.remove(name, keys[:1], missing="count")
     elif times is not None:
@@ -375,8 +377,15 @@ def test_faces_of_a_replay(served):
 
 
 def position_at(track, revision):
-    """Where a key was at a revision, as its track has it."""
-    return track.points[int(np.searchsorted(track.revisions, revision, side="right")) - 1].tolist()
+    """Where a key was at a revision, and how exactly, as its track has it."""
+    row = int(np.searchsorted(track.revisions, revision, side="right")) - 1
+    return [*track.points[row].tolist(), 0.0 if track.accuracies is None else float(track.accuracies[row])]
+
+
+def positions_of(found):
+    """The same of an answer."""
+    accuracies = [0.0] * len(found.positions) if found.accuracies is None else found.accuracies
+    return np.column_stack((found.positions, accuracies)).tolist()
 
 
 @pytest.mark.parametrize("name", [name for name, settings in KINDS.items() if "keyed" in settings])
@@ -389,12 +398,12 @@ def test_a_track_is_where_a_key_was_at_each_revision(served, name):
         tracks = client.track(name, [*keys, *keys[:1]], first, last)
         assert list(tracks) == keys
         for revision in range(first, last + 1):
-            found = client.at(name, revision).positions(keys).positions
-            for key, expected in zip(keys, found.tolist(), strict=True):
+            found = positions_of(client.at(name, revision).positions(keys))
+            for key, expected in zip(keys, found, strict=True):
                 if tracks[key].revisions[0] <= revision:
                     assert repr(position_at(tracks[key], revision)) == repr(expected)
                 else:
-                    assert np.isnan(expected).all()
+                    assert np.isnan(expected[:2]).all()
         begun = seen[name][first][1]
         for times, points in client.track(name, keys, begun, seen[name][last][1], every=1000).values():
             assert len(times) == len(points) <= 2
@@ -403,6 +412,7 @@ def test_a_track_is_where_a_key_was_at_each_revision(served, name):
             repr(position_at(tracks[key], last)) for key in keys
         ]
         assert any(track.event_times is not None for track in whole.values()) == name.startswith("recent")
+        assert any(track.accuracies is not None for track in whole.values()) == (name in INEXACT)
 
 
 def test_faces_of_a_track(served):
@@ -427,15 +437,20 @@ def test_faces_of_a_track(served):
     times = [datetime.fromisoformat(each["time"]) for each in shown]
     assert [round(time.timestamp() * 1e6) for time in times] == tracks["k1"].times.tolist()
     heading, *rows = dynhull("track", "keyed", "k1", *options, "--csv").stdout.splitlines()
-    assert (heading, len(rows)) == ("key,time,x,y,revision,event_time", len(shown))
+    assert (heading, len(rows)) == ("key,time,x,y,revision,event_time,accuracy", len(shown))
+    accuracies = tracks["k1"].accuracies.tolist()
+    assert [each.get("accuracy", 0) for each in shown] == [float(row.split(",")[-1] or 0) for row in rows] == accuracies
     (way,) = json.loads(dynhull("track", "keyed", "k1", *options, "--geojson").stdout)["features"]
     geometry = way["geometry"]
     lines = [geometry["coordinates"]] if geometry["type"] == "LineString" else geometry["coordinates"]
     assert sum(len(line) for line in lines) >= sum(each["position"] is not None for each in shown)
+    said = way["properties"]["accuracies"]
+    assert [*map(len, said if geometry["type"] == "MultiLineString" else [said])] == [*map(len, lines)]
     path = f"/hulls/keyed/tracks?key=k1&key=k2&from=0&to={last}"
     status, body = asyncio.run(streamed(path))
     (first, _) = json.loads(body)["tracks"]
     assert (status, first["revisions"]) == (200, tracks["k1"].revisions.tolist())
+    assert first["accuracies"] == accuracies
     for asked in ({"accept": "application/geo+json"}, {}):
         found = asyncio.run(streamed(path + ("" if asked else "&f=geojson"), **asked))[1]
         assert json.loads(found)["features"][0] == way

@@ -13,6 +13,7 @@ from dynhull_server.engine import entities
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.tracks import require_tracks, tracks
 from dynhull_server.state.batch import KeyedBatch, Write
+from dynhull_server.state.contents.keyed import Found
 from dynhull_server.state.errors import HullNotFoundError, HullUnsuitableError, LimitExceededError
 from dynhull_server.state.records import HullSettings, QuarantineRules, Window
 from dynhull_server.state.tracks import Moves, joined
@@ -68,13 +69,14 @@ class Life:
             deadlines = now + rng.integers(1, 3_000, len(put))  # microseconds: some leave before a later batch
         if self.kind == "quarantine" and number % 10 == 9:
             return KeyedBatch("str", NO_KEYS, NO_POINTS, NO_KEYS, releases=KEYS)
-        return KeyedBatch("str", keys[0], points, keys[1], times, condition, deadlines=deadlines)
+        accuracies = rng.choice([0.0, 0.5, 3.0], len(put))
+        return KeyedBatch("str", keys[0], points, keys[1], times, condition, deadlines=deadlines, accuracies=accuracies)
 
     async def look(self) -> None:
         """Where the keys are, at the last revision."""
         live = self.engine.hulls.get(NAME)
         counts, found = await entities.positions(live, KEYS, 0)
-        self.seen[counts.revision] = found.points
+        self.seen[counts.revision] = np.column_stack((found.points, accuracies_of(found)))
         assert live.committed is not None
         self.times[counts.revision] = live.committed.time
 
@@ -86,12 +88,16 @@ class Life:
         return joined(parts)
 
 
+def accuracies_of(found: Found) -> np.ndarray:
+    return np.zeros(len(NAMES)) if found.accuracies is None else found.accuracies
+
+
 def standing(moves: Moves, revision: int) -> np.ndarray:
-    """Where each key is at a revision, as its track has it."""
-    found = np.full((len(NAMES), 2), np.nan)
-    for row, at, point in zip(moves.rows, moves.revisions, moves.points, strict=True):
+    """Where each key is at a revision, and how exactly, as its track has it."""
+    found = np.full((len(NAMES), 3), (np.nan, np.nan, 0.0))
+    for row, at, point, accuracy in zip(moves.rows, moves.revisions, moves.points, moves.accuracies, strict=True):
         if at <= revision:
-            found[row] = point
+            found[row] = *point, accuracy
     return found
 
 
@@ -141,7 +147,7 @@ def test_a_thinned_track_has_the_last_place_in_each_span(every: int, monkeypatch
                 expected[int(whole.rows[place]), span] = place
             thinned = await life.tracked(first, last, every)
             order = [*range(begun), *sorted(expected.values())]
-            for part in ("rows", "revisions", "times", "points", "event_times"):
+            for part in ("rows", "revisions", "times", "points", "event_times", "accuracies"):
                 assert np.array_equal(getattr(thinned, part), getattr(whole, part)[order], equal_nan=part == "points")
 
     asyncio.run(compare())
