@@ -101,7 +101,7 @@ class Recorder {
     if (this.paused_at == undefined && this.past.moment >= this.recorded) {
       this.paused_at = this.past.moment
       this.leave_past()
-      this.show_from(-Infinity, this.paused_at)
+      this.show_from(0, this.paused_at)  // what is not recorded yet stays as it was played
       this.play()
     }
     this.changed()
