@@ -82,6 +82,15 @@ def add_alarms_to_cluster(draw: random.Random, plan: Plan, names: tuple[str, ...
 def _asked(
     draw: random.Random, plan: Plan, asked: dict[str, int], alarms: tuple[str, ...], hulls: tuple[str, ...]
 ) -> Operation:
+    op = _request(draw, plan, asked, alarms, hulls)
+    if draw.random() < 0.1:
+        op["leave"] = int(draw.expovariate(1 / 3))
+    return op
+
+
+def _request(
+    draw: random.Random, plan: Plan, asked: dict[str, int], alarms: tuple[str, ...], hulls: tuple[str, ...]
+) -> Operation:
     do = draw.choices(list(asked), list(asked.values()))[0]
     name, hull = draw.choice(alarms), draw.choice(hulls)
     op: Operation = {"do": do, "name": name, "rows": draw.choice((1, 1, 200, 5_000))}
@@ -101,8 +110,6 @@ def _asked(
             op |= {"consumer": draw.choice(("x", "x", "y")), "back": draw.choice((None, 0, 0, 1, 3))}
         case _:
             op |= {"back": draw.choice((0, 0, 1, 5, 50)), "most": draw.choice((1, 3, 1_000))}
-    if draw.random() < 0.1:
-        op["leave"] = int(draw.expovariate(1 / 3))
     return op
 
 

@@ -571,6 +571,7 @@ class Client:
                 consumer = await server.acknowledge(name, op["consumer"], sequence, fence.row.uid)
                 self.model.fences.acked(fence.number, consumer, sequence)
             case "unack":
+                self.model.fences.unacked[name].add(op["consumer"])
                 await server.drop_consumer(name, op["consumer"])
             case "take":
                 self.model.asks_alarm(name, op["hull"], None)

@@ -20,6 +20,7 @@ from dynhull_server.state.alarms.rule import AlarmRule
 from dynhull_server.state.alarms.status import AlarmStatus
 from dynhull_server.state.fences.events.block import AppendEvents
 from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, HullArea, PolygonArea
+from dynhull_server.state.fences.model.expected import NOWHERE, OF_ALL, daily
 from dynhull_server.state.fences.model.records import (
     AddFence,
     AlarmStanding,
@@ -81,6 +82,7 @@ class FenceTruth:
         outside: since when expected keys are outside, None if they are inside; those not named have not moved.
         missing: the expected keys that are missing, and their deadlines.
         expecting: since when it expects keys, once that is known.
+        passed: up to when the times of day at which it expects keys have passed; None if it does otherwise.
         restored: whether a backup has brought it back, after which nobody follows which keys are missing.
         known: of an alarm, what is known of each hull that it watches.
         latest: the latest time that its events or what is known have.
@@ -100,6 +102,7 @@ class FenceTruth:
     outside: dict[Key, int | None] = field(default_factory=dict)
     missing: dict[Key, int] = field(default_factory=dict)
     expecting: int | None = None
+    passed: int | None = None
     restored: bool = False
     known: dict[str, Known] = field(default_factory=dict)
     latest: int = NO_TIME
@@ -158,6 +161,7 @@ class FenceModel:
     Attributes:
         alive: the fences there are, by name.
         ever: all fences.
+        unacked: the consumers that callers have asked to delete, by the name of the fence.
         asked: until when callers have asked to mute an alarm for a hull, by its name; None to acknowledge it.
     """
 
@@ -167,6 +171,7 @@ class FenceModel:
         self.ever: dict[int, FenceTruth] = {}
         self._told: dict[tuple[int, int], list[tuple[FenceTruth, int]]] = {}
         self.asked: defaultdict[str, set[tuple[str, int | None]]] = defaultdict(set)
+        self.unacked: defaultdict[str, set[str]] = defaultdict(set)
         self._judge = AlarmJudge(model, self._corners)
 
     def belong_to(self, model: "Model") -> None:
@@ -247,20 +252,73 @@ class FenceModel:
         times = [event.time for event in (*fence.events[-1:], *events)]
         if times != sorted(times):
             raise self._model.finds(f"the times of events of {fence.row.name} go back: {times}")
-        before, others = fence.config, _without_expected(events)
+        before, others, inside = fence.config, _without_expected(events), {key for _, key in fence.inside}
         if isinstance(first, AddFence):
             self._began(fence, changes, others)
         elif isinstance(first, ChangeFence):
             self._replaced(fence, first.row, others)
-        if isinstance(first, AddFence) or expected_of(before) != expected_of(fence.config):
-            fence.outside, fence.missing, fence.expecting = {}, {}, None
-        self._expects(fence, events)
+        renewed = isinstance(first, AddFence) or expected_of(before) != expected_of(fence.config)
+        passed = None if renewed else _passed(changes)
+        if before.expected_by and not fence.restored:
+            self._expects_by(fence, before, events, inside, fence.passed if passed is None else passed)
+        elif not fence.restored:
+            self._expects_within(fence, before, events)
+        if renewed:
+            fence.outside, fence.missing, fence.expecting, fence.passed = {}, {}, None, _passed(changes)
         return events
 
-    def _expects(self, fence: FenceTruth, events: list[FenceEvent]) -> None:
+    def _expects_by(
+        self, fence: FenceTruth, config: FenceConfig, events: list[FenceEvent], inside: set[Key], until: int | None
+    ) -> None:
+        """Whether keys are missing and arrive as they should, by a time of day, in a fence around one hull.
+
+        Up to `until` deadlines have passed then; `inside` are the keys that were.
+        """
+        expected, late = set(config.expected), dict[Key, tuple[int, int]]()
+        whole, waiting = expected <= inside, list[Key]()
+        for event in events:
+            key = event.key
+            if key is None or key not in expected:
+                continue
+            match event.type:
+                case EventType.ENTER:
+                    inside.add(key)
+                    if key in fence.missing:
+                        late[key] = fence.missing.pop(key), event.time
+                case EventType.EXIT:
+                    inside.discard(key)
+                case EventType.ARRIVED:
+                    if late.pop(key, None) != (event.first_time, event.time):
+                        raise self._model.finds(f"{event} of {fence.row.name} arrives without being missing")
+                case EventType.MISSING:
+                    if not waiting:
+                        self._pass_deadlines(fence, config, event.time, missing=True, whole=whole)
+                        waiting, whole = sorted(expected - inside), False
+                    if not waiting or waiting.pop(0) != key:
+                        raise self._model.finds(f"{event} of {fence.row.name} is missing, and not {waiting}")
+                    fence.missing[key] = fence.passed or 0
+            whole |= expected <= inside
+        if late or waiting:
+            raise self._model.finds(f"{late} of {fence.row.name} have not arrived, {waiting} are not missing")
+        if until is not None and fence.passed is not None:
+            self._pass_deadlines(fence, config, until, missing=False, whole=whole)
+        if until != fence.passed:
+            raise self._model.finds(f"of {fence.row.name} deadlines up to {until} have passed, and not {fence.passed}")
+
+    def _pass_deadlines(
+        self, fence: FenceTruth, config: FenceConfig, until: int, *, missing: bool, whole: bool
+    ) -> None:
+        """Deadlines pass, at the last of which keys are `missing`; for the others the fence must have been `whole`."""
+        times, found = daily(config.expected_by), 0
+        while fence.passed is not None and (due := times.after(fence.passed)) <= until:
+            fence.passed, found = due, found + 1
+        if found < missing or (found > missing and not whole):
+            raise self._model.finds(f"{found} deadlines of {fence.row.name} pass up to {until}, {missing=}, {whole=}")
+
+    def _expects_within(self, fence: FenceTruth, config: FenceConfig, events: list[FenceEvent]) -> None:
         """Whether keys are missing and arrive as they should, by an age, in a fence around one hull."""
-        config, late = fence.config, dict[Key, tuple[int, int]]()
-        for event in () if fence.restored else events:
+        late = dict[Key, tuple[int, int]]()
+        for event in events:
             key = event.key
             if key is None or key not in config.expected:
                 continue
@@ -742,6 +800,8 @@ class FenceModel:
         """An acknowledgement was answered."""
         fence = self.ever[number]
         kept = fence.acknowledged.get(consumer.name)
+        if consumer.name in self.unacked[fence.row.name]:  # of one that is made and deleted at once nothing is kept
+            kept = fence.last
         if kept is None or not (sequence or 0) <= consumer.acknowledged <= kept:
             raise self._model.finds(f"{consumer} of {fence.row.name} was answered to {sequence}, kept is {kept}")
 
@@ -754,8 +814,17 @@ class FenceModel:
                 raise self._model.finds(f"inside of {fence.row.name} are {kept}, answered was {found}")
 
     def overdue(self, time: int) -> list[tuple[str, Subject | str]]:
-        """Who should have made its dwell event at a time by the server's clock, or which alarms should be raised."""
-        return self.overdue_alarms(time) + [
+        """Who should have made its dwell event at a time by the server's clock, or which alarms should be raised.
+
+        Or the fences of which a deadline should have passed.
+        """
+        deadlines = [
+            (name, fence.config.expected_by)
+            for name, fence in self.alive.items()
+            if fence.config.expected_by and fence.passed is not None and not fence.restored
+            if daily(fence.config.expected_by).after(fence.passed) <= time
+        ]
+        return [*self.overdue_alarms(time), *deadlines] + [
             (name, subject)
             for name, fence in self.alive.items()
             if fence.config.dwell
@@ -1102,6 +1171,12 @@ def _stored(by_fence: Mapping[int, Sequence[Any]]) -> dict[int, dict[str, Delay 
         for number, changes in by_fence.items()
         if any(isinstance(change, PutDelays) for change in changes)
     }
+
+
+def _passed(changes: Iterable[Any]) -> int | None:
+    """Up to when times of day have passed at which a fence expects keys, as changes store it."""
+    stored = (change.delays.get((NOWHERE, OF_ALL)) for change in changes if isinstance(change, PutDelays))
+    return max((each.since for each in stored if each is not None), default=None)
 
 
 def _of_settings(events: list[FenceEvent] | None) -> bool:

@@ -25,6 +25,14 @@ FENCES = {
 FENCED = {"f": ("hull", "k"), "g": ("prefix", "k"), "h": ("other", "k"), "i": ("hull", "l")}
 # The subjects of fences that ask for certain positions, with all of their settings.
 BY_ACCURACY = ("l",)
+# Lives begin at 01:46:40 UTC on a Sunday, or up to ten seconds later; days pass in some.
+TIMES_OF_DAY = (
+    "01:46:41 UTC",
+    "01:46:45 UTC",
+    "01:46:51 UTC mon-fri,sun",
+    "03:46:50 Europe/Berlin",
+    "02:30 America/New_York mon",
+)
 AREAS = ("a", "k", "kk", "l", "w")
 
 # The names of hulls of points, of hulls with keys or a window, and of fences.
@@ -191,7 +199,10 @@ def _config(draw: random.Random, kind: str, subjects: str) -> dict[str, Any]:
     if kind == "hull" and draw.random() < 0.4:
         keys = draw.sample(range(5), draw.choice((1, 3)))
         config["expected"] = tuple(keys if subjects == "l" else map(str, keys))
-        config["expected_within"] = draw.choice((1, 100_000, 400_000, 2_000_000))
+        if draw.random() < 0.4:
+            config["expected_by"] = draw.choice(TIMES_OF_DAY)
+        else:
+            config["expected_within"] = draw.choice((1, 100_000, 400_000, 2_000_000))
     if subjects in BY_ACCURACY:
         config |= {"by_accuracy": True, "margin": 0.0, "crosses": False}
     if draw.random() < 0.3:
