@@ -99,6 +99,13 @@ class Flat:
         )
 
 
+def disk(x: float, y: float, radius: float, center: Center | None) -> Points:
+    """The border of the disk around a place as it is shown, clockwise; no places without a radius."""
+    if not radius:
+        return np.empty((0, 2))
+    return shown(circle(Circle(x, y, radius), on_globe=center is not None)[::-1], center)
+
+
 def circle(area: Circle, *, on_globe: bool) -> Points:
     """A circle; on the globe its radius is in metres. For the eye: the server decides who is inside."""
     angles = np.linspace(0, 2 * np.pi, CORNERS_OF_CIRCLE, endpoint=False)

@@ -86,5 +86,6 @@ def describe_key(key: str, feed: HullFeed, sighting: Sighting) -> list[str]:
     if not feed.keyed:
         return [f"The points of {feed.name} have no keys", ""]
     sentence = SENTENCES[sighting.state].format(key=key, hull=feed.name)
-    at = f"{position_text(sighting.x, sighting.y, feed.center)}, revision {sighting.revision:,}"
+    within = f" ± {sighting.accuracy:.8g}{'' if feed.center is None else ' m'}" if sighting.accuracy else ""
+    at = f"{position_text(sighting.x, sighting.y, feed.center)}{within}, revision {sighting.revision:,}"
     return [sentence, at if sighting.seen else ""]

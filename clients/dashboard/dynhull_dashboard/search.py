@@ -6,6 +6,8 @@ import time
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 
+import numpy as np
+
 from dynhull_client import AsyncHullClient, HullCopy
 
 from .degrees import shown_place
@@ -35,12 +37,14 @@ class Sighting:
         x: its coordinate; of a key that has left, the last one; NaN for a key that was never seen.
         y: likewise.
         revision: the revision of the hull with that position.
+        accuracy: how far the position may be from where the key really is, in metres on the globe; 0 for not at all.
     """
 
     state: State
     x: float = math.nan
     y: float = math.nan
     revision: int = 0
+    accuracy: float = 0.0
 
     @property
     def seen(self) -> bool:
@@ -105,13 +109,15 @@ class KeySearch:
         located = await self._client.locate(self._name, keys=keys, min_revision=answer.revision)
         corners = set(copy.vertex_keys or ())
         found = {}
-        for key, position, present, side in zip(keys, answer.positions, answer.present, located.sides, strict=True):
+        accuracies = np.zeros(len(keys)) if answer.accuracies is None else answer.accuracies
+        columns = answer.positions, answer.present, located.sides, accuracies.tolist()
+        for key, position, present, side, accuracy in zip(keys, *columns, strict=True):
             if not present or side < 0:
                 continue
             is_corner = key in corners or bool((copy.vertices == position).all(axis=1).any())
             state = State.INSIDE if side else State.VERTEX if is_corner else State.BOUNDARY
             x, y = shown_place(float(position[0]), float(position[1]), copy.center)
-            found[key] = Sighting(state, x, y, answer.revision)
+            found[key] = Sighting(state, x, y, answer.revision, accuracy)
         return found
 
     def _lost(self, text: str) -> Sighting:

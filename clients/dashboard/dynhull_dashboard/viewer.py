@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .advice import about_fences, about_metrics, about_picture, about_server
 from .alarm_rows import alarm_rows, raised_count
 from .cards import key, past_table, table
+from .degrees import disk
 from .describe import describe, describe_key
 from .feed import HullFeed
 from .fence_picks import FencePicks
@@ -272,7 +273,11 @@ class Viewer:
         sought = self._sought
         sightings = [(shown.feed.search.find(sought), shown) for shown in self._shown.values()] if sought else []
         words = [describe_key(sought, shown.feed, sighting) for sighting, shown in sightings]
-        places = [[each.x, each.y, shown.look.colour] for each, shown in sightings if each.present]
+        places = [
+            [each.x, each.y, shown.look.colour, disk(each.x, each.y, each.accuracy, shown.feed.center).tolist()]
+            for each, shown in sightings
+            if each.present
+        ]
         # With the first drawing, so that the field for keys does not move the picture later.
         keyed = any(shown.feed.followed and shown.feed.keyed for shown in self._shown.values())
         return {"sought": sought, "found": words, "places": places, "keyed": keyed}

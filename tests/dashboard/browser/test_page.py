@@ -195,9 +195,11 @@ def test_a_key_is_found_and_followed(browser: Browser, url: str, client: HullCli
             ]
         )
         wait_for_ring(page, [[4, 0]])
-        client.put(fleet, ["corner", "UA17"], [[4, 0], [1, 1]])
-        expect(found.first).to_have_text(f"UA17 is inside {fleet}: x 1, y 1, revision 2")
+        client.put(fleet, ["corner", "UA17"], [[4, 0], [1, 1]], accuracies=[0, 0.5])
+        expect(found.first).to_have_text(f"UA17 is inside {fleet}: x 1, y 1 ± 0.5, revision 2")
         wait_for_ring(page, [[1, 1]])
+        away = page.evaluate("picture.found()[0].disk.map(([x, y]) => Math.hypot(x - 1, y - 1))")
+        assert away == pytest.approx([0.5] * len(away))
         client.put(fleet, ["UA17"], [[2, 0]])
         expect(found.first).to_have_text(
             f"UA17 is on the boundary of {fleet}, between two vertices: x 2, y 0, revision 3"
@@ -205,6 +207,7 @@ def test_a_key_is_found_and_followed(browser: Browser, url: str, client: HullCli
         client.remove(fleet, ["UA17"])
         expect(found.first).to_have_text(f"UA17 has left {fleet}. Last position: x 2, y 0, revision 3")
         wait_for_ring(page, [])
+        assert not page.evaluate("picture.places.length")
         field.fill("<b>nobody")
         field.press("Enter")
         expect(found.first).to_have_text(f"{fleet} has no key <b>nobody")
@@ -222,7 +225,7 @@ def test_keys_are_looked_for_where_there_are_some(
     browser: Browser, url: str, client: HullClient, hull: str, name: str
 ) -> None:
     client.create_hull(f"{name}-keyed", keyed="str", geographic=True)
-    client.put(f"{name}-keyed", ["a"], [[13.123456789, 52.123456789]])
+    client.put(f"{name}-keyed", ["a"], [[13.123456789, 52.123456789]], accuracies=[1234.5])
     with opened(browser, url, hull) as page:
         wait_for_vertices(page, hull, SQUARE)
         field = page.get_by_label("Find a key")
@@ -231,7 +234,11 @@ def test_keys_are_looked_for_where_there_are_some(
         field.fill("a")
         field.press("Enter")
         found = page.get_by_role("list", name="Where the key is").locator("li")
-        expect(found.nth(1)).to_contain_text("longitude 13.123457, latitude 52.123457, revision 1")
+        expect(found.nth(1)).to_contain_text("longitude 13.123457, latitude 52.123457 ± 1234.5 m, revision 1")
+        north = page.evaluate("picture.found()[0].disk.map(([, y]) => y)")
+        assert max(north) - min(north) == pytest.approx(2 * 1234.5 / 111_195, rel=1e-4)
+        disk = "(disk => ({type: 'Polygon', coordinates: [[...disk, disk[0]]]}))(picture.found()[0].disk)"
+        assert page.evaluate(f"d3.geoArea({disk})") < 1, "it is the rest of the globe"
 
 
 def test_the_picture_stands_still_while_hulls_move_in_it(browser: Browser, url: str) -> None:

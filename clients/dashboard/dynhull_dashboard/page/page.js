@@ -117,7 +117,7 @@ function update({kind: _, ...changes}) {
     if (changes[name] != undefined) write(selector, changes[name])
   find(".page").classList.toggle("keyed", Boolean(state.keyed || state.sought))
   if (changes.places || changes.sought != undefined) {
-    picture.places = state.places.map(([x, y, colour]) => [x, y, lit(colour)])
+    picture.places = state.places.map(([x, y, colour, disk]) => [x, y, lit(colour), disk])
     picture.sought = state.sought
     picture.draw_soon()
   }

@@ -1,6 +1,7 @@
 // @ts-nocheck
 // The names beside vertices, subjects of fences and points: as many as fit without overlap. Hovering shows the others.
 import { FOUND_LABEL_FONT, LABEL_FONT, LABEL_GAP, LABEL_HEIGHT, is_inside, label_box, square_box, text_width } from "./boxes.js"
+import { AREA_ALPHA, MARGIN_DASH } from "./fences.js"
 export const LABEL_OFFSET = 8, RING_RADIUS = 13, WIDE_RING_RADIUS = 17, RING_DASH = [5, 3]
 export const MOST_HALOS = 100  // of more names, drawing takes too long
 export class Labels {
@@ -68,6 +69,23 @@ export function place_rings(picture) {
     taken.add(square_box(across, down, ring.radius))
     return [{across, down, box, ...ring}]
   })
+}
+// Where the key that the viewer looks for may really be.
+export function draw_accuracy(canvas, picture) {
+  if (!picture.sought) return
+  for (const {colour, disk} of picture.found()) {
+    if (!disk?.length) continue
+    canvas.beginPath()
+    picture.view.polygon(canvas, [disk])
+    canvas.fillStyle = canvas.strokeStyle = colour
+    canvas.globalAlpha = AREA_ALPHA
+    canvas.fill("evenodd")
+    canvas.globalAlpha = 1
+    canvas.lineWidth = 1
+    canvas.setLineDash(MARGIN_DASH)
+    canvas.stroke()
+    canvas.setLineDash([])
+  }
 }
 export function draw_rings(canvas, {rings, colours}) {
   canvas.font = FOUND_LABEL_FONT

@@ -6,13 +6,13 @@ import { Boxes, FONT, square_box } from "./boxes.js"
 import { Coasts } from "./coasts.js"
 import { Fence, MARK_RADIUS, draw_fence_names, draw_fences, draw_marks } from "./fences.js"
 import { Hull, draw_layers, draw_points, draw_surfaces, draw_vertices } from "./hulls.js"
-import { Labels, draw_rings, place_rings } from "./labels.js"
+import { Labels, draw_accuracy, draw_rings, place_rings } from "./labels.js"
 import { Many, draw_many } from "./many.js"
 import { Tiles } from "./tiles.js"
 import { Trails } from "./trails.js"
 import { EARTH_RADIUS, GlobeView, PlaneView, RADIAN } from "./views.js"
 export const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
-  draw_rings]
+  draw_accuracy, draw_rings]
 export const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
 export const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
 export function draw_trails(canvas, picture) {
@@ -94,7 +94,7 @@ export class Picture {
   }
   // Where the key is that the viewer looks for: as the server says, or as it was drawn at an earlier moment.
   found() {
-    if (this.live) return this.places.map(([x, y, colour]) => ({place: [x, y], colour}))
+    if (this.live) return this.places.map(([x, y, colour, disk]) => ({place: [x, y], colour, disk}))
     const drawn = [...this.hulls.values()].map(hull => ({place: hull.place_of(this.sought), colour: hull.look.colour, hull}))
     return drawn.filter(({place}) => place)
   }
