@@ -8,6 +8,8 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from datetime import UTC, datetime, timedelta
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,7 @@ from postgresql import PostgreSQL, query
 from server_process import Server, server_process
 from steady_writer import SteadyWriter
 
-from dynhull_client import HullClient, Quarantine
+from dynhull_client import AlarmEvent, HullClient, Quarantine
 from dynhull_cluster.postgres.ownership import LEASE
 
 POINTS = np.random.default_rng(1).normal(size=(5_000, 2))
@@ -306,4 +308,62 @@ def test_all_kinds_of_hulls_are_followed(mortal_pair: Pair) -> None:
         assert {*names, pair.hull} <= there
         assert "gone" not in there
         write(client, turn)
+    pair.check()
+
+
+SMALL, LARGE = [[0, 1]], [[0, 6]]  # where the third point is: areas of 2 and 12
+SOON = timedelta(seconds=2)
+
+
+def events(client: HullClient, alarm: str) -> list[AlarmEvent]:
+    last = client.get_alarm(alarm).last_sequence
+    with client.watch_alarm(alarm, after=0) as stream:
+        return list(islice(stream, last))
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_alarms_are_followed(mortal_pair: Pair) -> None:
+    """Who is raised, who waits and who takes care: what the target has read, and what has come since."""
+    pair, hulls = mortal_pair, [f"alarmed/{each}" for each in "abc"]
+    with HullClient(pair.servers[0].address, retries=1000) as client:
+
+        def statuses() -> list[Any]:
+            return [client.get_alarm(alarm).statuses for alarm in ("large", "later")]
+
+        for hull in hulls:
+            client.create_hull(hull, keyed="str")
+            client.put(hull, [*"xyz"], [[0, 0], [4, 0], *SMALL])
+        client.create_alarm("large", prefix="alarmed/", when="area > 10", clear="area < 9")
+        client.create_alarm("later", prefix="alarmed/", when="area > 10", for_="1h")
+        client.create_alarm("soon", prefix="alarmed/", when="area > 10", for_=SOON)
+        for hull in hulls[:2]:
+            client.put(hull, ["z"], LARGE)
+        client.acknowledge_alarm("large", hulls[0])
+        client.mute_alarm("large", hulls[1], datetime.now(UTC) + timedelta(hours=1))
+        client.ack_alarm("large", "pager", 1)
+        source, target = pair.owner(), pair.other()
+        with standing_until_ready(pair, source, target):
+            assert pair.owner() == source
+        client.put(hulls[0], ["z"], SMALL)
+        client.put(hulls[2], ["z"], LARGE)
+        client.acknowledge_alarm("large", hulls[2])
+        client.put(hulls[0], ["z"], LARGE)
+        wait_until(lambda: pair.owner() == target)
+        large, later = before = statuses()
+        assert [each.acknowledged is not None for each in large] == [False, False, True]
+        assert [each.muted_until is not None for each in large] == [False, True, False]
+        assert [each.since is not None and not each.raised for each in later] == [True] * 3
+        epoch = pair.epoch()
+        os.kill(pair.process(target), signal.SIGKILL)
+        wait_until(lambda: pair.epoch() > epoch)
+        assert statuses() == before
+        assert [each.acknowledged for each in client.get_alarm("large").consumers] == [1]
+        wait_until(lambda: client.get_alarm("soon").raised == 3)
+        made = [(event.sequence, event.type, event.hull) for event in events(client, "large")]
+        types = ["raised", "raised", "cleared", "raised", "raised"]
+        order = [hulls[0], hulls[1], hulls[0], hulls[2], hulls[0]]
+        assert made == list(zip(range(1, 6), types, order, strict=True))
+        for hull, since in zip(hulls, (each.since for each in later), strict=True):
+            last = [event for event in events(client, "soon") if event.hull == hull][-1]
+            assert (last.type, last.cause_time, last.time) == ("raised", since, since + SOON)
     pair.check()
