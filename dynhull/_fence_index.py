@@ -323,7 +323,8 @@ class FenceIndex:
 
         Raises:
             KeyError: there is no such fence.
-            ValueError: a number is not finite, or an error is negative; or the fence was set with `without_self`.
+            ValueError: a number is not finite, or an error is negative; the fence was set with `without_self`; or the
+                index has a `frame`.
 
         >>> import dynhull
         >>> fences = dynhull.FenceIndex(dynhull.KeyedHull())
@@ -331,6 +332,8 @@ class FenceIndex:
         >>> fences.clear(7, [[3, 4], [3, 4], [9, 12], [9, 12]], [5, 4.5, 5, 4.5]).tolist()
         [False, True, False, True]
         """
+        if self._on_globe:
+            raise ValueError("clear is for the plane: the index has a frame")
         points, radii = as_points(xy, "xy"), np.asarray(errors, np.float64)
         if radii.shape != (len(points),):
             raise ValueError(f"errors have the shape {radii.shape}: must be ({len(points)},), one for each point")
