@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -252,6 +253,43 @@ def test_questions_that_no_shard_can_answer_are_refused(client: HullClient, name
         with pytest.raises(HullUnsuitableError, match=words):
             ask()
     assert client.get_hull(divided).revision == 1
+
+
+def test_the_feed_of_a_prefix_names_what_it_leaves_out_and_goes_on(client: HullClient, name: str) -> None:
+    whole, divided = f"{name}/whole", f"{name}/divided"
+    client.create_hull(whole)
+    client.create_hull(divided, shards=2)
+
+    def write(x: int) -> None:
+        for each in (divided, whole):
+            client.apply(each, insert=[[x, x]])
+
+    write(1)
+    with client.feed(prefix=f"{name}/", after=0) as feed:
+        told = (each for each in feed if each.type in ("batch", "lost"))
+        assert sorted((each.type, each.hull, each.revision) for each in islice(told, 2)) == [
+            ("batch", whole, 1),
+            ("lost", divided, 1),
+        ]
+        write(2)
+        found = sorted(islice(told, 2), key=lambda each: each.type)
+    assert [(each.type, each.hull, each.revision) for each in found] == [("batch", whole, 2), ("lost", divided, 2)]
+    assert (found[1].first, found[1].last) == (2, 2)
+    with client.feed(prefix=f"{name}/", after=found[0].after) as feed:
+        client.apply(whole, insert=[[3, 3]])
+        batch = next(each for each in feed if each.type == "batch")
+        assert (batch.hull, batch.revision) == (whole, 3)
+    with pytest.raises(HullUnsuitableError, match="is divided among shards, and has no feed"):
+        next(iter(client.feed(divided)))
+
+
+def test_of_a_hull_over_shards_only_the_present_can_be_read(client: HullClient, name: str) -> None:
+    client.create_hull(name, shards=2)
+    for x in range(3):
+        client.apply(name, insert=[[x, x]])
+    found = client.history(name)
+    assert (found.first_revision, found.last_revision) == (3, 3)
+    assert found.first_time == found.last_time is not None
 
 
 # Faults

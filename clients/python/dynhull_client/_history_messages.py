@@ -34,7 +34,7 @@ class History:
     """What is there of the past of a hull.
 
     Attributes:
-        first_revision: the oldest revision that can be read.
+        first_revision: the oldest revision that can be read; of a hull over shards the newest one.
         first_time: the time of its commit; None where an early version of the server did not store it.
         last_revision: the newest revision.
         last_time: the time of its commit; None as before.

@@ -130,8 +130,10 @@ class HullFeeds:
         return oldest.revision, oldest.revision > 0
 
     async def next(self, hull: LiveHull, after: int) -> FeedPart:
-        """What follows a revision that the hull has passed."""
+        """What follows a revision that the hull has passed. Of a divided hull nothing is kept that can be sent."""
         newest = hull.counts.revision
+        if isinstance(hull, DividedHull):
+            return FeedPart(newest, lost=(after + 1, newest))
         try:
             records: list[Record] = await self._ask(hull, partial(_batches, self._past, after, newest))
         except NotStoredError as error:

@@ -118,7 +118,6 @@ class PrefixFeed:
 
         Raises:
             PositionForgottenError: the standing is of other data.
-            HullUnsuitableError: a hull has no feed.
             NotStoredError: the storage cannot be read.
         """
         with self._roster.following() as key:
@@ -181,7 +180,6 @@ class PrefixFeed:
     def _source(self, name: str) -> _Source:
         """The hull of a name, as it is followed; raises HullNotFoundError."""
         live = self._get(name)
-        self._feeds.require_fed(live)
         known = self._sources.get(name)
         if known is None or known.live.number != live.number:
             if known is not None:

@@ -217,6 +217,8 @@ class Hulls:
             raise HullNotFoundError(name) from None
         except UNREADABLE as error:
             raise NotStoredError(words_for_callers(error)) from error
+        if hull.divided:  # only its present can be read
+            found = StoredHistory(found.last, found.last)
         return self._live_hull(hull), found
 
     async def apply(self, write: Write, *, create: bool) -> Applied:
