@@ -1,13 +1,15 @@
 """Hulls as they were: rebuilt from a stored state and the batches after it, in short steps beside the writes."""
 
 import asyncio
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractContextManager, asynccontextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, TypeVar
 from weakref import WeakValueDictionary
+
+from dynhull.arrays import Points
 
 from ..state.core import SMALL
 from ..state.errors import (
@@ -38,6 +40,8 @@ Outcome = Literal["anew", "kept", "unreadable"]
 # Holds a place of those who may rebuild at the same time.
 Place = Callable[[], AbstractContextManager[None]]
 
+# What is applied in one step for who wants the vertices after each batch: rows, and the bytes of the vertices.
+OUTLINED_ROWS, OUTLINED_BYTES = 2**15, 2**20
 # Rebuilt hulls that are kept for further reads, and the batches that are always applied to one rather than begin anew.
 MOST_KEPT, NEAR = 4, 1024
 
@@ -59,6 +63,23 @@ class _Rebuilt:
     rows: int
     erasures: tuple[Erasure, ...]
     round: int
+
+
+@dataclass(frozen=True, slots=True)
+class Outlined:
+    """A hull at one revision, as far as its vertices tell.
+
+    Attributes:
+        counts: its counts.
+        committed: the commit; None where it is not known.
+        vertices: the vertices.
+        time: the time of the commit, or of the one before where it is not known; 0 for none.
+    """
+
+    counts: Counts
+    committed: CommitStamp | None
+    vertices: Points
+    time: int
 
 
 class _ErasedMeanwhileError(Exception):
@@ -163,17 +184,51 @@ class PastHulls:
             RevisionForgottenError: they are not kept any more.
             NotStoredError: they cannot be read at present, or do not fit the state, since keys were erased meanwhile.
         """
+        found: list[Record] = await self._onwards(live, after, partial(self._read, live, after, until, erasures))
+        return found
 
-        def read() -> list[Record]:
-            records = self._past.batches(live.number, after, until)
-            if erasures is not None and self._past.erasures(live.number) != erasures:
-                raise _ErasedMeanwhileError
-            return records
+    def _read(self, live: LiveHull, after: int, until: int, erasures: tuple[Erasure, ...] | None) -> list[Record]:
+        records = self._past.batches(live.number, after, until)
+        if erasures is not None and self._past.erasures(live.number) != erasures:
+            raise NotStoredError("keys were erased from the past meanwhile: begin again")
+        return records
 
-        try:
-            found: list[Record] = await self._onwards(live, after, read)
-        except _ErasedMeanwhileError:
-            raise NotStoredError("keys were erased from the past meanwhile: begin again") from None
+    async def outlined(
+        self, live: LiveHull, state: HullState, ahead: deque[Record], until: int, erasures: tuple[Erasure, ...]
+    ) -> list[Outlined]:
+        """Apply the next batches to a state that the caller has for himself, with the vertices after each.
+
+        As many as take some milliseconds, none after revision `until`. Those in `ahead` come first, which gets others
+        that have been read. Raises the errors of `batches` if there are none.
+        """
+        now = self._driver.machine.clock.monotonic()
+
+        def work() -> list[Outlined]:
+            self._require_room(state.counts.points)
+            found: list[Outlined] = []
+            rows, size = 0, 0
+            while rows < OUTLINED_ROWS and size < OUTLINED_BYTES and (ahead or state.counts.revision < until):
+                if not ahead:
+                    try:
+                        ahead.extend(self._read(live, state.counts.revision, until, erasures))
+                    except Exception:
+                        if found:  # these come first
+                            break
+                        raise
+                record, committed = ahead.popleft(), state.committed
+                state.catch_up([record], now)
+                if found and state.counts.points > self._max_rows:
+                    break
+                self._require_room(state.counts.points)
+                before, vertices = state.known_vertices, state.vertices()
+                committed = record.committed or committed
+                time = 0 if committed is None else committed.time
+                found.append(Outlined(state.counts, state.committed, vertices, time))
+                rows += 1 + len(record.rows)
+                size += 0 if vertices is before else vertices.nbytes
+            return found
+
+        found: list[Outlined] = await self._onwards(live, state.counts.revision, work)
         return found
 
     async def tracker(self, live: LiveHull, keys: Keys, revision: int) -> Tracker:

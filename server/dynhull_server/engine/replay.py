@@ -1,8 +1,8 @@
 """Playing the past of a hull: it goes from revision to revision, with the events of a watch.
 
 The reader has a hull of its own, which is rebuilt once, at the beginning, and then takes the batches as they are read.
-So nothing is held for a reader that is slow: it gets one event for several revisions or, where it sets the pace, the
-batches are read later.
+So little is held for a reader that is slow: it gets one event for several revisions or, where it sets the pace, the
+batches are read later, some milliseconds of them at a time.
 """
 
 import asyncio
@@ -11,6 +11,8 @@ from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
+
+from dynhull.arrays import Points
 
 from ..state.core import SMALL
 from ..state.fences.model.fence import Fence
@@ -21,9 +23,9 @@ from ..storage.past import Erasure
 from .driver import Driver
 from .fences import Fences
 from .live_hull import LiveHull
-from .past import PastHulls
+from .past import Outlined, PastHulls
 from .recalls import Recalls
-from .views import Event, Progress, View
+from .views import Event, Progress, VerticesView, View
 
 T = TypeVar("T")
 
@@ -93,29 +95,45 @@ class ReplayedHull(LiveHull):
         self._erasures = erasures
         self._last = last
         self._ahead: deque[Record] = deque()
+        # Where only vertices are asked for, the state is ahead of them: these are here, and those that follow.
+        self._at: Outlined | None = None
+        self._outlines: deque[Outlined] = deque()
 
     @property
     def counts(self) -> Counts:
         """The counts at the revision that it has come to."""
-        return self._state.counts
+        return self._state.counts if self._at is None else self._at.counts
 
     @property
     def committed(self) -> CommitStamp | None:
         """The commit of that revision; None where it is not known."""
-        return self._state.committed
+        return self._state.committed if self._at is None else self._at.committed
 
     @property
     def vertex_count(self) -> int:
         """The number of its vertices."""
-        return self._state.vertex_count
+        return self._state.vertex_count if self._at is None else len(self._at.vertices)
 
     def erased_at(self, revision: int) -> bool:
         """Whether it may lack keys at a revision that were erased from its past."""
         return any(each.concerns(revision) for each in self._erasures)
 
+    async def outline_only(self) -> None:
+        """Be asked for vertices alone from now on: several batches are applied in one step, each with its own."""
+        counts, vertices = await self.vertices()
+        self._at = Outlined(counts, self.committed, vertices, 0)
+
+    async def vertices(self, min_revision: int = 0, layer: int = 1) -> tuple[Counts, Points]:
+        """The vertices, or those of another convex layer; the same array object while they have not changed."""
+        if self._at is None:
+            return await super().vertices(min_revision, layer)
+        await self.reached(min_revision)
+        return self._at.counts, self._at.vertices
+
     async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
         """Call `function` with the state at that revision."""
         await self.reached(min_revision)
+        assert self._at is None, "only vertices are asked for"
         work = partial(function, self._state)
         return self.counts, work() if rows <= SMALL else await self._driver.aside(work)
 
@@ -132,6 +150,11 @@ class ReplayedHull(LiveHull):
             RevisionForgottenError, NotStoredError: the next revisions are not kept any more, or cannot be read.
         """
         await self.reached(0)
+        if self._at is not None:
+            if not self._outlines and self._at.counts.revision < self._last:
+                arguments = self._live, self._state, self._ahead, self._last, self._erasures
+                self._outlines.extend(await self._pasts.outlined(*arguments))
+            return self._outlines[0].time if self._outlines else None
         if not self._ahead:
             if self.counts.revision >= self._last:
                 return None
@@ -144,6 +167,9 @@ class ReplayedHull(LiveHull):
 
         It is due.
         """
+        if self._at is not None:
+            self._at = self._outlines.popleft()
+            return
         records = [self._ahead.popleft()]
         while until is not None and self._ahead and self._time_of(self._ahead[0]) <= until:
             records.append(self._ahead.popleft())
@@ -182,6 +208,8 @@ async def replay(
     loop = asyncio.get_running_loop()
     event = await view.first(0)
     center = event.counts.center
+    if isinstance(view, VerticesView) and view.outline_only and not pace.combines:
+        await hull.outline_only()
     begun = sent = loop.time()
     if not resumed:
         yield event

@@ -105,6 +105,11 @@ class VerticesView:
         self._held = np.empty((0, 2))
         self._held_keys: VertexKeys | None = None
 
+    @property
+    def outline_only(self) -> bool:
+        """Whether it reads nothing but the vertices of the hull itself."""
+        return not self._with_keys and self._layer == 1
+
     async def _look(self, min_revision: int = 0) -> tuple[Counts, Points, VertexKeys | None]:
         if self._with_keys:
             return await self._hull.named_vertices(min_revision, self._layer)

@@ -122,6 +122,11 @@ class HullState:
         """The number of vertices when they were last read."""
         return len(self._vertices)
 
+    @property
+    def known_vertices(self) -> Points:
+        """The vertices when they were last read."""
+        return self._vertices
+
     # Changes
 
     def catch_up(self, records: Sequence[Record], now: float) -> None:

@@ -201,6 +201,6 @@ def test_a_hull_that_grows_beyond_the_limit_ends_it(monkeypatch: pytest.MonkeyPa
             hull = await engine.hulls.replayed(engine.hulls.get(NAME), 1, BATCHES)
             with pytest.raises(LimitExceededError, match="max_past_rows"):
                 assert [event async for event in events_of(hull, AT_ONCE)]
-            assert hull.counts.points == 8
+            assert hull.counts.points == 7
 
     asyncio.run(life())
