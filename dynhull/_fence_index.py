@@ -381,6 +381,7 @@ class FenceIndex:
         True
         >>> for fences in before, after:
         ...     fences.set_circle(7, 0, 0, 5)
+        ...     _ = fences.take()  # from now on the van is known
         >>> yard.remove("van"), road.put("van", 2, 2)
         (True, True)
         >>> after.carry(before, ["van"]).tolist()
