@@ -7,6 +7,7 @@ long enough, and it is cleared by a revision that meets the other condition, or 
 
 from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
+from functools import lru_cache
 from itertools import combinations
 from math import hypot, inf, isclose, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,6 +32,8 @@ BATCH = Cause.MOVED | Cause.APPEARED
 ROUNDED = 1e-12
 MICROSECONDS = 10**6
 MOST_KEYS = 100
+# Outlines, or pairs of them, whose measures are remembered: each is asked for again at every look.
+OUTLINES = 4096
 
 At = Mapping[str, int]
 
@@ -78,6 +81,7 @@ def _double_area(corners: tuple[Point, ...]) -> int:
     return sum(a[0] * b[1] - a[1] * b[0] for a, b in edges(corners)) if len(corners) > 2 else 0
 
 
+@lru_cache(OUTLINES)
 def _square_of_width(corners: tuple[Point, ...]) -> Fraction:
     if len(corners) < 3:
         return Fraction(0)
@@ -85,6 +89,7 @@ def _square_of_width(corners: tuple[Point, ...]) -> Fraction:
     return min(Fraction(height**2, base) for height, base in heights)
 
 
+@lru_cache(OUTLINES)
 def _square_of_distance(one: tuple[Point, ...], other: tuple[Point, ...]) -> Fraction:
     if not apart(one, other, 0):
         return Fraction(0)

@@ -32,6 +32,10 @@ PATIENT = 0.7
 ROUND = 1.1
 JUMPS = (-3600.0, -2.0, 2.0, 3600.0)
 
+# The share of the plans with segments of many batches in which a hull is written to for longer than it keeps its past.
+BEYOND_ITS_AGE = 0.1
+AGE = 3_000_000
+
 # The share of the plans without backups in which the past is in an object store.
 IN_STORE = 0.3
 
@@ -62,6 +66,9 @@ def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
             for _ in range(draw.randint(0, 3)):
                 client.insert(draw.randint(0, len(client)), _of_past(draw, draw.choice(names), files=files))
         life["clients"].append(_written_until_filed(draw, draw.choice(names), files=files))
+    aged = random.Random(f"aged {plan['seed']}")  # the other plans stay as they were
+    if files and plan["segment_rows"] is None and aged.random() < BEYOND_ITS_AGE:
+        aged.choice(plan["lives"])["clients"].append(_written_beyond_its_age(aged.choice(names)))
     if files and draw.random() < 0.6:
         plan["faults"] += [_fault(draw, in_store=plan["store"]) for _ in range(draw.choice((1, 1, 2, 3)))]
 
@@ -72,8 +79,7 @@ def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list
     if name == "w":
         create["window"] = {"max_points": 2}
     scene = [create | _kept(draw) if files else create]
-    write: Operation = {"do": "write", "name": name, "create": False, "numbered": False, "rows": 1}
-    put = write | {"do": "put", "removes": [], "time": 0}
+    write, put = _writes(name)
     for _ in range(draw.randint(2, 6)):
         for _ in range(draw.randint(1, 4)):
             if name not in TIMED:
@@ -86,6 +92,21 @@ def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list
             scene.append({"do": "rest", "name": name, "seconds": draw.choice((0.3, ROUND, ROUND, 2 * ROUND))})
         scene += [_of_past(draw, name, files=files) for _ in range(draw.choice((0, 1, 2)))]
     return scene
+
+
+def _written_beyond_its_age(name: str) -> list[Operation]:
+    """A hull is written to until its first segments are too old, each for a while only in part."""
+    write, put = _writes(name)
+    one = put | {"keys": [0]} if name in TIMED else write
+    rests: list[Operation] = [{"do": "rest", "name": name, "seconds": seconds} for seconds in (0.4, 0.7)]
+    set_age: Operation = {"do": "keep_past", "name": name, "at": 0.0, "history": AGE, "history_bytes": 0}
+    return [one | {"create": True}, set_age, *[one, rests[0], one, rests[1]] * 7]
+
+
+def _writes(name: str) -> tuple[Operation, Operation]:
+    """A batch of points, and one of keys, which names them yet."""
+    write: Operation = {"do": "write", "name": name, "create": False, "numbered": False, "rows": 1}
+    return write, write | {"do": "put", "removes": [], "time": 0}
 
 
 def _of_past(draw: random.Random, name: str, *, files: bool) -> Operation:
