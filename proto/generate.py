@@ -1,4 +1,4 @@
-"""Generate the Python package dynhull_proto from the .proto files: `generate.py`, or `generate.py --check`.
+"""Generate dynhull_proto and descriptors from the .proto files: `generate.py`, or `generate.py --check`.
 
 The counts of batches are described in dynhull_surface, and come from there into the .proto files first.
 """
@@ -10,6 +10,7 @@ import tempfile
 from importlib import resources
 from pathlib import Path
 
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from grpc_tools import protoc
 
 from dynhull_surface.counts import COUNTS
@@ -17,6 +18,8 @@ from dynhull_surface.counts import COUNTS
 PROTO = Path(__file__).parent
 CONTRACT = PROTO / "dynhull"
 PACKAGE = PROTO / "dynhull_proto"
+# For clients that make their messages of descriptors.
+DESCRIPTORS = PROTO.parent / "clients" / "typescript" / "src" / "grpc" / "contract.binpb"
 # Of a message, between a line that ends so and the other.
 FIELDS = re.compile(r"(`make proto`.*\n\n)(?:.*\n)*?(  // End of counts)")
 COUNT_FIELDS = {
@@ -79,6 +82,25 @@ def services_of(module: str, services: list[str]) -> str:
     return imports + surface + "".join(SERVICE.format(service, module) for service in services)
 
 
+def described(folder: Path) -> bytes:
+    """The contract as a FileDescriptorSet, with what it imports, and with the names of fields that JavaScript has."""
+    out = folder / "contract.binpb"
+    sources = map(str, sorted(CONTRACT.rglob("*.proto")))
+    well_known = resources.files("grpc_tools") / "_proto"
+    if protoc.main(
+        ["protoc", f"-I{PROTO}", f"-I{well_known}", f"--descriptor_set_out={out}", "--include_imports", *sources]
+    ):
+        raise SystemExit("protoc failed")
+    files = FileDescriptorSet.FromString(out.read_bytes())
+    messages = [message for file in files.file for message in file.message_type]
+    while messages:
+        message = messages.pop()
+        messages += message.nested_type
+        for field in message.field:
+            field.name = field.json_name  # readers of descriptors take the first
+    return files.SerializeToString(deterministic=True)
+
+
 def contents(package: Path) -> dict[str, str]:
     """Every generated file by its path within the package."""
     files = (path for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
@@ -96,13 +118,17 @@ def main() -> None:
         if check and filled != text:
             sys.exit(f"stale, run `make proto`: {proto}")
         proto.write_text(filled)
-    if not check:
-        generate(PROTO)
-        return
     with tempfile.TemporaryDirectory() as folder:
+        descriptors = described(Path(folder))
+        if not check:
+            DESCRIPTORS.write_bytes(descriptors)
+            generate(PROTO)
+            return
         generate(Path(folder))
         fresh, committed = contents(Path(folder) / PACKAGE.name), contents(PACKAGE)
     stale = sorted(path for path in fresh.keys() | committed.keys() if fresh.get(path) != committed.get(path))
+    if descriptors != DESCRIPTORS.read_bytes():
+        stale.append(str(DESCRIPTORS.relative_to(PROTO.parent)))
     if stale:
         sys.exit(f"stale, run `make proto`: {', '.join(stale)}")
 

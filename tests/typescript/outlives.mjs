@@ -1,9 +1,10 @@
 // A writer and a watch of one hull while its server is killed: prints a line for each step, and at the end what there is.
 
+import { GrpcClient } from "../../clients/typescript/src/grpc/index.js"
 import { Client, HullCopy } from "../../clients/typescript/src/index.js"
 
 const [url, name] = process.argv.slice(2)
-const client = new Client(url)
+const client = url.startsWith("grpc:") ? new GrpcClient(url) : new Client(url)
 await client.createHull(name, { keyed: "int" })
 const copy = new HullCopy()
 const watching = (async () => {

@@ -72,8 +72,8 @@ def blocks(kind: str) -> list[str]:
     return [block.partition("```")[0] for block in text.split(f"```{kind}\n")[1:]]
 
 
-def test_its_own_tests(gateway: Gateway) -> None:
-    said = node("--test", "--test-reporter=tap", DYNHULL_GATEWAY=gateway.url)
+def test_its_own_tests(gateway: Gateway, server: MortalServer) -> None:
+    said = node("--test", "--test-reporter=tap", DYNHULL_GATEWAY=gateway.url, DYNHULL_SERVER=f"grpc://{server.address}")
     assert "\n# fail 0\n" in said
     assert "\n# skipped 0\n" in said
 
@@ -155,9 +155,11 @@ def test_points_beside_edges(count: int, tmp_path: Path) -> None:
     assert np.array_equal(sides, expected)
 
 
-def test_a_writer_and_a_watch_outlive_servers(server: MortalServer, gateway: Gateway) -> None:
-    name = "typescript/kills"
-    command = [program("node"), str(HERE / "outlives.mjs"), gateway.url, name]
+@pytest.mark.parametrize("way", ["gateway", "grpc"])
+def test_a_writer_and_a_watch_outlive_servers(way: str, server: MortalServer, gateway: Gateway) -> None:
+    name = f"typescript/kills/{way}"
+    url = gateway.url if way == "gateway" else f"grpc://{server.address}"
+    command = [program("node"), str(HERE / "outlives.mjs"), url, name]
     with subprocess.Popen(command, cwd=typescript(), stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout is not None
         for _ in range(KILLS):
@@ -176,13 +178,16 @@ def test_a_writer_and_a_watch_outlive_servers(server: MortalServer, gateway: Gat
 
 def test_what_the_page_of_documentation_says(gateway: Gateway, server: MortalServer) -> None:
     first, watching, writing = blocks("js")
+    (over_grpc,) = blocks('js title="grpc.mjs"')
     ended = watching.replace("console.log(", "if (event.type === 'snapshot') break\n  console.log(")
     program = (
         (first + ended + writing).replace("http://127.0.0.1:8080", gateway.url).replace('"dynhull"', '"./src/index.js"')
     )
+    over_grpc = over_grpc.replace("127.0.0.1:50051", server.address).replace("dynhull/grpc", "./src/grpc/index.js")
     node("--input-type=module", "-e", program + "console.assert(sides[0] === 1)")
+    assert node("--input-type=module", "-e", over_grpc) == "[ [ 9, 50 ] ]\n"
     with HullClient(server.address) as client:
-        assert client.positions("fleet", ["LH400"]).positions.tolist() == [[9, 51]]
+        assert client.positions("fleet", ["LH400"]).positions.tolist() == [[9, 50]]
 
 
 @contextmanager

@@ -17,6 +17,10 @@ const SILENCE = 45
  * @typedef {import("./past.js").Past} Past
  * @typedef {{signal?: AbortSignal | null}} Abortable
  *
+ * @typedef {object} Transport how calls and streams reach a server: `dynhull/grpc` has another one
+ * @property {Pick<Connection, "url" | "ask" | "events">} connection
+ * @property {Pick<Joined, "follow">} joined
+ *
  * @typedef {object} HullInfo
  * @property {string} name
  * @property {bigint} revision
@@ -209,11 +213,11 @@ export class Client extends Streams {
 
   /**
    * @param {string} url of the gateway
-   * @param {import("./connection.js").ConnectionOptions} [options]
+   * @param {import("./connection.js").ConnectionOptions & {transport?: Transport}} [options]
    */
   constructor(url, options = {}) {
-    const connection = new Connection(url, options)
-    super(connection, new Joined(connection, options.silence ?? SILENCE))
+    const { connection, joined } = options.transport ?? overHttp(url, options)
+    super(connection, joined)
     this.#connection = connection
   }
 
@@ -766,6 +770,12 @@ export class Client extends Streams {
       after = page.next
     } while (after !== null)
   }
+}
+
+/** @param {string} url @param {import("./connection.js").ConnectionOptions} options @returns {Transport} */
+function overHttp(url, options) {
+  const connection = new Connection(url, options)
+  return { connection, joined: new Joined(connection, options.silence ?? SILENCE) }
 }
 
 /** Of a hull, it has acknowledged a revision. @param {any} consumer @returns {FeedConsumer} */

@@ -1,5 +1,6 @@
 import { DynhullError } from "./errors.js"
 import { fromJson, toJson } from "./json.js"
+import { parsed } from "./sse.js"
 
 /**
  * @typedef {object} ConnectionOptions
@@ -74,6 +75,16 @@ export class Connection {
     const response = await this.#send(path, call, headers, call.signal ?? undefined)
     if (!response.ok || response.body === null) throw await problemOf(response)
     return response.body
+  }
+
+  /**
+   * The events of a stream that ends.
+   * @param {string} path
+   * @param {Call} call
+   * @returns {AsyncGenerator<{type: string, data: any}, void, undefined>}
+   */
+  async *events(path, call) {
+    for await (const { type, data } of parsed(await this.open(path, call), () => {})) yield { type, data: fromJson(data || "null") }
   }
 
   /** @param {string} path @param {Call} call */

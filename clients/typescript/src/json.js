@@ -50,7 +50,8 @@ export function fromWire(value) {
 
 /** @param {string} name @param {any} field @returns {any} */
 function fieldOf(name, field) {
-  if (TIMES.test(name)) return mapped(field, micros)
+  // The clock of a window is a word.
+  if (TIMES.test(name)) return mapped(field, (each) => (INSTANT.test(each) ? micros(each) : each))
   if (INTEGERS.test(name)) return mapped(field, (each) => (typeof each === "number" ? BigInt(each) : fromWire(each)))
   return fromWire(field)
 }

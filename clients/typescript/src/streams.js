@@ -1,11 +1,9 @@
 import { path, problem } from "./connection.js"
-import { fromJson, fromWire, momentOf, toWire } from "./json.js"
+import { fromWire, momentOf, toWire } from "./json.js"
 import { Reads } from "./reads.js"
-import { parsed } from "./sse.js"
 import { alarmEvent, fenceEvent, hullEvent, hullNow } from "./watch.js"
 
 /**
- * @typedef {import("./connection.js").Connection} Connection
  * @typedef {import("./hull-copy.js").HullCopy} HullCopy
  * @typedef {import("./hull-copies.js").HullCopies} HullCopies
  * @typedef {import("./joined.js").Following} Following
@@ -35,8 +33,8 @@ export class Streams extends Reads {
   #joined
 
   /**
-   * @param {Connection} connection
-   * @param {import("./joined.js").Joined} joined
+   * @param {import("./client.js").Transport["connection"]} connection
+   * @param {import("./client.js").Transport["joined"]} joined
    */
   constructor(connection, joined) {
     super((name, what, call) => connection.ask(path`/hulls/${name}` + what, { repeatable: true, ...call }))
@@ -119,11 +117,10 @@ export class Streams extends Reads {
    */
   async *fenceEventsBetween({ signal = null, start, end, ...settings }) {
     const body = toWire({ ...settings, start: momentOf(start), end: momentOf(end) })
-    const stream = await this.#connection.open("/fences/between", { method: "POST", body, signal })
-    for await (const { type, data } of parsed(stream, () => {})) {
+    for await (const { type, data } of this.#connection.events("/fences/between", { method: "POST", body, signal })) {
       if (type === "complete") return
-      if (type === "problem") throw problem(fromJson(data))
-      if (type !== "available" && type !== "unavailable") yield fenceEvent(type, fromWire(fromJson(data)))
+      if (type === "problem") throw problem(data)
+      if (type !== "" && type !== "available" && type !== "unavailable") yield fenceEvent(type, fromWire(data))
     }
     throw problem({ reason: "UNREACHABLE", detail: "the events have ended before the last one" })
   }

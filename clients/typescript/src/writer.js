@@ -4,7 +4,7 @@ import { fromWire, isoTime } from "./json.js"
 
 /**
  * @typedef {import("./exact.js").Point} Point
- * @typedef {import("./connection.js").Connection} Connection
+ * @typedef {import("./client.js").Transport["connection"]} Connection
  * @typedef {string | number | bigint} AnyKey
  * @typedef {bigint | Date | string} Time microseconds since 1970, a Date, or a text in ISO 8601 with its zone
  *

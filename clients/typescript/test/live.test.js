@@ -3,14 +3,22 @@ import { readFile } from "node:fs/promises"
 import { test } from "node:test"
 
 import { Client, DynhullError, HullCopies, HullCopy } from "../src/index.js"
+import { GrpcClient } from "../src/grpc/index.js"
 import { fromJson } from "../src/json.js"
 
 const url = process.env.DYNHULL_GATEWAY ?? ""
-const options = { skip: url ? false : "DYNHULL_GATEWAY names no gateway" }
-const client = new Client(url)
-const name = (/** @type {string} */ what) => `${process.env.DYNHULL_NAME ?? "node"}/${what}`
+const server = process.env.DYNHULL_SERVER ?? ""
+/** Both ways in. @type {Record<string, Client>} */
+const ways = url ? { node: new Client(url), grpc: new GrpcClient(server) } : {}
+const options = { skip: url ? false : "DYNHULL_GATEWAY names no gateway, and DYNHULL_SERVER no server" }
 
-test("hulls are created, written, asked and deleted", options, async () => {
+/** A test over each way in. @param {string} title @param {(client: Client, name: (what: string) => string) => Promise<void>} run */
+function live(title, run) {
+  if (!url) test(title, options, () => {})
+  for (const [way, client] of Object.entries(ways)) test(`${title} (${way})`, () => run(client, (what) => `${way}/${what}`))
+}
+
+live("hulls are created, written, asked and deleted", async (client, name) => {
   const hull = name("all")
   const { revision, keyed, created } = await client.createHull(hull, { keyed: "int", existOk: true })
   assert.deepEqual([revision, keyed, typeof created], [0n, "int", "bigint"])
@@ -38,7 +46,7 @@ test("hulls are created, written, asked and deleted", options, async () => {
   await assert.rejects(client.getHull(hull), { reason: "HULL_NOT_FOUND", status: 404 })
 })
 
-test("refusals name the field, the row and the value", options, async () => {
+live("refusals name the field, the row and the value", async (client, name) => {
   const hull = name("refused")
   await client.createHull(hull)
   const bad = client.apply(hull, { insert: [[0, 0], [1, /** @type {any} */ ("x")]] })
@@ -48,10 +56,16 @@ test("refusals name the field, the row and the value", options, async () => {
     return true
   })
   await assert.rejects(client.apply(hull, { delete: [[8, 8]] }), { reason: "POINT_MISSING" })
-  await assert.rejects(new Client("http://127.0.0.1:1", { retries: 0 }).getHull(hull), { reason: "UNREACHABLE" })
+  const late = /** @type {any} */ ({ insert: [[0, 0]], times: ["9999-12-31T00:00:00Z"] })
+  await assert.rejects(client.apply(hull, late), { reason: "INVALID_FIELD", status: 400, field: "times", row: 0 })
+  const elsewhere = client instanceof GrpcClient ? new GrpcClient("grpc://127.0.0.1:1", { retries: 0 }) : new Client("http://127.0.0.1:1", { retries: 0 })
+  await assert.rejects(elsewhere.getHull(hull), { reason: "UNREACHABLE" })
+  const left = AbortSignal.timeout(50)
+  await assert.rejects(client.getHull(hull, { minRevision: 99, signal: left }), { name: "TimeoutError" })
+  for await (const event of client.watch(hull, { signal: AbortSignal.timeout(100) })) assert.equal(event.type, "snapshot")
 })
 
-test("a numbered batch is applied once, and a transfer whole", options, async () => {
+live("a numbered batch is applied once, and a transfer whole", async (client, name) => {
   const [a, b] = [name("once/a"), name("once/b")]
   for (const hull of [a, b]) await client.createHull(hull, { keyed: "str" })
   const batch = { keys: ["k"], points: [[1, 1]], producer: "page", sequence: 1 }
@@ -62,7 +76,7 @@ test("a numbered batch is applied once, and a transfer whole", options, async ()
   assert.deepEqual([moved[a].deleted, moved[b].inserted], [1, 1])
 })
 
-test("a watch waits for its hull, follows it, and says that it is gone", options, async () => {
+live("a watch waits for its hull, follows it, and says that it is gone", async (client, name) => {
   const hull = name("watched")
   const copy = new HullCopy()
   const watch = client.watch(hull, { copy, keys: true, measures: true })
@@ -83,7 +97,7 @@ test("a watch waits for its hull, follows it, and says that it is gone", options
   await watch.return()
 })
 
-test("many hulls are watched by one stream", options, async () => {
+live("many hulls are watched by one stream", async (client, name) => {
   const copies = new HullCopies()
   const watch = client.watchMany(name("many/"), { outlines: true, copies })
   for await (const event of watch) {
@@ -98,7 +112,7 @@ test("many hulls are watched by one stream", options, async () => {
   assert.equal(copies.size, 0)
 })
 
-test("the other questions are answered", options, async () => {
+live("the other questions are answered", async (client, name) => {
   const [a, b] = [name("questions/a"), name("questions/b")]
   await client.createHull(a, { keyed: "str", quarantine: { maxGrowth: 2 } })
   await client.setQuarantine(a, { maxGrowth: 3 })
@@ -120,7 +134,7 @@ test("the other questions are answered", options, async () => {
   assert.deepEqual((await client.recenter(name("questions/globe"), [9, 51])).center, [9, 51])
 })
 
-test("fences make events, which a consumer acknowledges", options, async () => {
+live("fences make events, which a consumer acknowledges", async (client, name) => {
   const [hull, fence] = [name("fenced"), name("fence")]
   await client.createHull(hull, { keyed: "str" })
   const made = await client.createFence(fence, { area: { center: [0, 0], radius: 3 }, subjects: hull, initial: "none" })
@@ -138,7 +152,7 @@ test("fences make events, which a consumer acknowledges", options, async () => {
   await client.deleteFence(fence)
 })
 
-test("alarms are raised, acknowledged, muted and cleared", options, async () => {
+live("alarms are raised, acknowledged, muted and cleared", async (client, name) => {
   const [hull, alarm] = [name("alarmed"), name("alarm")]
   await client.createHull(hull, { keyed: "str" })
   const made = await client.createAlarm(alarm, { hull, when: "area > 5", clear: "area < 2" })
@@ -167,7 +181,7 @@ test("alarms are raised, acknowledged, muted and cleared", options, async () => 
   await assert.rejects(client.watchAlarm(alarm).next(), { reason: "ALARM_NOT_FOUND" })
 })
 
-test("the past is replayed, followed and asked", options, async () => {
+live("the past is replayed, followed and asked", async (client, name) => {
   const hull = name("past")
   await client.createHull(hull, { keyed: "int", history: true })
   const large = 18446744073709551615n
@@ -227,6 +241,7 @@ test("the past is replayed, followed and asked", options, async () => {
 })
 
 test("whatever a client follows takes one connection", options, async () => {
+  const name = (/** @type {string} */ what) => `node/${what}`
   const counted = /** @type {string[]} */ ([])
   const counting = new Client(url, { fetch: (input, init) => (counted.push(`${init?.method} ${input}`), fetch(input, init)) })
   const hulls = Array.from({ length: 12 }, (_, i) => name(`joined/${i}`))
@@ -243,7 +258,7 @@ test("whatever a client follows takes one connection", options, async () => {
   for (const each of [...watches, many, later]) await each.return()
 })
 
-test("numbers at the ends of what they can be come back as they are", options, async () => {
+live("numbers at the ends of what they can be come back as they are", async (client, name) => {
   const { values } = fromJson(await readFile(new URL("cases.json", import.meta.url), "utf8"))
   const hull = name("values")
   await client.createHull(hull, { keyed: "int", ordering: "event_time" })
@@ -262,7 +277,7 @@ test("numbers at the ends of what they can be come back as they are", options, a
   }
 })
 
-test("a writer gathers, waits for room, and stops where the server refuses", options, async () => {
+live("a writer gathers, waits for room, and stops where the server refuses", async (client, name) => {
   const hull = name("writer")
   await client.createHull(hull, { keyed: "int" })
   const writer = client.writer(hull, { batchRows: 500, room: 1000 })

@@ -1,9 +1,11 @@
 // Types alone: what a strict program is told, and what it is warned of.
 import { Client, DynhullError, HullCopy, type Writer } from "dynhull"
+import { GrpcClient } from "dynhull/grpc"
 import type { DynhullMap } from "dynhull/map"
 
 export async function fleet(signal: AbortSignal, map: DynhullMap): Promise<Int8Array> {
-  const client: Client = new Client("http://127.0.0.1:8080", { token: "token" })
+  const grpc = new GrpcClient("grpc://127.0.0.1:50051", { timeout: 5 })
+  const client: Client = signal.aborted ? grpc : new Client("http://127.0.0.1:8080", { token: "token" })
   const { revision }: { revision: bigint } = await client.put("fleet", ["a", "b"], [[0, 0], [4, 0]], { signal })
   const writer: Writer = client.writer("fleet")
   await writer.put([1n, 2, "c"], [[0, 0], [1, 1], [2, 2]])

@@ -1,0 +1,170 @@
+// Values of the contract as they are in JavaScript, and back.
+
+import { DynhullError } from "../errors.js"
+import { isoTime, micros } from "../json.js"
+
+/** @typedef {import("../hull-copy.js").Key} Key */
+
+const LARGEST = (1n << 64n) - 1n
+
+/**
+ * What a request has that the contract cannot carry.
+ * @param {string} field
+ * @param {number | null} row
+ * @param {unknown} value
+ * @param {string} detail
+ */
+export function invalid(field, row, value, detail) {
+  const shown = typeof value === "bigint" ? String(value) : JSON.stringify(value) ?? String(value)
+  const place = row === null ? field : `${field}/${row}`
+  return new DynhullError({ reason: "INVALID_FIELD", status: 400, field, row, value: shown, detail: `/${place}: ${detail}` })
+}
+
+/** @param {string} field @param {readonly (readonly number[])[] | null | undefined} rows */
+export function packPoints(field, rows) {
+  if (rows == null) return null
+  const packed = new DataView(new ArrayBuffer(16 * rows.length))
+  rows.forEach((point, row) => {
+    for (const axis of [0, 1]) {
+      if (!Number.isFinite(point?.[axis])) throw invalid(field, row, point?.[axis], "must be a finite number")
+      packed.setFloat64(16 * row + 8 * axis, point[axis], true)
+    }
+  })
+  return { packed: Buffer.from(packed.buffer) }
+}
+
+/** @param {string} field @param {readonly number[] | null | undefined} rows */
+export function packNumbers(field, rows) {
+  if (rows == null) return null
+  rows.forEach((each, row) => {
+    if (!Number.isFinite(each)) throw invalid(field, row, each, "must be a finite number")
+  })
+  return { values: rows }
+}
+
+/** @param {string} field @param {readonly (string | number | bigint)[] | null | undefined} keys */
+export function packKeys(field, keys) {
+  if (keys == null) return null
+  if (keys.every((key) => typeof key === "string")) return { strings: keys }
+  const packed = new DataView(new ArrayBuffer(8 * keys.length))
+  keys.forEach((key, row) => {
+    const whole = typeof key === "bigint" || Number.isSafeInteger(key) ? BigInt(key) : -1n
+    if (whole < 0n || whole > LARGEST) throw invalid(field, row, key, "must be an integer from 0 to 2**64 - 1, as the others")
+    packed.setBigUint64(8 * row, whole, true)
+  })
+  return { packedIntegers: Buffer.from(packed.buffer) }
+}
+
+/** @param {string} field @param {readonly string[] | null | undefined} times */
+export function packTimes(field, times) {
+  if (times == null) return null
+  const packed = new DataView(new ArrayBuffer(8 * times.length))
+  times.forEach((time, row) => packed.setBigInt64(8 * row, instant(field, row, time), true))
+  return { packed: Buffer.from(packed.buffer) }
+}
+
+/** @param {string} field @param {number | null} row @param {any} time */
+function instant(field, row, time) {
+  try {
+    return typeof time === "bigint" ? time : micros(isoTime(time))
+  } catch {
+    throw invalid(field, row, time, "must be a time with its zone")
+  }
+}
+
+/** @param {any} time a text, or microseconds @param {string} [field] */
+export function timestamp(time, field = "time") {
+  if (time == null) return null
+  const whole = instant(field, null, time)
+  const rest = ((whole % 1_000_000n) + 1_000_000n) % 1_000_000n
+  return { seconds: String((whole - rest) / 1_000_000n), nanos: Number(rest) * 1000 }
+}
+
+/** @param {number | null | undefined} seconds @param {string} [field] */
+export function duration(seconds, field = "seconds") {
+  if (seconds == null) return null
+  if (typeof seconds !== "number" || !Number.isFinite(seconds)) throw invalid(field, null, seconds, "must be seconds")
+  const whole = Math.trunc(seconds)
+  return { seconds: String(whole), nanos: Math.round((seconds - whole) * 1e6) * 1000 }
+}
+
+/** A moment of the past as the fields of a request. @param {string} prefix @param {any} when @param {string} [field] */
+export function moment(prefix, when, field = prefix) {
+  if (when == null) return {}
+  if (/^\d+$/.test(String(when))) return { [`${prefix}Revision`]: String(when) }
+  return { [`${prefix}Time`]: timestamp(when, field) }
+}
+
+/** @param {any} points @returns {[number | null, number | null][]} */
+export function pointsOf(points) {
+  if (!points) return []
+  if (!points.packed?.length) return pairs(points.coordinates ?? [])
+  const view = viewOf(points.packed)
+  const rows = Array.from({ length: view.byteLength / 16 })
+  return rows.map((_, row) => [finite(view.getFloat64(16 * row, true)), finite(view.getFloat64(16 * row + 8, true))])
+}
+
+/** @param {number[]} flat @returns {[number, number][]} */
+function pairs(flat) {
+  return Array.from({ length: flat.length / 2 }, (_, row) => [flat[2 * row], flat[2 * row + 1]])
+}
+
+/** @param {any} keys @returns {Key[]} */
+export function keysOf(keys) {
+  if (!keys) return []
+  if (keys.packedIntegers?.length) {
+    const view = viewOf(keys.packedIntegers)
+    return Array.from({ length: view.byteLength / 8 }, (_, row) => view.getBigUint64(8 * row, true))
+  }
+  if (keys.integers?.length) return keys.integers.map(BigInt)
+  if (!keys.lengths?.length) return keys.strings ?? []
+  let end = 0
+  return [...keys.lengths].map((length) => keys.text.toString("utf8", end, (end += length)))
+}
+
+/** Keys that not every answer has. @param {any} keys @param {boolean} asked */
+export function keysOrNull(keys, asked = true) {
+  return keys && asked ? keysOf(keys) : null
+}
+
+/** Times; null for those that are none. @param {any} times @returns {(bigint | null)[]} */
+export function timesOf(times) {
+  if (!times) return []
+  const view = viewOf(times.packed)
+  return Array.from({ length: view.byteLength / 8 }, (_, row) => view.getBigInt64(8 * row, true) || null)
+}
+
+/** @param {any} time @returns {bigint | null} */
+export function timeOf(time) {
+  return time ? BigInt(time.seconds) * 1_000_000n + BigInt(Math.trunc(time.nanos / 1000)) : null
+}
+
+/** @param {any} span @returns {number | null} */
+export function secondsOf(span) {
+  return span ? Number(span.seconds) + span.nanos / 1e9 : null
+}
+
+/** There is no JSON of infinities. @param {number} value */
+export function finite(value) {
+  return Number.isFinite(value) ? value : null
+}
+
+/** @param {number[]} values */
+export function finites(values) {
+  return values.map(finite)
+}
+
+/** The word of an enumeration, without its beginning. @param {string} value @param {string} prefix */
+export function word(value, prefix) {
+  return value.slice(prefix.length).toLowerCase()
+}
+
+/** @param {any} center @returns {[number, number] | null} */
+export function lonLatOf(center) {
+  return center ? [center.longitude, center.latitude] : null
+}
+
+/** @param {Buffer} bytes */
+function viewOf(bytes) {
+  return new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength)
+}
