@@ -22,7 +22,8 @@ import { alarmEvent, fenceEvent, hullEvent, hullNow } from "./watch.js"
  * @property {number} [rate] the most events a second
  * @property {HullCopy} [copy] updated with each event
  *
- * @typedef {Following & View} WatchOptions
+ * @typedef {Following & View & {wait?: boolean}} WatchOptions `wait`: for a hull that is not there yet, as is usual; else that is
+ *   refused
  * @typedef {Following & View & {start?: Moment, end?: Moment, speed?: number, every?: number}} ReplayOptions
  * @typedef {Following & {outlines?: boolean, maxVertices?: number, rate?: number, copies?: HullCopies}} ManyOptions
  */
@@ -51,8 +52,8 @@ export class Streams extends Reads {
    * @param {WatchOptions} [options]
    * @returns {AsyncGenerator<HullEvent, void, undefined>}
    */
-  async *watch(name, options = {}) {
-    const query = { ...viewed(options), wait: true }
+  async *watch(name, { wait = true, ...options } = {}) {
+    const query = { ...viewed(options), wait: wait || undefined }
     for await (const { type, data } of this.#joined.follow(path`/hulls/${name}/events`, query, options)) {
       const event = hullEvent(type, fromWire(data))
       options.copy?.update(event)
