@@ -115,6 +115,12 @@ export class Channel {
   }
 }
 
+/** Whether nothing of a call was sent, because there was no connection. @param {DynhullError} error */
+export function notSent(error) {
+  const { details = "" } = /** @type {{details?: string}} */ (error.cause ?? {})
+  return error.reason === "UNREACHABLE" && details.startsWith("No connection established")
+}
+
 /** @param {any} error @param {string} url */
 function problemOf(error, url) {
   const { reason, metadata } = reasonOf(error.metadata?.get("grpc-status-details-bin")[0])

@@ -2,7 +2,7 @@ import { growing, pause } from "../connection.js"
 import { Client } from "../client.js"
 import { DynhullError } from "../errors.js"
 import { routed } from "./calls.js"
-import { Channel } from "./channel.js"
+import { Channel, notSent } from "./channel.js"
 import { Followed } from "./follow.js"
 import { fenceConfig } from "./requests.js"
 import { moment } from "./values.js"
@@ -43,7 +43,8 @@ class GrpcConnection {
       try {
         return await this.#once(path, call)
       } catch (error) {
-        const again = error instanceof DynhullError && (error.passing || (call.repeatable && error.unknown))
+        if (!(error instanceof DynhullError)) throw error
+        const again = error.passing || notSent(error) || (call.repeatable && error.unknown)
         if (!again || tries >= this.#retries) throw error
         await pause(pauses.next().value, call.signal)
       }
