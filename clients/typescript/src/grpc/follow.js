@@ -155,6 +155,7 @@ function hull(name, query) {
     request: () => state.request(name, query),
     take: (response) => state.take(response),
     mended({ reason }) {
+      if (reason === "HULL_NOT_FOUND" && !query.wait && state.revision < 0n) return null
       if (reason === "HULL_NOT_FOUND" || reason === "HULL_REPLACED") return state.forget()
       if (reason !== "REVISION_FORGOTTEN" || !state.resumable) return null
       state.resumable = false // each call begins with a snapshot
