@@ -15,8 +15,8 @@ from pathlib import Path
 LAYERS = "core", "shell", "sqlite", "past", "cluster", "links"
 FINDINGS = Path(__file__).parent / "findings"
 
-# Plans from one collection of garbage to the next, and lives from one line of progress to the next.
-COLLECT, REPORT = 500, 10_000
+# Plans from one collection of garbage to the next, and seconds from one line of progress to the next.
+COLLECT, REPORT = 500, 300.0
 # A run draws its plans' seeds from here on: room for any number of plans.
 ROOM = 10**9
 
@@ -73,8 +73,8 @@ def _search(arguments: argparse.Namespace) -> int:
     layers = LAYERS if arguments.layer == "all" else (arguments.layer,)
     lives = dict.fromkeys(layers, 0)
     seconds = dict.fromkeys(layers, 0.0)
-    begun = time.monotonic()
-    seed, reported = arguments.seed * ROOM, 0
+    begun = reported = time.monotonic()
+    seed = arguments.seed * ROOM
     while time.monotonic() - begun < arguments.seconds:
         layer = min(layers, key=lambda each: seconds[each])
         plan = random_plan(seed, layer)
@@ -91,11 +91,10 @@ def _search(arguments: argparse.Namespace) -> int:
         seed += 1
         if seed % COLLECT == 0:
             gc.collect()
-        total = sum(lives.values())
-        if total // REPORT > reported:
-            reported = total // REPORT
+        if time.monotonic() - reported >= REPORT:
+            reported = time.monotonic()
             print(f"{_progress(lives, seconds)}, no finding", flush=True)
-        if arguments.lives is not None and total >= arguments.lives:
+        if arguments.lives is not None and sum(lives.values()) >= arguments.lives:
             break
     print(f"{_progress(lives, seconds)}, no finding", flush=True)
     return 0
