@@ -120,8 +120,8 @@ surface: .venv/.test  ## what users see of HTTP, commands and the SDK is to chan
 	SURFACE=renew $(BIN)/pytest -q tests/surface/test_goldens.py
 
 vendor:  ## bring newer libraries and maps into the dashboard's page, from npm
-	npm ci --prefix clients/dashboard --no-audit --no-fund --ignore-scripts
-	$(PYTHON) clients/dashboard/vendor.py
+	npm ci --prefix clients/gateway --no-audit --no-fund --ignore-scripts
+	$(PYTHON) clients/gateway/vendor.py
 
 contract: .venv/.check  ## with a release: the contract that later ones must not break
 	$(BIN)/buf breaking --against proto/contract.binpb

@@ -1,30 +1,32 @@
 """What twenty viewers of the dashboard cost those who write: `python benchmarks/dashboard.py`.
 
 A writer streams as fast as the server takes it, in turns with the dashboard and its viewers paused and running. A
-viewer is a page's websocket. Server, writer, dashboard and viewers share this machine.
+viewer is a page's stream of events. Server, writer, dashboard and viewers share this machine.
 """
 
 import argparse
-import asyncio
+import http.client
+import json
 import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median, quantiles
 
 import numpy as np
-from tornado.websocket import websocket_connect
 
 from dynhull_client import HullClient
 
 SERVER = ["-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "warning"]
 DASHBOARD = ["-m", "dynhull_cli", "dashboard", "--port", "0", "--address"]
 POINTS, BATCH, VERTICES, CYCLE = 100_000, 2_048, 48, 64
-VERTICES_OF = '"kind": "vertices", "hull": "a"'
+FOLLOWED = {"subscriptions": {"a": {"path": "/hulls/a/events?measures=true&rate=10"}}}
+HULLS = b"event: snapshot", b"event: change"
 SETTLE = 0.3  # seconds from a turn's beginning to its measurement
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -76,18 +78,17 @@ def write(address, pause):
 def view(address, viewers, told):
     """Viewers; each sends on how many hulls it was sent."""
 
-    async def one(viewer):
-        await read(await websocket_connect(f"ws://{address}/live?hull=a"), viewer)
+    def read(viewer):
+        connection = http.client.HTTPConnection(address)
+        connection.request("POST", "/streams", json.dumps(FOLLOWED), {"Content-Type": "application/json"})
+        for line in connection.getresponse():
+            told[viewer] += line.startswith(HULLS)
 
-    async def read(socket, viewer):
-        while (message := await socket.read_message()) is not None:
-            if VERTICES_OF in message[:60]:
-                told[viewer] += 1
-
-    async def all_of_them():
-        await asyncio.gather(*map(one, range(viewers)))
-
-    asyncio.run(all_of_them())
+    threads = [threading.Thread(target=read, args=[viewer]) for viewer in range(viewers)]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
 
 
 def processor_seconds(pid):

@@ -43,7 +43,6 @@ OURS = {
     "dynhull_bridges",
     "dynhull_cli",
     "dynhull_cluster",
-    "dynhull_dashboard",
     "dynhull_gateway",
     "dynhull_server",
     "dynhull_surface",

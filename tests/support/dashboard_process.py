@@ -15,6 +15,20 @@ DESKTOP = {"viewport": {"width": 1440, "height": 900}}
 PATIENCE_OF_BROWSER = 1000 * PATIENCE  # milliseconds
 expect.set_options(timeout=PATIENCE_OF_BROWSER)
 LOUD = "warning", "error"
+REFUSED = (
+    "Failed to load resource:"  # what browsers say of each answer that is an error; the page says it in its own words
+)
+# What the page is made of, for tests of parts.
+PARTS = """async () => {
+    const folder = document.querySelector("script[type=module]").src.replace(/[^/]*$/, "")
+    const names = [
+        ...["views", "picture", "hulls", "trails", "coasts"].map(name => `dynhull/map/${name}`), "recorder", "degrees",
+        ...["fence_area", "event_rows", "hull_state", "hull_feed", "server_metrics", "repeating"]
+            .map(name => `sources/${name}`),
+    ]
+    const parts = await Promise.all(names.map(name => import(`${folder}${name}.js`)))
+    Object.assign(globalThis, ...parts, {d3: await import("d3-geo")})
+}"""
 VERTICES = "name => picture.hulls.get(name)?.corners ?? []"
 
 
@@ -51,13 +65,16 @@ def opened(browser: Browser, url: str, *hulls: str, fences: Sequence[str] = (), 
     page = idle.pop() if idle else browser.new_context(**{**DESKTOP, **look}).new_page()
     listeners = {
         "pageerror": lambda error: failures.append(error),
-        "console": lambda message: failures.append(message.text) if message.type in LOUD else None,
+        "console": lambda message: (
+            failures.append(message.text) if message.type in LOUD and not message.text.startswith(REFUSED) else None
+        ),
     }
     for event, listener in listeners.items():
         page.on(event, listener)
     page.set_default_timeout(PATIENCE_OF_BROWSER)
     page.mouse.move(0, 0)
     page.goto(f"{url}?{urlencode({'hull': hulls, 'fence': fences}, doseq=True)}")
+    page.evaluate(PARTS)
     try:
         yield page
     finally:

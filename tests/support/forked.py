@@ -36,7 +36,7 @@ RUN_BY = {
         *(f"dynhull_cluster.storages.{each}" for each in ("choice", "folder", "memory")),
     ],
     "gateway": ["dynhull_client", "dynhull_gateway.serve"],
-    "dashboard": ["dynhull_client", "dynhull_dashboard.serve"],
+    "dashboard": ["dynhull_client", "dynhull_gateway.serve"],
     "ingest": ["dynhull_client", "dynhull_bridges.ingest.ingest", "dynhull_bridges.ingest.jetstream"],
     "relay": ["dynhull_client", "dynhull_bridges.relay", "dynhull_bridges.webhook"],
 }

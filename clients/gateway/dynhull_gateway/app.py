@@ -1,7 +1,8 @@
 """The gateway as an application: what it answers to, and in which order."""
 
 import json
-from functools import partial
+from dataclasses import replace
+from functools import cache, partial
 
 from fastapi import Depends, FastAPI, Request, Response
 from fastapi.middleware.cors import CORSMiddleware
@@ -23,11 +24,15 @@ from .figures import Figures, Measured
 from .gathering import Gatherer
 from .heads import HeadAsGet
 from .hosts import KnownHosts
+from .known_names import KnownNames
 from .ogc import routes as maps
 from .ogc.entities import Snapshots
+from .page import Dashboard
+from .page.routes import routes_of
 from .parameters import require_known, require_one_number
 from .paths import PathsAsSent
 from .problems import RESPONSES
+from .read_only import ReadOnly
 from .settings import Settings
 from .small_changes import SmallChanges
 
@@ -70,6 +75,8 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     of_events = events, replays, subscriptions
     modules = hulls, points, uploads, fences, alarms, questions, *of_past, *of_events, maps, health
     routers = [module.router for module in modules]
+    page = cache(lambda: Dashboard(replace(settings.page, address=client.address), settings.root_path))
+    app.router.routes[:0] = pages = routes_of(page, first=settings.read_only)
     for router in routers:
         app.include_router(router)
     app.openapi = partial(description_of, app, EVENTS)  # type: ignore[method-assign]  # the framework's way to have one's own
@@ -78,7 +85,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         Route("/docs", _answer_people, include_in_schema=False),
     ]
     app.router.routes.extend(described)
-    app.state.routes = [*described, *(route for router in routers for route in router.routes)]
+    app.state.routes = [*pages, *described, *(route for router in routers for route in router.routes)]
     handlers.install(app)
     app.add_middleware(SmallChanges, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
@@ -90,8 +97,12 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
             allow_headers=SEEN_BY_PAGES,
             expose_headers=["Location", "Link", "Retry-After"],
         )
+    if settings.read_only:
+        app.add_middleware(ReadOnly, root_path=settings.root_path)
     if settings.hosts:
         app.add_middleware(KnownHosts, hosts=settings.hosts)
+    if settings.names:
+        app.add_middleware(KnownNames, names=settings.names)
     app.add_middleware(Measured, figures=app.state.figures)
     app.add_middleware(HeadAsGet)
     app.add_middleware(PathsAsSent, root_path=settings.root_path)

@@ -91,7 +91,7 @@ def gateway(
     from dynhull_client import AsyncHullClient
 
     from .hosts import hosts_of
-    from .serve import run
+    from .serve import listener, run
     from .settings import Settings
 
     settings = Settings(
@@ -112,7 +112,8 @@ def gateway(
         metrics=None if metrics_port is None else (metrics_host, metrics_port),
     )
     limit = more_than_0(timeout, "--timeout")
-    run(lambda: connect(AsyncHullClient, timeout=limit, read_ahead=READ_AHEAD), host, port, settings)
+    with listener(host, port) as listening:
+        run(lambda: connect(AsyncHullClient, timeout=limit, read_ahead=READ_AHEAD), listening, settings)
 
 
 def _origin(text: str) -> str:

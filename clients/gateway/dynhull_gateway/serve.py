@@ -30,10 +30,10 @@ class Server(uvicorn.Server):
         yield
 
 
-def run(connect: Callable[[], AsyncHullClient], host: str, port: int, settings: Settings) -> None:
+def run(connect: Callable[[], AsyncHullClient], listening: socket.socket, settings: Settings) -> None:
     """Serve until SIGTERM or SIGINT; the first line printed has the address."""
     config = uvicorn.Config("", log_config=None)  # for its choice of an event loop
-    with listener(host, port) as listening, asyncio.Runner(loop_factory=config.get_loop_factory()) as runner:
+    with asyncio.Runner(loop_factory=config.get_loop_factory()) as runner:
         runner.run(serve(connect, listening, settings))
 
 
@@ -68,7 +68,8 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
         serving = asyncio.create_task(server.serve([listening]))
         host, port = listening.getsockname()[:2]
         place = f"[{host}]" if ":" in host else host
-        typer.echo(f"dynhull gateway on http://{place}:{port}{settings.root_path}")
+        kind = "dashboard" if settings.read_only else "gateway"
+        typer.echo(f"dynhull {kind} on http://{place}:{port}{settings.root_path}")
         following = asyncio.create_task(app.state.health.follow(client.presence()))
         try:
             await serving

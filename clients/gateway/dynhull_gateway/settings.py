@@ -1,6 +1,8 @@
 """The settings of `dynhull gateway`, from its command line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from .page import PageSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,9 @@ class Settings:
         root_path: the path below which a proxy shows the gateway.
         forwarded_from: the addresses of proxies whose forwarded headers are believed, with commas between.
         metrics: host and port of the page for Prometheus; None for no such page.
+        page: what the dashboard shows.
+        names: the names, with their ports, to which a dashboard alone answers; none for a gateway.
+        read_only: whether it is a dashboard: a gateway that changes nothing, with the page at its own address.
     """
 
     origins: tuple[str, ...] = ()
@@ -41,3 +46,6 @@ class Settings:
     root_path: str = ""
     forwarded_from: str = "127.0.0.1"
     metrics: tuple[str, int] | None = None
+    page: PageSettings = field(default_factory=PageSettings)
+    names: frozenset[str] = frozenset()
+    read_only: bool = False

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dashboard_process import dashboard_process, let_go, opened, wait_for_vertices
+from dashboard_process import PARTS, dashboard_process, let_go, opened, wait_for_vertices
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
@@ -407,6 +407,7 @@ def test_no_page_asks_another_host(browser: Browser, url: str, client: HullClien
         page.on("websocket", lambda socket: asked.append(socket.url))
         with page.expect_response("**/countries-50m.json"):
             page.goto(f"{url}?hull={name}")
+            page.evaluate(PARTS)
         page.wait_for_function("() => picture.coasts.known.get(FINE)?.coasts.length > 1000")
     hosts = {request.split("/")[2] for request in asked if not request.startswith("data:")}
     assert len(asked) > 4
@@ -535,9 +536,11 @@ def test_the_link_keeps_where_the_picture_is(browser: Browser, url: str, client:
             extent = page.evaluate("picture.view.extent")
             page.reload()
             page.wait_for_function("name => picture.hulls.get(name)?.corners?.length >= 3 && !picture.wanted", arg=hull)
-            assert page.evaluate("picture.view.extent") == pytest.approx(extent, rel=1e-6)
+            # Once the tables below have their heights.
+            wait_until(lambda extent=extent: page.evaluate("picture.view.extent") == pytest.approx(extent, rel=1e-6))
             page.get_by_role("button", name="Show all").click()
             page.wait_for_function("() => picture.following && !location.search.includes('view=')")
+            page.evaluate(PARTS)
             assert page.evaluate("['1,2', 'a,b,c', '1,2,0', ',,', null].map(read_extent)") == [None] * 5
 
 

@@ -147,7 +147,7 @@ def test_what_is_missing_is_said(browser: Browser, url: str, client: HullClient,
         go(page, client, fleet, 2)
         wait_for_vertices(page, fleet, corners(1))
         expect(row(page, fleet)).to_contain_text("Keys were erased from this past on 20")
-        assert page.evaluate("name => picture.hulls.get(name).points.keys", fleet) == []
+        page.wait_for_function("name => picture.hulls.get(name).points.keys?.length == 0", arg=fleet)
         # A hull that keeps nothing: how to keep it.
         advice = page.locator(".why").text_content() or ""
         assert f"{forgetful} keeps no past. Keep it: dynhull history set {forgetful} 30d" in advice

@@ -16,7 +16,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
 from dynhull_client import HullClient
-from dynhull_dashboard.tiles import Tiles
+from dynhull_gateway.tiles import Tiles
 
 pytestmark = pytest.mark.long  # first, so that one worker, and one browser, has all of them
 ATTRIBUTION = "© <nobody>"

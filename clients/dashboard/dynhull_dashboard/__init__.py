@@ -1,1 +1,0 @@
-"""The dashboard: a live page of hulls. It uses the public client only."""
