@@ -36,7 +36,7 @@ from dynhull_server.storage.rows import filed, filing, past_rows, storage
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments import archive
 from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive
-from dynhull_server.storage.segments.columns import columns_of, records_of
+from dynhull_server.storage.segments.columns import columns_of, columns_of_state, contents_of, records_of
 from dynhull_server.storage.segments.parquet import from_parquet, to_parquet
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -413,6 +413,15 @@ def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():
             for name in ("points", "inserts", "deletes"):
                 if isinstance(getattr(other.rows, name, None), np.ndarray):
                     assert getattr(one.rows, name).tobytes() == getattr(other.rows, name).tobytes()
+
+
+def test_the_state_of_an_empty_hull_comes_back():
+    for identity in ("str", "int", "multiset"):
+        keys = {"str": PackedKeys.pack([]), "int": np.empty(0, np.uint64), "multiset": None}[identity]
+        empty = Contents(np.empty((0, 2)), keys)
+        columns = columns_of_state(empty, 7, None, identity)
+        found, _, _ = from_parquet(to_parquet(columns, {}), "a file")
+        same(contents_of(found, times=False, deadlines=False), empty)
 
 
 def test_positions_of_few_decimals_take_few_bytes():

@@ -396,6 +396,8 @@ def _all(file: pq.ParquetFile) -> SegmentColumns:
                 detail[row] = text
     for name, none in (("event_time", NO_TIME), ("expire_time", FOREVER)):
         arrays.setdefault(name, _constant(none, count))
+    for name in CONSTANT:
+        arrays.setdefault(name, np.full(count, NONE, np.int8))  # of no rows: the state of an empty hull
     arrays.setdefault(ACCURACY, _exact(count))
     arrays.setdefault("points", np.full((count, 2), np.nan))
     keyed = codes != NONE
