@@ -75,9 +75,7 @@ def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
 
 def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list[Operation]:
     """A hull is written to, and rests until its snapshots and segments are written, again and again."""
-    create: Operation = {"do": "create", "name": name, "max_points": 0}
-    if name == "w":
-        create["window"] = {"max_points": 2}
+    create = _creation(name)
     scene = [create | _kept(draw) if files else create]
     write, put = _writes(name)
     for _ in range(draw.randint(2, 6)):
@@ -100,7 +98,13 @@ def _written_beyond_its_age(name: str) -> list[Operation]:
     one = put | {"keys": [0]} if name in TIMED else write
     rests: list[Operation] = [{"do": "rest", "name": name, "seconds": seconds} for seconds in (0.4, 0.7)]
     set_age: Operation = {"do": "keep_past", "name": name, "at": 0.0, "history": AGE, "history_bytes": 0}
-    return [one | {"create": True}, set_age, *[one, rests[0], one, rests[1]] * 7]
+    return [_creation(name), set_age, *[one, rests[0], one, rests[1]] * 7]
+
+
+def _creation(name: str) -> Operation:
+    """The creation of a hull, which has a window if its name says so."""
+    create: Operation = {"do": "create", "name": name, "max_points": 0}
+    return create | {"window": {"max_points": 2}} if name == "w" else create
 
 
 def _writes(name: str) -> tuple[Operation, Operation]:
