@@ -134,6 +134,8 @@ export class Viewer {
   }
   // Gives the page what is new since the last call.
   tick() {
+    // What the lists say comes before the first drawing: later it would move the picture.
+    if (![this.hull_list, this.fence_list].every(({listed, error}) => listed || error)) return
     if (this.ticks++ % TICKS_OF_TEXT == 0) {
       this.choose()
       this.tell({...this.looks(), ...this.text()})
