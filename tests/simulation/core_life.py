@@ -420,8 +420,9 @@ class CoreServer:
         truth = self.model.fences.ever[fence.number]
         # What the storage has dropped may be about to be published; until then there is no answer.
         known = truth.deleted is None and truth.first == fence.first
-        complete = len(events) < op["most"] and (known or sent is not None or after >= fence.last)
-        client.followed(asked, fence, after, sent or Sent(after), complete=complete)
+        sent = sent or Sent(after)
+        complete = len(events) < op["most"] and (known or max(after, sent.sequence) >= fence.last)
+        client.followed(asked, fence, after, sent, complete=complete)
 
     async def _keep_fence(self, client: Client, op: Operation) -> None:
         """Store who is inside, and drop old events, as the engine does."""
