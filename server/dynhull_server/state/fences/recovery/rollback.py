@@ -19,9 +19,10 @@ def reading(
     That is None if the trip was committed.
     """
     touched = part.touched()
-    numbers = sorted(
-        {number for subjects in touched.values() for number in subjects.fences} | part.legs.keys() | part.pairs()
-    )
+    compared = {number for subjects in touched.values() for number in subjects.fences}
+    # By a hull that it creates, whose subjects are not touched, it crosses others: they tell whether it was committed.
+    crossed = set() if part.crossed is None else set(part.crossed.fences.tolist())
+    numbers = sorted(compared | crossed | part.legs.keys() | part.pairs())
 
     def restored(states: list[HullState | None], kept: list[KeptFence | None]) -> Restored | None:
         if trip.unknown and trip.landed(states, kept):
