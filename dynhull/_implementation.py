@@ -25,6 +25,7 @@ class _Kernel(Protocol):
     Entities: "type[_kernel.Entities]"
     Fences: "type[_kernel.Fences]"
     WindowTree: "type[_kernel.WindowTree]"
+    LastVertices: "type[_kernel.LastVertices]"
     GlobeTree: "type[_kernel.GlobeTree]"
     GlobeEntities: "type[_kernel.GlobeEntities]"
     GlobeWindowTree: "type[_kernel.GlobeWindowTree]"

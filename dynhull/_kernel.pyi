@@ -10,6 +10,16 @@ import dynhull.arrays
 import dynhull.keys
 
 
+class LastVertices:
+    """The vertices that a hull had when they were last taken."""
+
+    def __init__(self) -> None: ...
+
+    def __len__(self) -> int: ...
+
+    def points(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
+        """The vertices."""
+
 class HullTree:
     """
     A multiset of points and its convex hull: see dynhull's tree in Python.
@@ -44,6 +54,14 @@ class HullTree:
 
     def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The hull's vertices, counter-clockwise from the least. O(h log n)."""
+
+    def take_vertices(self, last: LastVertices) -> None:
+        """Take the vertices. O(h log n)."""
+
+    def take_vertices_if(self, last: LastVertices, measure: str, bound: float, least: int, most: int) -> bool:
+        """
+        Take the vertices if the sign of a measure less a bound is certain, as `sign_of_measure` has it, and at least `least` and at most `most`. O(h log n), or O(h²) of few.
+        """
 
     def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The upper (0) or lower (1) chain from left to right. O(h log n)."""
@@ -146,6 +164,14 @@ class Entities:
 
     def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The hull's vertices, counter-clockwise from the least. O(h log n)."""
+
+    def take_vertices(self, last: LastVertices) -> None:
+        """Take the vertices. O(h log n)."""
+
+    def take_vertices_if(self, last: LastVertices, measure: str, bound: float, least: int, most: int) -> bool:
+        """
+        Take the vertices if the sign of a measure less a bound is certain, as `sign_of_measure` has it, and at least `least` and at most `most`. O(h log n), or O(h²) of few.
+        """
 
     def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The upper (0) or lower (1) chain from left to right. O(h log n)."""

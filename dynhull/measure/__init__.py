@@ -7,7 +7,7 @@ error, and exact integers decide the rest.
 from ._area import area, centroid, perimeter
 from ._box import min_box, min_perimeter_box
 from ._circle import min_circle
-from ._comparison import Compared, compare
+from ._comparison import Compared, LastVertices, compare
 from ._extent import bounds, diameter, width
 from ._label import label_point
 from ._lines import distance, intersect_lines
@@ -16,6 +16,7 @@ from ._summary import FEW, Summary, summary
 __all__ = [
     "FEW",
     "Compared",
+    "LastVertices",
     "Summary",
     "area",
     "bounds",

@@ -3,13 +3,18 @@
 from fractions import Fraction
 from itertools import pairwise
 from math import isfinite
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from .._implementation import kernel
 from ..arrays import Points
 from ._area import doubled_area
 from ._extent import squared_diameter, squared_width
 from ._summary import FEW, extent_of_few
+
+if TYPE_CHECKING:
+    from .._base import Live
 
 # The greatest relative error of one operation, and an absolute error that no underflow exceeds.
 UNIT, TINY = 2.0**-53, 2.0**-1000
@@ -29,6 +34,47 @@ def compare(vertices: Points, measure: Compared, bound: float) -> int:
     else:
         squared = squared_diameter(vertices) if measure == "diameter" else squared_width(vertices)
     return _sign(squared, Fraction(bound) ** 2)
+
+
+class LastVertices:
+    """The vertices that a hull had when they were last taken: of someone who looks at it after each of its changes."""
+
+    __slots__ = ("_last",)
+
+    def __init__(self) -> None:
+        self._last: Any = np.empty((0, 2)) if kernel is None else kernel.LastVertices()
+
+    def __len__(self) -> int:
+        """Their number. O(1)."""
+        return len(self._last)
+
+    def points(self) -> Points:
+        """(h, 2) vertices, in the order of `DynamicHull.vertices`. O(h)."""
+        points: Points = self._last if kernel is None else self._last.points()
+        return points
+
+    def take(self, hull: "Live") -> None:
+        """Take the vertices of a hull. O(h log n)."""
+        tree: Any = hull._tree
+        if kernel is None:
+            self._last = tree.vertices()
+        else:
+            tree.take_vertices(self._last)
+
+    def take_if(self, hull: "Live", measure: Compared, bound: float, least: int, most: int) -> bool:
+        """Take them if what `compare` says of them is at least `least` and at most `most`, and say so.
+
+        Where rounding might decide, this says no: then `compare` knows. O(h log n), O(h²) of few.
+        """
+        tree: Any = hull._tree
+        if kernel is not None:
+            taken: bool = tree.take_vertices_if(self._last, measure, bound, least, most)
+            return taken
+        vertices = tree.vertices()
+        if not least <= compare(vertices, measure, bound) <= most:
+            return False
+        self._last = vertices
+        return True
 
 
 def _compare_area(vertices: Points, bound: float) -> int:

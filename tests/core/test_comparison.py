@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dynhull
-from dynhull.measure import _comparison, compare
+from dynhull.measure import LastVertices, _comparison, compare
 from dynhull.measure._area import doubled_area
 from dynhull.measure._extent import squared_diameter, squared_width
 
@@ -67,3 +67,35 @@ def test_a_bound_that_is_not_near_needs_no_fractions(monkeypatch: pytest.MonkeyP
     assert asked == []
     assert compare(rectangle, "width", 3.0) == 0
     assert asked == ["extent"]
+
+
+@pytest.mark.parametrize("keyed", [False, True])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_vertices_are_taken_where_the_sign_is_one_of_those_that_are_named(shape: str, *, keyed: bool) -> None:
+    random = np.random.default_rng(SHAPES.index(shape))
+    hull = dynhull.KeyedHull("int") if keyed else dynhull.DynamicHull()
+    last, nothing, doubts = LastVertices(), dynhull.DynamicHull(), 0
+    assert (len(last), last.points().shape) == (0, (0, 2))
+    for _ in range(40):
+        points = shaped(shape, random)
+        hull.clear()
+        if isinstance(hull, dynhull.KeyedHull):
+            hull.update(np.arange(len(points), dtype=np.uint64), points)
+        else:
+            hull.insert_many(points)
+        vertices = hull.vertices()
+        for measure in ("area", "diameter", "width"):
+            exact = squared(vertices, measure)
+            value = float(exact) if measure == "area" else sqrt(exact)
+            for bound in (value, nextafter(value, inf), value * (1 + 1e-13), 2 * value, value / 2, 0.0):
+                sign = compare(vertices, measure, bound)
+                for least, most in ((-1, -1), (-1, 0), (0, 1), (1, 1)):
+                    last.take(nothing)
+                    taken, named = last.take_if(hull, measure, bound, least, most), least <= sign <= most
+                    assert named or not taken, (measure, bound)
+                    assert np.array_equal(last.points(), vertices if taken else nothing.vertices())
+                    doubts += named and not taken
+        last.take(hull)
+        assert np.array_equal(last.points(), vertices)
+        assert len(last) == len(vertices)
+    assert doubts == 0 or dynhull.KERNEL == "cpp"

@@ -41,7 +41,7 @@ PACKAGES = {
     "dynhull.measure": {
         *("area", "bounds", "centroid", "diameter", "distance", "intersect_lines"),
         *("label_point", "min_box", "min_circle", "min_perimeter_box", "perimeter", "width"),
-        *("FEW", "Summary", "summary", "Compared", "compare"),
+        *("FEW", "Summary", "summary", "Compared", "compare", "LastVertices"),
     },
     "dynhull.robust": {"depth", "nearest_points"},
     "dynhull.static": {

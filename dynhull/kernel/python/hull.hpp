@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "../globe/framed_tree.hpp"
+#include "../query/certain_sign.hpp"
 #include "../query/layers.hpp"
 #include "../query/locate_index.hpp"
 #include "../query/sketch.hpp"
@@ -30,6 +34,11 @@ inline Gnomonic gnomonic_of(const nb::object& parameters) {
   return {center.first, center.second, {sine.first, sine.second}, {cosine.first, cosine.second}};
 }
 inline nb::object globe_module(const char* name) { return nb::module_::import_("dynhull._globe").attr(name); }
+
+// The vertices that a hull had when they were last taken.
+struct LastVertices {
+  std::vector<Point> points;
+};
 
 class Hull {
  protected:
@@ -103,10 +112,14 @@ class Hull {
     return array_of(reading([&] { return tree_.plane().chain(static_cast<Side>(side)); }));
   }
 
-  PointArray vertices() {
-    std::vector<Point> found = reading([&] { return tree_.vertices(); }, expected_vertices());
-    vertices_ = found.size();
-    return array_of(std::move(found));
+  PointArray vertices() { return array_of(vertex_list()); }
+  void take_vertices(LastVertices& last) { last.points = vertex_list(); }
+  bool take_vertices_if(LastVertices& last, std::string_view measure, double bound, int least, int most) {
+    std::vector<Point> found = vertex_list();
+    const std::optional<int> sign = certain_sign(found, measure.empty() ? ' ' : measure[0], bound);
+    if (!sign || *sign < least || *sign > most) return false;
+    last.points = std::move(found);
+    return true;
   }
 
   SignArray locate(const nb::object& xy) {
@@ -309,6 +322,12 @@ class Hull {
   FramedTree& writable() {
     lock_.await_writable();
     return tree_;
+  }
+
+  std::vector<Point> vertex_list() {
+    std::vector<Point> found = reading([&] { return tree_.vertices(); }, expected_vertices());
+    vertices_ = found.size();
+    return found;
   }
 
   // Refreshes the index if that pays for the queries since the hull last changed.

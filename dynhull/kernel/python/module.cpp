@@ -95,6 +95,10 @@ nb::class_<Tree>& add_reads(nb::class_<Tree>& type) {
       .def("clear", &Tree::clear, "Remove every point.")
       .def("points", &Tree::points, "All points in lexicographic order, with multiplicity. O(n).")
       .def("vertices", &Tree::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
+      .def("take_vertices", &Tree::take_vertices, "last"_a, "Take the vertices. O(h log n).")
+      .def("take_vertices_if", &Tree::take_vertices_if, "last"_a, "measure"_a, "bound"_a, "least"_a, "most"_a,
+           "Take the vertices if the sign of a measure less a bound is certain, as `sign_of_measure` has it, and "
+           "at least `least` and at most `most`. O(h log n), or O(h²) of few.")
       .def("chain", &Tree::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")
       .def("locate", &Tree::locate, "xy"_a, "For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row.")
       .def("support", &Tree::support, "directions"_a,
@@ -116,6 +120,13 @@ nb::class_<Tree>& add_reads(nb::class_<Tree>& type) {
       .def("copy", &Tree::copy, "An independent tree of the same points. O(n).")
       .def("check", &Tree::check, "Raise AssertionError if an invariant is broken. O(n log n).")
       .def_prop_ro("memory", &Tree::memory, "The bytes that the tree uses, and the bytes that it reserves.");
+}
+
+void add_last_vertices(nb::module_& module) {
+  nb::class_<LastVertices>(module, "LastVertices", "The vertices that a hull had when they were last taken.")
+      .def(nb::init<>())
+      .def("__len__", [](const LastVertices& last) { return last.points.size(); })
+      .def("points", [](const LastVertices& last) { return array_of(last.points); }, "The vertices.");
 }
 
 void add_hull_tree(nb::module_& module) {
@@ -371,6 +382,7 @@ NB_MODULE(_kernel, module) {
   nanobind::set_leak_warnings(false);  // a daemon thread that has a hull at the end of its program is no fault
   module.doc() = "The hull tree in C++, with the same results as the one in Python.";
   nanobind::register_exception_translator(dynhull::translate_broken_invariant);
+  dynhull::add_last_vertices(module);
   dynhull::add_hull_tree(module);
   dynhull::add_entities(module);
   dynhull::add_fences(module);

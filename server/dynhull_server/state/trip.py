@@ -45,17 +45,19 @@ class Reservation:
     limits: Limits
 
 
-@dataclass(slots=True)
 class Quiet:
-    """Alarms that look at the hulls of a trip, and as a rule have nothing to say.
+    """Alarms that look at the hulls of trips, and as a rule have nothing to say.
 
-    Attributes:
+    Args:
         line: the alarms.
-        part: makes the part of the trip that concerns them, once one may have something to say.
+        part: makes the part of a trip that concerns them, once one may have something to say.
     """
 
-    line: "Line"
-    part: "Callable[[], FencePart]"
+    __slots__ = ("line", "part")
+
+    def __init__(self, line: "Line", part: "Callable[[Line, Trip], FencePart]") -> None:
+        self.line = line
+        self.part = part
 
     def look_again(self, names: Iterable[str]) -> None:
         """Look at hulls as the storage has them, after a commit that failed."""
@@ -148,7 +150,7 @@ class Trip:
     def alarmed(self, request: WriteBatch, applied: Applied, records: list[Record] | None) -> None:
         """Take over a batch that was applied without a trip, and about which an alarm has something to say."""
         if self.quiet is not None:
-            self.fences, self.quiet = self.quiet.part(), None
+            self.fences, self.quiet = self.quiet.part(self.quiet.line, self), None
         leg = self.legs[request.name]
         leg.records = records
         assert self.fences is not None  # it was made for a hull with alarms,
@@ -245,7 +247,7 @@ class Trip:
     def _fences_at(self, hull: Hull, now: int) -> "FencePart | None":
         """What the trip does to fences, now that a hull has perhaps a new revision."""
         if self.quiet is not None and self.quiet.line.touched(hull, now):
-            self.fences, self.quiet = self.quiet.part(), None
+            self.fences, self.quiet = self.quiet.part(self.quiet.line, self), None
         return self.fences
 
     def _write_together(self, request: WriteTogether) -> None:

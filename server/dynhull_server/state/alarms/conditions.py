@@ -104,6 +104,11 @@ class Condition:
             sign > 0 if self.op == ">" else sign >= 0 if self.op == ">=" else sign < 0 if self.op == "<" else sign <= 0
         )
 
+    def signs(self, *, holding: bool) -> tuple[int, int]:
+        """The least and the greatest sign of the measure less the bound for which it holds, or does not."""
+        found = [sign for sign in (-1, 0, 1) if self.holds(sign) == holding]
+        return found[0], found[-1]
+
     def meets(self, other: "Condition") -> bool:
         """Whether both can hold at once, given another one of the same measure and the other direction."""
         if self.limit == other.limit:

@@ -54,6 +54,19 @@ class AlarmRule:
         """Whether nothing but a change of the outline means anything for it."""
         return self.raises.measure in OF_OUTLINES
 
+    @cached_property
+    def steady(self) -> tuple[tuple[float, int, int], ...]:
+        """A bound, and the least and the greatest sign of the measure less it, with which all stays as it is.
+
+        Of a hull for which nothing is raised, for which the condition holds and waits, and for which it is raised.
+        """
+        raises, clears = self.raises, self.clears
+        return (
+            (raises.bound, *raises.signs(holding=False)),
+            (raises.bound, *raises.signs(holding=True)),
+            (clears.bound, *clears.signs(holding=False)),
+        )
+
     @property
     def other(self) -> str | None:
         """The name of the other hull that it compares hulls with, None for none."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull.measure import Compared, compare
+from dynhull.measure import Compared, LastVertices, compare
 
 from ..records import NO_TIME
 from .conditions import Condition
@@ -48,6 +48,7 @@ class Watched:
     __slots__ = (
         "_as_of",
         "_exact",
+        "_last",
         "_rule",
         "_seen",
         "fresh",
@@ -70,16 +71,25 @@ class Watched:
         self._rule = rule
         measure = rule.raises.measure
         exact = measure in EXACT and not self._geographic
+        # Of a measure that is compared exactly, which has only vertices; what is seen for others is in `_seen`.
         self._exact = cast("Compared", measure) if exact else None
+        self._last = LastVertices() if exact else None
+        self._seen = NOTHING
         self._look()
 
     def _look(self) -> None:
         self._as_of = self._changes()
-        self._seen = NOTHING if self._rule.silence else self._now()
+        if self._last is not None:
+            self._last.take(self.hull.state.hull)
+        elif not self._rule.silence:
+            self._seen = self._now()
 
     def _now(self) -> Seen:
         other = None if self.other is None else self.other.state
         return seen(self._rule, self.hull.state, other, geographic=self._geographic)
+
+    def _noted(self) -> Seen:
+        return self._seen if self._last is None else Seen(self._last.points())
 
     def _changes(self) -> tuple[int, int]:
         """What differs after each change of what the rule compares, of the hull and of the other one."""
@@ -94,7 +104,7 @@ class Watched:
     @property
     def vertex_count(self) -> int:
         """The number of vertices that were compared when it was last looked at; 0 for a rule that needs none."""
-        return len(self._seen.vertices) + len(self._seen.others)
+        return len(self._seen.vertices) + len(self._seen.others) if self._last is None else len(self._last)
 
     @property
     def waits(self) -> bool:
@@ -116,14 +126,14 @@ class Watched:
         """What was seen of the hull before, if it has changed since this was last asked; else None."""
         if self._as_of == self._changes():
             return None
-        before = self._seen
+        before = self._noted()
         self._look()
         return before
 
     def touched(self, now: int) -> bool:
         """Whether a new revision of the hull changes anything for the alarm; takes note of it if it does not."""
-        if self._exact is not None and not self.fresh:
-            return self._crossed(self._exact)
+        if self._last is not None and not self.fresh:
+            return self._crossed(self._last)
         if self.fresh or self._as_of == self._changes():
             return self.fresh
         rule, before = self._rule, self._seen
@@ -138,17 +148,20 @@ class Watched:
             self._as_of, self._seen = NEVER, before
         return changes
 
-    def _crossed(self, measure: Compared) -> bool:
+    def _crossed(self, last: LastVertices) -> bool:
         """As `touched`, for a measure that is compared exactly: what is done after most changes of outlines."""
-        hull = self.hull.state.hull
+        hull, measure = self.hull.state.hull, self._exact
         changes = hull.changes
         if changes == self._as_of[0]:
             return False
-        vertices, condition = hull.vertices(), self._rule.clears if self.raised else self._rule.raises
-        if condition.holds(compare(vertices, measure, condition.bound)) != (self.waits and not self.raised):
-            self._as_of = NEVER  # `changed` says what was before
-            return True
-        self._as_of, self._seen = (changes, 0), Seen(vertices)
+        assert measure is not None  # as `last` is not
+        bound, least, most = self._rule.steady[2 if self.raised else self.waits]
+        if not last.take_if(hull, measure, bound, least, most):
+            if not least <= compare(hull.vertices(), measure, bound) <= most:
+                self._as_of = NEVER  # `changed` says what was before
+                return True
+            last.take(hull)
+        self._as_of = changes, 0
         return False
 
     def doubt(self) -> None:
@@ -163,11 +176,11 @@ class Watched:
 
     def holds(self, condition: Condition) -> bool:
         """Whether a condition of the rule holds for the hull as it was last looked at."""
-        return holds(condition, self._seen, self._rule, geographic=self._geographic)
+        return holds(condition, self._noted(), self._rule, geographic=self._geographic)
 
     def value(self, before: Seen | None = None) -> float:
         """The measure as it was last looked at, or of what was seen before."""
-        return value_of(self._seen if before is None else before, self._rule, geographic=self._geographic)
+        return value_of(self._noted() if before is None else before, self._rule, geographic=self._geographic)
 
     def keys(self) -> "Keys | None":
         """The keys of the vertices that the alarm is about, at most MOST_KEYS; None for other alarms and hulls."""
@@ -247,7 +260,10 @@ class WatchedHulls:
 
     def weight(self, name: str) -> int:
         """The number of vertices of all that is compared after a change of a hull."""
-        return sum(each.vertex_count for each in self.at(name))
+        total = 0
+        for each in self.at(name):
+            total += each.vertex_count
+        return total
 
     def renewed(self, other: "Hull | None") -> "WatchedHulls":
         """The same hulls as they are now, of which nothing is known otherwise."""

@@ -1,7 +1,6 @@
 """What the core does for fences: their part of trips, and what follows once that is committed or fails."""
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 from ..events import Effect, Examine, WakeFences
@@ -102,7 +101,7 @@ class FenceCore:
         for request in requests:
             if type(request) is not WriteBatch:
                 return None
-            name = request.name
+            name = request.write.name
             if name not in legs:
                 hull = hulls.get(name)
                 if hull is None:
@@ -112,12 +111,12 @@ class FenceCore:
         if weight > QUIET_WEIGHT:
             return None
         trip = Trip(legs, requests, now, pause, {})
-        trip.quiet = Quiet(line, partial(self._quiet_part, line, legs, requests))
+        trip.quiet = Quiet(line, self._quiet_part)
         return trip
 
-    def _quiet_part(self, line: Line, legs: dict[str, Leg], requests: list[Request]) -> FencePart:
+    def _quiet_part(self, line: Line, trip: Trip) -> FencePart:
         registry = self._registry
-        return FencePart(Ground(legs, [line], {}, {}, registry.tallies, registry.limits.fences), requests)
+        return FencePart(Ground(trip.legs, [line], {}, {}, registry.tallies, registry.limits.fences), trip.requests)
 
     def _reserve(self, request: CreateFence, numbers: dict[str, int]) -> None:
         number = self._registry.reserve_fence(alarm=request.config.rule is not None)

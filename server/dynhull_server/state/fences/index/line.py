@@ -145,11 +145,12 @@ class Line:
 
     def touched(self, hull: Hull, now: int) -> bool:
         """Whether a new revision of a hull may mean anything for one of the alarms at it: as a rule it does not."""
-        name, found = hull.name, False
+        name, found = hull.row.name, False
         for fence in self.alarms.get(name, ()):
-            for watched in () if fence.watched is None else fence.watched.at(name):
-                if watched.touched(now):
-                    found = True  # the others take note of the revision, too
+            if fence.watched is not None:
+                for watched in fence.watched.at(name):
+                    if watched.touched(now):
+                        found = True  # the others take note of the revision, too
         return found
 
     def watching(self, names: Iterable[str]) -> Iterator[tuple[Fence, Watched]]:
@@ -222,7 +223,8 @@ class Line:
         """The number of subjects that a change of a hull may concern beside its own rows."""
         area, measured = self.areas.get(name), 0
         for fence in self.alarms.get(name, ()):
-            measured += 0 if fence.watched is None else MEASURED * fence.watched.weight(name)
+            if fence.watched is not None:
+                measured += MEASURED * fence.watched.weight(name)
         if area is None:
             return measured
         return sum(fence.subject_count for fence in area.fences.values()) + (PEELED if area.layered else 0) + measured
