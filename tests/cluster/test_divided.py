@@ -742,7 +742,6 @@ def test_what_is_about_the_past_is_refused_by_name(client: HullClient) -> None:
         lambda: client.track("past/big", ["a"]),
         lambda: next(client.feed("past/big", after=0)),
         lambda: next(client.feed("past/big", consumer="c")),
-        lambda: next(client.feed(prefix="past/", after=0)),
         lambda: client.ack_feed("past/big", consumer="c", after=0),
         lambda: client.erase_history("past/big", ["z"]),
         lambda: client.set_history("past/big", "1d"),

@@ -8,6 +8,7 @@ python -m simulation mutants                       after how many lives the simu
 import argparse
 import gc
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -26,7 +27,7 @@ def main() -> int:
     parser.add_argument("--package", help="the folder of other copies of the server's packages")
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="random plans")
-    run.add_argument("--seconds", type=float, default=60.0)
+    run.add_argument("--seconds", type=float, help="end after this time (default: 60, or never with --lives)")
     run.add_argument("--seed", type=int, default=1)
     run.add_argument("--layer", choices=(*LAYERS, "all"), default="all")
     run.add_argument("--lives", type=int, default=None, help="end after this number of lives")
@@ -75,7 +76,9 @@ def _search(arguments: argparse.Namespace) -> int:
     seconds = dict.fromkeys(layers, 0.0)
     begun = reported = time.monotonic()
     seed = arguments.seed * ROOM
-    while time.monotonic() - begun < arguments.seconds:
+    least = 60.0 if arguments.lives is None else math.inf
+    until = begun + (least if arguments.seconds is None else arguments.seconds)
+    while time.monotonic() < until:
         layer = min(layers, key=lambda each: seconds[each])
         plan = random_plan(seed, layer)
         if arguments.alarms and "alarms" not in plan:
