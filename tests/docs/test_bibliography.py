@@ -7,7 +7,14 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BIBLIOGRAPHY = ROOT / "docs" / "algorithms" / "bibliography.md"
-PLACES = ("dynhull/**/*.py", "dynhull/**/*.hpp", "server/**/*.py", "clients/**/*.py", "docs/**/*.md")
+PLACES = (
+    "dynhull/**/*.py",
+    "dynhull/**/*.hpp",
+    "server/**/*.py",
+    "clients/**/*.py",
+    "clients/*/src/**/*.js",
+    "docs/**/*.md",
+)
 MONTHS = {"March", "July"}  # of the days that the demo replays
 
 NAME = r"(?:van den |van |de )?[A-Z][\w-]+"

@@ -227,6 +227,12 @@ class Fence:
             return []
         return None if self._recent is None else self._recent.events(self.number, after, most)
 
+    def told(self, events: list[FenceEvent]) -> list[FenceEvent]:
+        """Events from the storage, without those of a commit of a moment ago: others are not told of them yet."""
+        if not events or events[-1].sequence <= self.last:
+            return events
+        return [each for each in events if each.sequence <= self.last]
+
     @property
     def oldest_recent(self) -> int:
         """The sequence of the oldest event in memory; that of the next one if there is none."""
