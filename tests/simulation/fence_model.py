@@ -749,6 +749,8 @@ class FenceModel:
         for name in {*fence.consumers, *put}:
             known = fence.consumers.get(name, Consumer(name, fence.first - 1))
             now = put.get(name, known)
+            if now.acknowledged < known.acknowledged and name in self.unacked[fence.row.name]:
+                known = Consumer(name, fence.first - 1)  # deleted, and made again in the same trip
             if not known.acknowledged <= now.acknowledged <= max(fence.last, known.acknowledged):
                 raise self._model.finds(f"the consumer {known} of {fence.row.name} becomes {now}")
             most, least = (

@@ -122,7 +122,10 @@ class Quarantined:
         released, left = _puts(rows), frozenset(_listed(rows.held.dropped))
         waited = frozenset(self.waiting)
         for key, put in released.items():
-            if key not in left or self.waiting.get(key, put)[:4] != put[:4]:
+            waiting = self.waiting.get(key, put)
+            if waiting.time == NO_TIME and self.rules.max_speed is not None:  # a rule since then needs a time
+                waiting = waiting._replace(time=put.time)
+            if key not in left or waiting[:4] != put[:4]:
                 raise BrokenRuleError(f"{key!r} is released at {put}, and waits at {self.waiting.get(key)}")
         if not left <= waited or len(rows.held.rows):
             raise BrokenRuleError(f"{left} left the quarantine, and {waited} were there")
