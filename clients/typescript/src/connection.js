@@ -26,6 +26,29 @@ export const PAUSES = { first: 0.25, last: 15 }
 
 const JSON_TYPE = "application/json"
 
+/**
+ * What a call brings, tried again after growing pauses where that is safe.
+ * @template T
+ * @param {() => Promise<T>} once
+ * @param {number} retries
+ * @param {Call} call
+ * @param {(error: DynhullError) => boolean} [notSent] whether nothing of it has reached the other side
+ * @returns {Promise<T>}
+ */
+export async function answered(once, retries, call, notSent = () => false) {
+  const pauses = growing()
+  for (let tries = 0; ; tries++) {
+    try {
+      return await once()
+    } catch (error) {
+      if (!(error instanceof DynhullError)) throw error
+      const again = error.passing || notSent(error) || (call.repeatable && error.unknown)
+      if (!again || tries >= retries) throw error
+      await pause(pauses.next().value, call.signal)
+    }
+  }
+}
+
 /** Calls of one gateway. */
 export class Connection {
   #token
@@ -51,17 +74,8 @@ export class Connection {
    * @param {Call} [call]
    * @returns {Promise<any>} what the answer's JSON has
    */
-  async ask(path, call = {}) {
-    const pauses = growing()
-    for (let tries = 0; ; tries++) {
-      try {
-        return await this.#once(path, call)
-      } catch (error) {
-        const again = error instanceof DynhullError && (error.passing || (call.repeatable && error.unknown))
-        if (!again || tries >= this.#retries) throw error
-        await pause(pauses.next().value, call.signal)
-      }
-    }
+  ask(path, call = {}) {
+    return answered(() => this.#once(path, call), this.#retries, call)
   }
 
   /**

@@ -1,6 +1,5 @@
-import { growing, pause } from "../connection.js"
+import { answered } from "../connection.js"
 import { Client } from "../client.js"
-import { DynhullError } from "../errors.js"
 import { routed } from "./calls.js"
 import { Channel, notSent } from "./channel.js"
 import { Followed } from "./follow.js"
@@ -37,18 +36,8 @@ class GrpcConnection {
    * @param {import("../connection.js").Call} [call]
    * @returns {Promise<any>}
    */
-  async ask(path, call = {}) {
-    const pauses = growing()
-    for (let tries = 0; ; tries++) {
-      try {
-        return await this.#once(path, call)
-      } catch (error) {
-        if (!(error instanceof DynhullError)) throw error
-        const again = error.passing || notSent(error) || (call.repeatable && error.unknown)
-        if (!again || tries >= this.#retries) throw error
-        await pause(pauses.next().value, call.signal)
-      }
-    }
+  ask(path, call = {}) {
+    return answered(() => this.#once(path, call), this.#retries, call, notSent)
   }
 
   /** @param {string} path @param {import("../connection.js").Call} call */
