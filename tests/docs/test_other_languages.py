@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from importlib.resources import files
@@ -10,25 +9,11 @@ from pathlib import Path
 
 import pytest
 from peers import missing
-from server_process import PATIENCE
+from run_in import run
 
 ROOT = Path(__file__).parents[2]
 DEFAULT_ADDRESS = "127.0.0.1:50051"
 SCRIPTS = Path(sys.executable).parent
-
-
-def run(*command: str, folder: Path, **environment: str) -> str:
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @pytest.mark.parametrize("tool", ["buf", "grpcurl"])

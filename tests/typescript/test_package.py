@@ -2,7 +2,6 @@
 
 import gzip
 import json
-import os
 import shutil
 import subprocess
 import tarfile
@@ -20,6 +19,7 @@ from gateway_process import Gateway, gateway_process
 from mortal_server import MortalServer
 from peers import program, typescript
 from playwright.sync_api import Browser, Page, expect
+from run_in import run
 from server_process import PATIENCE
 
 from dynhull import DynamicHull
@@ -46,24 +46,9 @@ def gateway(server: MortalServer) -> Iterator[Gateway]:
         yield running
 
 
-def run(folder: Path, *command: str, **environment: str) -> str:
-    """What a command prints in a folder."""
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
 def node(*words: str, **environment: str) -> str:
     """What a program of Node prints in the package's folder."""
-    return run(typescript(), program("node"), *words, **environment)
+    return run(program("node"), *words, folder=typescript(), **environment)
 
 
 def blocks(kind: str) -> list[str]:
@@ -80,9 +65,8 @@ def test_its_own_tests(gateway: Gateway, server: MortalServer) -> None:
 
 def test_it_packs(tmp_path: Path) -> None:
     """What is packed and installed in an empty folder runs, and its types are those that a strict program needs."""
-    packed = run(
-        typescript(), program("npm"), "pack", "--silent", "--offline", "--pack-destination", str(tmp_path)
-    ).strip()
+    pack = program("npm"), "pack", "--silent", "--offline", "--pack-destination", str(tmp_path)
+    packed = run(*pack, folder=typescript()).strip()
     installed = tmp_path / "node_modules" / "dynhull"
     with tarfile.open(tmp_path / packed) as archive:
         archive.extractall(tmp_path, filter="data")
@@ -96,8 +80,8 @@ def test_it_packs(tmp_path: Path) -> None:
     assert (installed / "LICENSE").read_text() == (HERE.parents[1] / "LICENSE").read_text()
     for name in ("program.mjs", "program.ts", "tsconfig.json"):
         shutil.copy(HERE / "installed" / name, tmp_path)
-    assert run(tmp_path, program("node"), "program.mjs") == "6 1\n"
-    run(tmp_path, str(typescript() / "node_modules" / ".bin" / "tsc"))
+    assert run(program("node"), "program.mjs", folder=tmp_path) == "6 1\n"
+    run(str(typescript() / "node_modules" / ".bin" / "tsc"), folder=tmp_path)
 
 
 def test_python_has_the_same_cases() -> None:
