@@ -411,7 +411,7 @@ class CoreServer:
         events = fence.events(after, op["most"])
         if events is None:
             try:
-                events = fence.told(self._storage.read_events(fence.number, after, op["most"]))
+                events = fence.published_among(self._storage.read_events(fence.number, after, op["most"]))
             except KeyError:  # deleted meanwhile
                 events = fence.events(fence.oldest_recent - 1, op["most"]) or []
             except (OSError, MemoryError) as error:

@@ -12,12 +12,15 @@ MIB = 2**20
 # Bytes of a stream of the server that wait here for a caller who does not read.
 READ_AHEAD = 2**17
 
+Host = Annotated[str, typer.Option(help="Address to listen on.")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")]
+
 
 @connecting
 def gateway(
     connect: Connect,
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")] = 8080,
+    host: Host = "127.0.0.1",
+    port: Port = 8080,
     origin: Annotated[
         list[str] | None,
         typer.Option(

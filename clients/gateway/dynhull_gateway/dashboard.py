@@ -6,6 +6,7 @@ import typer
 
 from dynhull_cli.connected import Connect, connecting
 
+from .command import Host, Port
 from .tiles import LARGEST_ZOOM, Tiles
 
 LOOPBACK = "127.0.0.1", "localhost", "[::1]"
@@ -21,8 +22,8 @@ def dashboard(
         typer.Option(help="URL of the server's metrics page, for updates per second and acknowledgement delay."),
     ] = None,
     prefix: Annotated[str, typer.Option(help="Offer only hulls and fences whose names begin with this.")] = "",
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")] = 5006,
+    host: Host = "127.0.0.1",
+    port: Port = 5006,
     origin: Annotated[
         list[str] | None,
         typer.Option(
@@ -58,15 +59,14 @@ def dashboard(
     from .known_names import names_of
     from .page import PageSettings
     from .page.metrics import Metrics
-    from .serve import listener, run
+    from .serve import in_url, listener, run
     from .settings import Settings
 
     ground = None if tiles is None else Tiles(tiles, tiles_attribution, tiles_zoom)
     further = names_of(origin or ())
     with listener(host, port) as listening:
         port = listening.getsockname()[1]
-        name = f"[{host}]" if ":" in host else host
-        names = further | names_of(f"{each}:{port}" for each in (name, *LOOPBACK))
+        names = further | names_of(f"{each}:{port}" for each in (in_url(host), *LOOPBACK))
         measured = None if metrics is None else Metrics(metrics)
         page = PageSettings(prefix=prefix, x_unit=x_unit, y_unit=y_unit, tiles=ground, metrics=measured)
         settings = Settings(names=names, page=page, read_only=True)

@@ -37,6 +37,11 @@ def run(connect: Callable[[], AsyncHullClient], listening: socket.socket, settin
         runner.run(serve(connect, listening, settings))
 
 
+def in_url(host: str) -> str:
+    """A host as it is written before a port."""
+    return f"[{host}]" if ":" in host else host
+
+
 async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket, settings: Settings) -> None:
     """Serve on a listening socket."""
     async with connect() as client:
@@ -67,9 +72,8 @@ async def serve(connect: Callable[[], AsyncHullClient], listening: socket.socket
             asyncio.get_running_loop().add_signal_handler(number, stop)
         serving = asyncio.create_task(server.serve([listening]))
         host, port = listening.getsockname()[:2]
-        place = f"[{host}]" if ":" in host else host
         kind = "dashboard" if settings.read_only else "gateway"
-        typer.echo(f"dynhull {kind} on http://{place}:{port}{settings.root_path}")
+        typer.echo(f"dynhull {kind} on http://{in_url(host)}:{port}{settings.root_path}")
         following = asyncio.create_task(app.state.health.follow(client.presence()))
         try:
             await serving
@@ -97,5 +101,5 @@ def explained(host: str, port: int) -> Iterator[None]:
             why = "another program uses this port: stop it, or choose another port"
         else:
             why = os.strerror(number) if number in errno.errorcode else error.strerror or str(error)
-        place = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+        place = f"{in_url(host)}:{port}"
         raise OSError(f"cannot serve: cannot listen on {place}: {why}") from None

@@ -3,6 +3,7 @@
 import asyncio
 from functools import partial
 
+from ..garbage import without_collections
 from ..state.core import Core
 from ..state.limits import Limits
 from ..state.records import CommitStamp
@@ -14,7 +15,7 @@ from .fence_keeping import FenceKeeping
 from .fences import Fences
 from .housekeeping import Housekeeping
 from .hulls import Hulls
-from .loading import Loader, without_collections
+from .loading import Loader
 from .past_fences import PastFences
 from .positions import incarnation_of
 from .series import LOOK_SECONDS

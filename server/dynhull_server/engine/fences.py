@@ -108,7 +108,7 @@ class LiveFence:
             return self.fence.events(self.fence.oldest_recent - 1, most) or []
         except (StorageError, OSError, MemoryError) as error:
             raise NotStoredError(words_for_callers(error)) from error
-        return self.fence.told(events)
+        return self.fence.published_among(events)
 
     async def reached(self, sequence: int) -> None:
         """Wait until the fence has an event of this sequence or a later one, or is deleted."""

@@ -1,8 +1,6 @@
 """Loads the hulls of a storage, at the start or while another server still owns them."""
 
-import gc
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,18 +16,6 @@ from .driver import Driver
 READ_TOGETHER = 1000
 # Seconds of loading between reports of the progress.
 LOAD = 0.1
-
-
-@contextmanager
-def without_collections() -> Iterator[None]:
-    """A block that makes much and drops little: searching it for garbage again and again takes a fifth of the time."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 @dataclass(slots=True)

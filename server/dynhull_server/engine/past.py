@@ -82,6 +82,12 @@ class Outlined:
     time: int
 
 
+def time_of(record: Record, before: CommitStamp | None) -> int:
+    """The time of a record's commit, or of the one before where it is not known; 0 for none."""
+    committed = record.committed or before
+    return 0 if committed is None else committed.time
+
+
 class _ErasedMeanwhileError(Exception):
     """Keys were erased while a hull was rebuilt: what was read first may have them, and what was read last not."""
 
@@ -215,14 +221,13 @@ class PastHulls:
                         if found:  # these come first
                             break
                         raise
-                record, committed = ahead.popleft(), state.committed
+                record = ahead.popleft()
+                time = time_of(record, state.committed)
                 state.catch_up([record], now)
                 if found and state.counts.points > self._max_rows:
                     break
                 self._require_room(state.counts.points)
                 before, vertices = state.known_vertices, state.vertices()
-                committed = record.committed or committed
-                time = 0 if committed is None else committed.time
                 found.append(Outlined(state.counts, state.committed, vertices, time))
                 rows += 1 + len(record.rows)
                 size += 0 if vertices is before else vertices.nbytes

@@ -23,7 +23,7 @@ from ..storage.past import Erasure
 from .driver import Driver
 from .fences import Fences
 from .live_hull import LiveHull
-from .past import Outlined, PastHulls
+from .past import Outlined, PastHulls, time_of
 from .recalls import Recalls
 from .views import Event, Progress, VerticesView, View
 
@@ -160,7 +160,7 @@ class ReplayedHull(LiveHull):
                 return None
             after = self.counts.revision
             self._ahead.extend(await self._pasts.batches(self._live, after, self._last, self._erasures))
-        return self._time_of(self._ahead[0])
+        return time_of(self._ahead[0], self.committed)
 
     async def advance(self, until: int | None) -> None:
         """Go to the next revision; and over those after it that were committed by a time, as far as they are at hand.
@@ -171,7 +171,7 @@ class ReplayedHull(LiveHull):
             self._at = self._outlines.popleft()
             return
         records = [self._ahead.popleft()]
-        while until is not None and self._ahead and self._time_of(self._ahead[0]) <= until:
+        while until is not None and self._ahead and time_of(self._ahead[0], self.committed) <= until:
             records.append(self._ahead.popleft())
         await self._pasts.follow(self._state, records)
 
@@ -182,10 +182,6 @@ class ReplayedHull(LiveHull):
                 await self._live.outlined(FOREVER)
         except TimeoutError:
             return
-
-    def _time_of(self, record: Record) -> int:
-        committed = record.committed or self.committed
-        return 0 if committed is None else committed.time
 
 
 async def replay(

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
+
+from dynhull.measure import Compared
 
 from ..records import HullSettings
 from .conditions import SILENT, Condition, condition_of
@@ -55,16 +58,16 @@ class AlarmRule:
         return self.raises.measure in OF_OUTLINES
 
     @cached_property
-    def steady(self) -> tuple[tuple[float, int, int], ...]:
-        """A bound, and the least and the greatest sign of the measure less it, with which all stays as it is.
+    def steady(self) -> tuple[tuple[Compared, float, int, int], ...]:
+        """The measure, a bound, and the least and the greatest sign of it less the bound with which all stays as it is.
 
         Of a hull for which nothing is raised, for which the condition holds and waits, and for which it is raised.
         """
-        raises, clears = self.raises, self.clears
+        raises, clears, measure = self.raises, self.clears, cast("Compared", self.raises.measure)
         return (
-            (raises.bound, *raises.signs(holding=False)),
-            (raises.bound, *raises.signs(holding=True)),
-            (clears.bound, *clears.signs(holding=False)),
+            (measure, raises.bound, *raises.signs(holding=False)),
+            (measure, raises.bound, *raises.signs(holding=True)),
+            (measure, clears.bound, *clears.signs(holding=False)),
         )
 
     @property

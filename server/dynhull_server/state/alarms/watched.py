@@ -2,12 +2,12 @@
 
 from collections.abc import Collection, Iterator, Mapping
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynhull.keys import PackedKeys
-from dynhull.measure import Compared, LastVertices, compare
+from dynhull.measure import LastVertices, compare
 
 from ..records import NO_TIME
 from .conditions import Condition
@@ -47,7 +47,6 @@ class Watched:
 
     __slots__ = (
         "_as_of",
-        "_exact",
         "_last",
         "_rule",
         "_seen",
@@ -69,10 +68,8 @@ class Watched:
         self.planned: int | None = None
         self.fresh = True
         self._rule = rule
-        measure = rule.raises.measure
-        exact = measure in EXACT and not self._geographic
+        exact = rule.raises.measure in EXACT and not self._geographic
         # Of a measure that is compared exactly, which has only vertices; what is seen for others is in `_seen`.
-        self._exact = cast("Compared", measure) if exact else None
         self._last = LastVertices() if exact else None
         self._seen = NOTHING
         self._look()
@@ -150,12 +147,11 @@ class Watched:
 
     def _crossed(self, last: LastVertices) -> bool:
         """As `touched`, for a measure that is compared exactly: what is done after most changes of outlines."""
-        hull, measure = self.hull.state.hull, self._exact
+        hull = self.hull.state.hull
         changes = hull.changes
         if changes == self._as_of[0]:
             return False
-        assert measure is not None  # as `last` is not
-        bound, least, most = self._rule.steady[2 if self.raised else self.waits]
+        measure, bound, least, most = self._rule.steady[2 if self.raised else self.waits]
         if not last.take_if(hull, measure, bound, least, most):
             if not least <= compare(hull.vertices(), measure, bound) <= most:
                 self._as_of = NEVER  # `changed` says what was before

@@ -227,7 +227,7 @@ class Fence:
             return []
         return None if self._recent is None else self._recent.events(self.number, after, most)
 
-    def told(self, events: list[FenceEvent]) -> list[FenceEvent]:
+    def published_among(self, events: list[FenceEvent]) -> list[FenceEvent]:
         """Events from the storage, without those of a commit of a moment ago: others are not told of them yet."""
         if not events or events[-1].sequence <= self.last:
             return events
