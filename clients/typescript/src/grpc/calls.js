@@ -248,9 +248,9 @@ const FENCES = {
     const config = requests.fenceConfig(body)
     const create = async () => answers.fenceOf((await call("CreateFence", { name: body.name, config })).fence)
     return created(asked, create, async () => {
-      const fence = answers.fenceOf((await call("GetFence", { name: body.name })).fence)
-      const wanted = await call("GetFence", { name: body.name }).then(({ fence: { config: has } }) => answers.fenceSettingsOf(has))
-      return same(wanted, { ...wanted, ...given(body) }) ? fence : null
+      const { fence } = await call("GetFence", { name: body.name })
+      const has = answers.fenceSettingsOf(fence.config)
+      return same(has, { ...has, ...given(body) }) ? answers.fenceOf(fence) : null
     })
   },
   "PUT /fences/*": async ({ names: [name], body, call }) => {
