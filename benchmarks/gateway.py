@@ -1,8 +1,8 @@
 """What the gateway costs: `python benchmarks/gateway.py`. Needs h2load (Debian's nghttp2-client).
 
-One-point POSTs on 64 connections beside an empty handler of the same framework, in turns; a body of newline-delimited
-JSON; and 500 streams of events on one hull that changes ten times a second. Server, gateway and callers share this
-machine.
+One-point POSTs on 64 connections, changes and locates, beside an empty handler of the same framework, in turns; a body
+of newline-delimited JSON; and 500 streams of events on one hull that changes ten times a second. Server, gateway and
+callers share this machine.
 """
 
 import argparse
@@ -44,10 +44,10 @@ def running(*command):
             process.terminate()
 
 
-def h2load(url, requests):
+def h2load(url, requests, posted):
     """Answers a second, all of which must be 2xx."""
     with tempfile.NamedTemporaryFile("w") as body:
-        body.write("[[1.5, 2.5]]")
+        body.write(posted)
         body.flush()
         command = ["h2load", "--h1", "-n", str(requests), "-c", str(CONNECTIONS), "-d", body.name, url]
         done = subprocess.run(
@@ -58,14 +58,17 @@ def h2load(url, requests):
 
 
 def posts(place, requests, turns):
+    works = {"points": "[[1.5, 2.5]]", "locate": '{"points": [[1.5, 2.5]]}'}
     with running(sys.executable, __file__, "--serve-empty") as beside:
-        urls = f"http://{place}/hulls/posts/points", f"http://{beside}/"
-        pairs = [[h2load(url, requests) for url in urls] for _ in range(turns)]
-    ours, theirs = (median(each) for each in zip(*pairs, strict=True))
-    share = median(a / b for a, b in pairs)
-    print(
-        f"one-point POSTs, {CONNECTIONS} connections: {ours:,.0f}/s; empty handler {theirs:,.0f}/s; share {share:.2f}"
-    )
+        for work, posted in works.items():
+            urls = f"http://{place}/hulls/posts/{work}", f"http://{beside}/"
+            pairs = [[h2load(url, requests, posted) for url in urls] for _ in range(turns)]
+            ours, theirs = (median(each) for each in zip(*pairs, strict=True))
+            share = median(a / b for a, b in pairs)
+            print(
+                f"one-point POSTs, {work}, {CONNECTIONS} connections: {ours:,.0f}/s; "
+                f"empty handler {theirs:,.0f}/s; share {share:.2f}"
+            )
 
 
 def upload(place, points, name, kind):

@@ -34,7 +34,7 @@ from .paths import PathsAsSent
 from .problems import RESPONSES
 from .read_only import ReadOnly
 from .settings import Settings
-from .small_changes import SmallChanges
+from .short_way import ShortWay
 
 DESCRIPTION = """Exact convex hulls of points that are inserted, moved and deleted.
 
@@ -58,6 +58,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         openapi_url=None,  # below, with a newline at its end
         docs_url=None,  # the framework's pages load scripts from elsewhere
         redoc_url=None,
+        telemetry={"tracing": False, "metrics": False, "logs": False},  # it looks for these with each request
         responses=RESPONSES,
         dependencies=[Depends(require_known), Depends(require_one_number)],
         separate_input_output_schemas=False,
@@ -87,7 +88,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.router.routes.extend(described)
     app.state.routes = [*pages, *described, *(route for router in routers for route in router.routes)]
     handlers.install(app)
-    app.add_middleware(SmallChanges, root_path=settings.root_path)
+    app.add_middleware(ShortWay, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
     if settings.origins:
         app.add_middleware(

@@ -34,7 +34,7 @@ class AskedAt:
     uid: str
 
 
-def _asked(at: AtMoment = None, at_uid: AtUid = "") -> AskedAt | None:
+async def _asked(at: AtMoment = None, at_uid: AtUid = "") -> AskedAt | None:
     if at is None:
         if at_uid:
             raise ValueError("at_uid: is given with at")

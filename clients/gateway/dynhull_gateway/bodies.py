@@ -25,6 +25,7 @@ NEWLINE = b"\n"
 FORM = "application/x-www-form-urlencoded"
 WHOLE = (b"", JSON.encode(), GEOJSON.encode())
 SENT = "dynhull.body"
+HERE = "dynhull.here"  # in the scope of a request whose body came together with its head
 
 
 def require_type(request: Request, types: Collection[str]) -> str:
@@ -134,6 +135,9 @@ class LimitedBodies:
         limit = self._settings.max_body if whole else self._settings.max_upload
         if int(headers.get(b"content-length", b"0")) > limit:
             await _too_large(limit)(scope, receive, send)
+            return
+        if scope.get(HERE) and b"content-length" in headers:
+            await self._app(scope, receive, send)
             return
         body = _Body(receive, limit, self._settings.body_seconds, whole=whole)
         await self._app(scope, body.receive, send)

@@ -1,22 +1,23 @@
-"""Small changes of many requests, gathered into batches.
+"""Small requests of many callers, gathered into calls.
 
-While batches of a hull are on their way, the requests for this hull that arrive meanwhile wait and then go together:
-many callers cost the server few batches, and a single one waits for nobody. Two are on their way at a time, so that one
-is read and answered while the other is applied. Requests that are not answered have no order, as if each had a
-connection of its own.
+While calls about a hull are on their way, the requests of the same kind for this hull that arrive meanwhile wait and
+then go together: many callers cost the server few calls, and a single one waits for nobody. Two calls are on their way
+at a time, so that one is read and answered while the other is carried out. Requests that are not answered have no
+order, as if each had a connection of its own.
 """
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from dynhull_client import Applied, AsyncHullClient, DynhullError, OutcomeUnknownError, UnavailableError
 
 from .changes import apply, encoded
 from .problems import ProblemError
-from .schemas import Batch, Key
+from .schemas import Batch, Key, Located, Points
 
 MOST_ROWS = 8192
 SMALL_ROWS = 1024
@@ -27,20 +28,71 @@ GATHERED = ({"insert"}, {"insert", "times"}, {"keys", "points"}, {"keys", "point
 
 @dataclass(slots=True)
 class _Waiting:
-    """A batch that waits. `kind`: batches of the same kind can go together."""
+    """A request that waits. `kind`: those of the same kind can go together, unless they have a key in common."""
 
-    batch: Batch
-    kind: frozenset[object]
+    content: Any
+    kind: Hashable
     rows: int
+    keys: Collection[Key]
     answer: asyncio.Future[bytes]
+
+
+_Ask = Callable[[Sequence[_Waiting]], Awaitable[list[bytes]]]
+"""Carries out some requests as one call: the answer to each."""
 
 
 @dataclass(slots=True)
 class _Lane:
-    """What one caller sends to one hull."""
+    """What one caller asks of one hull."""
 
     waiting: deque[_Waiting] = field(default_factory=deque)
     tasks: set[asyncio.Task[None]] = field(default_factory=set)
+
+
+class Gatherer:
+    """Carries out requests, several together where that changes nothing but the number of revisions."""
+
+    def __init__(self) -> None:
+        self._lanes: dict[Hashable, _Lane] = {}
+
+    async def apply(self, client: AsyncHullClient, token: str | None, name: str, batch: Batch) -> bytes:
+        """The effect of a batch, as JSON."""
+        kind = _kind(batch)
+        if kind is None:
+            return encoded(await apply(client, name, batch), 1)
+        rows = len(batch.insert or batch.keys or ())
+        return await self._gather(
+            (token, name, apply), partial(_apply, client, name), batch, kind, rows, batch.keys or ()
+        )
+
+    async def locate(self, client: AsyncHullClient, token: str | None, name: str, points: Points) -> bytes:
+        """The sides of points, as JSON."""
+        return await self._gather((token, name, Located), partial(_locate, client, name), points, None, len(points))
+
+    async def _gather(
+        self, to: Hashable, ask: _Ask, content: Any, kind: Hashable, rows: int, keys: Collection[Key] = ()
+    ) -> bytes:
+        lane = self._lanes.setdefault(to, _Lane())
+        waiting = _Waiting(content, kind, rows, keys, asyncio.get_running_loop().create_future())
+        lane.waiting.append(waiting)
+        if len(lane.tasks) < IN_FLIGHT:
+            task = asyncio.create_task(self._run(to, ask, lane), name="gathered requests")
+            lane.tasks.add(task)
+            task.add_done_callback(lane.tasks.discard)
+        return await waiting.answer
+
+    async def _run(self, to: Hashable, ask: _Ask, lane: _Lane) -> None:
+        """Ask what waits until nothing does."""
+        together: list[_Waiting] = []
+        try:
+            while lane.waiting:
+                together = _next(lane.waiting)
+                await _send(ask, together)
+        finally:
+            for each in together:  # if the task was cancelled: nobody else would answer them
+                _fail(each, ProblemError(503, "the gateway stops", "DRAINING"))
+            if not lane.waiting and len(lane.tasks) == 1:
+                self._lanes.pop(to, None)
 
 
 def _kind(batch: Batch) -> frozenset[object] | None:
@@ -57,60 +109,26 @@ def _kind(batch: Batch) -> frozenset[object] | None:
     return frozenset((*given, None if batch.keys is None else type(batch.keys[0])))
 
 
-class Gatherer:
-    """Applies batches, several together where that changes nothing but the number of revisions."""
-
-    def __init__(self) -> None:
-        self._lanes: dict[tuple[str | None, str], _Lane] = {}
-
-    async def apply(self, client: AsyncHullClient, token: str | None, name: str, batch: Batch) -> bytes:
-        """The effect of a batch, as JSON."""
-        kind = _kind(batch)
-        if kind is None:
-            return encoded(await apply(client, name, batch), 1)
-        lane = self._lanes.setdefault((token, name), _Lane())
-        rows = len(batch.insert or batch.keys or ())
-        waiting = _Waiting(batch, kind, rows, asyncio.get_running_loop().create_future())
-        lane.waiting.append(waiting)
-        if len(lane.tasks) < IN_FLIGHT:
-            task = asyncio.create_task(self._run(client, token, name, lane), name=f"gathering for {name}")
-            lane.tasks.add(task)
-            task.add_done_callback(lane.tasks.discard)
-        return await waiting.answer
-
-    async def _run(self, client: AsyncHullClient, token: str | None, name: str, lane: _Lane) -> None:
-        """Send what waits until nothing does."""
-        together: list[_Waiting] = []
-        try:
-            while lane.waiting:
-                together = _next(lane.waiting)
-                await _send(client, name, together)
-        finally:
-            for each in together:  # if the task was cancelled: nobody else would answer them
-                _fail(each, ProblemError(503, "the gateway stops", "DRAINING"))
-            if not lane.waiting and len(lane.tasks) == 1:
-                self._lanes.pop((token, name), None)
-
-
 def _next(waiting: deque[_Waiting]) -> list[_Waiting]:
-    """The longest run of batches that can go together: of one kind, and no key twice."""
+    """The longest run of requests that can go together: of one kind, and no key twice."""
     together = [waiting.popleft()]
     rows = together[0].rows
-    keys: set[Key] = set(together[0].batch.keys or ())
+    keys: set[Key] = set(together[0].keys)
     while waiting and waiting[0].kind == together[0].kind and rows + waiting[0].rows <= MOST_ROWS:
-        more = waiting[0].batch.keys or ()
-        if not keys.isdisjoint(more):
-            break
-        keys.update(more)
+        more = waiting[0].keys
+        if more:
+            if not keys.isdisjoint(more):
+                break
+            keys.update(more)
         rows += waiting[0].rows
         together.append(waiting.popleft())
     return together
 
 
-async def _send(client: AsyncHullClient, name: str, together: Sequence[_Waiting]) -> None:
-    """Apply batches together and answer them; after a refusal, each half on its own, so that each has its own error."""
+async def _send(ask: _Ask, together: Sequence[_Waiting]) -> None:
+    """Ask together and answer each; after a refusal, each half on its own, so that each has its own error."""
     try:
-        applied = await apply(client, name, _joined([each.batch for each in together]))
+        answers = await ask(together)
     except (DynhullError, ValueError, TypeError) as error:
         uncertain = isinstance(error, DynhullError) and (
             not error.reason or isinstance(error, OutcomeUnknownError | UnavailableError)
@@ -120,27 +138,33 @@ async def _send(client: AsyncHullClient, name: str, together: Sequence[_Waiting]
                 _fail(each, error)
             return
         middle = len(together) // 2
-        await _send(client, name, together[:middle])
-        await _send(client, name, together[middle:])
+        await _send(ask, together[:middle])
+        await _send(ask, together[middle:])
         return
-    first = 0
-    answer = encoded(applied, len(together))
-    for each in together:
-        if applied.held:  # each has rows of its own
-            answer = encoded(_with_rows_from(applied, first, first + each.rows), len(together))
+    for each, answer in zip(together, answers, strict=True):
         if not each.answer.done():
             each.answer.set_result(answer)
-        first += each.rows
-
-
-def _with_rows_from(applied: Applied, first: int, end: int) -> Applied:
-    """The effect for the request that brought the rows from `first` to before `end`."""
-    return replace(applied, held_rows=tuple(row - first for row in applied.held_rows if first <= row < end))
 
 
 def _fail(waiting: _Waiting, error: Exception) -> None:
     if not waiting.answer.done():
         waiting.answer.set_exception(error)
+
+
+async def _apply(client: AsyncHullClient, name: str, together: Sequence[_Waiting]) -> list[bytes]:
+    applied = await apply(client, name, _joined([each.content for each in together]))
+    if not applied.held:
+        return [encoded(applied, len(together))] * len(together)
+    answers, first = [], 0
+    for each in together:
+        answers.append(encoded(_with_rows_from(applied, first, first + each.rows), len(together)))
+        first += each.rows
+    return answers
+
+
+def _with_rows_from(applied: Applied, first: int, end: int) -> Applied:
+    """The effect for the request that brought the rows from `first` to before `end`."""
+    return replace(applied, held_rows=tuple(row - first for row in applied.held_rows if first <= row < end))
 
 
 def _joined(batches: Sequence[Batch]) -> Batch:
@@ -153,3 +177,13 @@ def _joined(batches: Sequence[Batch]) -> Batch:
         if getattr(batches[0], name) is not None
     }
     return Batch.model_construct(set(rows), **rows)
+
+
+async def _locate(client: AsyncHullClient, name: str, together: Sequence[_Waiting]) -> list[bytes]:
+    located = await client.locate(name, [point for each in together for point in each.content])
+    answers, first = [], 0
+    for each in together:
+        own = Located.model_validate(replace(located, sides=located.sides[first : first + each.rows]))
+        answers.append(own.model_dump_json().encode() + b"\n")
+        first += each.rows
+    return answers

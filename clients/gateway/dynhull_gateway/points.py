@@ -16,6 +16,7 @@ from .texts import BYTE_ORDER_MARK
 
 router = APIRouter(tags=["changes"], route_class=JsonRoute)
 POINTS = TypeAdapter(Points)
+NO_CHANGE = Batch.model_construct()
 FIRST_OF_LIST = b"["
 
 BODY = {
@@ -82,7 +83,7 @@ def read_batch(body: bytes) -> Batch:
     """The batch in a body of JSON; pydantic's ValidationError or FieldError names the value at fault."""
     body = body.removeprefix(BYTE_ORDER_MARK)
     if body.lstrip()[:1] == FIRST_OF_LIST:
-        return Batch.model_construct({"insert"}, insert=POINTS.validate_json(body))
+        return NO_CHANGE.model_copy(update={"insert": POINTS.validate_json(body)})
     batch = Batch.model_validate_json(body)
     check(batch)
     return batch

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from .bodies import HERE
 from .problems import problem
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ class Protocol(HttpToolsProtocol):
     def on_message_complete(self) -> None:
         """A body is here."""
         self._in_body = False
+        cast("dict[str, Any]", self.scope)[HERE] = True  # the application is called later, and need not wait
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
