@@ -1,14 +1,20 @@
-// @ts-nocheck
 // What the viewer's hands do with the picture: dragging, pinching, scrolling, keys, and pointing at things.
 import { place_words } from "./picture.js"
+/**
+ * @typedef {import("./views.js").Point} Point
+ * @typedef {{title: string, revision?: bigint | number}} Thing
+ */
 export const PAN_STEP = 60, ZOOM_STEP = 1.4, NEAR = 12, WHEEL_PIXELS = 300, CLICK_PIXELS = 4
 export class Hands {
-  // `toggle_pause` is what the space bar does.
+  /** Where each pointer is. @type {Map<number, Point>} */
+  pointers = new Map()
+  moved = 0
+  /** @param {import("./picture.js").Picture} picture @param {HTMLElement} tip @param {() => void} toggle_pause what the space bar does */
   constructor(picture, tip, toggle_pause) {
     this.picture = picture
     this.tip = tip
-    this.pointers = new Map()
     const element = picture.element
+    /** @type {Record<string, () => void>} */
     const keys = {
       ArrowLeft: () => picture.move(view => view.pan(PAN_STEP, 0)),
       ArrowRight: () => picture.move(view => view.pan(-PAN_STEP, 0)),
@@ -37,7 +43,7 @@ export class Hands {
       this.pointers.set(event.pointerId, this.at(event))
       this.moved = 0
     })
-    for (const type of ["pointerup", "pointercancel"])
+    for (const type of /** @type {const} */ (["pointerup", "pointercancel"]))
       element.addEventListener(type, event => {
         this.pointers.delete(event.pointerId)
         if (type == "pointerup" && event.pointerType == "touch" && this.moved < CLICK_PIXELS) this.point(event)
@@ -45,15 +51,18 @@ export class Hands {
     element.addEventListener("pointermove", event => this.pointers.has(event.pointerId) ? this.drag(event) : this.point(event))
     element.addEventListener("pointerleave", () => this.tip.hidden = true)
   }
+  /** @param {MouseEvent} event @returns {[number, number]} */
   at(event) {
     const {left, top} = this.picture.element.getBoundingClientRect()
     return [event.clientX - left, event.clientY - top]
   }
+  /** @param {number} factor */
   zoom(factor) {
     this.picture.move(view => view.zoom(factor, view.rect.left + view.rect.width / 2, view.rect.top + view.rect.height / 2))
   }
+  /** @param {PointerEvent} event */
   drag(event) {
-    const before = this.pointers.get(event.pointerId), now = this.at(event)
+    const now = this.at(event), before = this.pointers.get(event.pointerId) ?? now
     const other = [...this.pointers].find(([id]) => id != event.pointerId)?.[1]
     this.pointers.set(event.pointerId, now)
     this.moved += Math.hypot(now[0] - before[0], now[1] - before[1])
@@ -64,7 +73,7 @@ export class Hands {
       else view.pan(now[0] - before[0], now[1] - before[1])
     })
   }
-  // Shows what is under the pointer.
+  /** Shows what is under the pointer. @param {MouseEvent} event */
   point(event) {
     const [across, down] = this.at(event), thing = this.nearest(across, down)
     this.tip.hidden = !thing
@@ -81,15 +90,23 @@ export class Hands {
     this.tip.style.left = `${Math.max(0, across + 14 + offsetWidth > width ? across - 14 - offsetWidth : across + 14)}px`
     this.tip.style.top = `${Math.max(0, down + 14 + offsetHeight > height ? down - 14 - offsetHeight : down + 14)}px`
   }
+  /** @param {number} across @param {number} down */
   nearest(across, down) {
     const {view, hulls, fences, many} = this.picture
-    let best, least = NEAR
+    /** @type {(Thing & {place: Point}) | undefined} */
+    let best
+    let least = NEAR
+    /** @param {Point} place @param {Thing} thing @param {number} advantage */
     const look = (place, thing, advantage) => {
       const [right, low] = view.place(...place), away = Math.hypot(right - across, low - down) - advantage
-      if (away < least) [best, least] = [{...thing, place}, away]
+      if (away >= least || isNaN(away)) return
+      best = {...thing, place}
+      least = away
     }
     for (const {name, points, vertices} of hulls.values())
-      for (const [{keys, x, y, revision}, words, advantage] of [[points, `a point of ${name}`, 0], [vertices, `a vertex of ${name}`, 4]])
+      for (const {keys, x, y, revision, words, advantage} of [
+        {...points, words: `a point of ${name}`, advantage: 0}, {...vertices, words: `a vertex of ${name}`, advantage: 4},
+      ])
         for (let row = 0; row < x.length; row++)
           look([x[row], y[row]], {title: keys ? `${keys[row]}: ${words}` : words, revision}, advantage)
     for (const {name, corners, vertices: {revision}} of many.hulls)
@@ -99,6 +116,7 @@ export class Hands {
     return best
   }
 }
+/** @param {Point} one @param {Point} two */
 export function distance(one, two) {
   return Math.hypot(one[0] - two[0], one[1] - two[1])
 }

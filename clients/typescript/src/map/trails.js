@@ -1,10 +1,18 @@
-// @ts-nocheck
 // Where keys have been within the last minute.
+/**
+ * @typedef {import("./views.js").Point} Point
+ * @typedef {[number, number, number][]} Trail moments, with x and y
+ */
 export const RECORDED_MILLISECONDS = 5 * 60_000, TRAIL_MILLISECONDS = 60_000, TRAIL_STEP = 1000, TRAIL_ALPHA = 0.45, MOST_TRAILS = 2_000
 export class Trails {
+  /** The trails of the keys of each hull. @type {Map<string, Map<string, Trail>>} */
   hulls = new Map()
   shown = false  // of all keys; the one that is looked for always has its trail
-  // A drawing of a hull that arrived at a moment. Positions are kept as long as the recording goes back.
+  /**
+   * A drawing of a hull that arrived at a moment. Positions are kept as long as the recording goes back.
+   * @param {import("./hulls.js").Drawing & {kind: string, hull: string}} drawing
+   * @param {number} at
+   */
   take({kind, hull, keys, x, y}, at) {
     if (!keys) return
     const known = this.hulls.get(hull) ?? new Map()
@@ -19,14 +27,16 @@ export class Trails {
     })
     if (kind == "points" && known.size > 2 * MOST_TRAILS) this.thin(known, at)
   }
-  // Keys that have not been seen for longer than the recording go.
+  /** Keys that have not been seen for longer than the recording go. @param {Map<string, Trail>} known @param {number} at */
   thin(known, at) {
-    for (const [key, trail] of known) if (trail.at(-1)[0] < at - RECORDED_MILLISECONDS) known.delete(key)
+    for (const [key, trail] of known) if (trail[trail.length - 1][0] < at - RECORDED_MILLISECONDS) known.delete(key)
     for (const key of [...known.keys()].slice(0, Math.max(0, known.size - 2 * MOST_TRAILS))) known.delete(key)
   }
+  /** @param {string[]} names */
   keep(names) {
     for (const name of this.hulls.keys()) if (!names.includes(name)) this.hulls.delete(name)
   }
+  /** @param {CanvasRenderingContext2D} canvas @param {import("./picture.js").Picture} picture */
   draw(canvas, {view, hulls, sought, now}) {
     const until = now()
     canvas.globalAlpha = TRAIL_ALPHA
@@ -36,8 +46,8 @@ export class Trails {
       if (!hull || view.globe && !hull.globe) continue
       canvas.beginPath()
       for (const key of this.shown ? trails.keys() : [sought]) {
-        const here = hull.place_of(key)
-        if (here && trails.has(key)) trace_back(canvas, view, here, trails.get(key), until)
+        const here = hull.place_of(key), trail = trails.get(key)
+        if (here && trail) trace_back(canvas, view, here, trail, until)
       }
       canvas.strokeStyle = hull.look.colour
       canvas.stroke()
@@ -45,7 +55,14 @@ export class Trails {
     canvas.globalAlpha = 1
   }
 }
-// From where the key is to where it was a minute before.
+/**
+ * From where the key is to where it was a minute before.
+ * @param {CanvasRenderingContext2D} canvas
+ * @param {import("./views.js").View} view
+ * @param {Point} here
+ * @param {Trail} trail
+ * @param {number} until
+ */
 export function trace_back(canvas, view, here, trail, until) {
   let place = view.place(...here), pen = !isNaN(place[0])
   canvas.moveTo(...place)
