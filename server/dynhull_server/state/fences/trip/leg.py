@@ -216,8 +216,6 @@ class FenceLeg:
         """Put the delay of a subject in the place of the one before."""
         assert self.fence.delays is not None  # only such fences have subjects with delays
         self.fence.delays.set(subject, delay)
-        if delay is not None:
-            self._time = max(self._time, delay.since)
         self.delays[subject] = delay
         self.fence.subjects[subject[0]].note_delays(self.fence)
 
@@ -241,8 +239,6 @@ class FenceLeg:
 
     def put_standing(self, hull: str, standing: Delay | None) -> None:
         """Put what an alarm has about a hull in the place of what it had."""
-        if standing is not None:
-            self._time = max(self._time, standing.since)
         self.delays[hull, ""] = standing
 
     def summed_up(self, kind: EventType, cause: int, now: int) -> None:
@@ -304,7 +300,9 @@ class FenceLeg:
             fence.published(self.events)
         if not self.row.config.delays:
             fence.delays = None
-        fence.time = max(fence.time, self._time)
+        # What began and ended in the trip is not stored: the next event must not wait for it.
+        stored = (each.since for each in self.delays.values() if each is not None)
+        fence.time = max(fence.time, self._time, *stored)
         if not self.deleted:
             fence.count_inside()
             if begins:
