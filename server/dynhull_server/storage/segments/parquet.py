@@ -24,13 +24,14 @@ from .gathered import key_codes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from io import IOBase
 
     import numpy.typing as npt
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     from dynhull.keys import Keys
+
+    from .archive import Parts, WholeFile
 
     Rows = npt.NDArray[np.intp]
 
@@ -80,10 +81,12 @@ SHARED = 4  # rows of a commit, on average, from which on its time is an index i
 def load() -> None:
     """Load what reads and writes files, if it is there: that takes a tenth of a second of the interpreter, or more."""
     try:
+        import pyarrow as pa
         import pyarrow.compute
-        import pyarrow.parquet  # noqa: F401
+        import pyarrow.parquet
     except ImportError:
         return
+    pa.array([0])  # with its first value pyarrow loads pandas, if that is there: a second of who would wait for it
 
 
 def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"") -> bytes:
@@ -175,7 +178,7 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
         raise DamagedError(f"{name} is damaged: {error}") from error
 
 
-def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
+def keys_from_parquet(parts: Parts | WholeFile, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
     """The same with the rows of some keys, and of none, alone: no more is read than the groups that have these.
 
     Raises:
@@ -184,13 +187,36 @@ def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentCol
     import pyarrow as pa
 
     try:
-        file = _opened(pa.PythonFile(source, mode="r"), name)
-        found = file.schema_arrow.metadata
+        _need_footer(parts)
+        file = _opened(pa.BufferReader(parts.content), name)
+        schema, metadata = file.schema_arrow, file.metadata
         values = sorted(key_list(keys))
-        table = _of_groups(file, _groups(file, values))
-        return _columns(table, found, _of_keys(table, values)), _about(found), found.get(STATE, b"")
+        groups = _groups(metadata, schema.names.index("key"), values)
+        some = [metadata.row_group(group) for group in groups]
+        for group in some:
+            parts.need(*_bytes_of(group))
+        same = _same(some) if some else {}
+        table = _rows_of(file.read_row_groups(groups, columns=_unknown(schema.names, same), use_threads=False), values)
+        found = schema.metadata
+        return _columns(table, same, found), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def _need_footer(parts: Parts | WholeFile) -> None:
+    """Read the end of a file, which says where its groups are: its last eight bytes say how long that is."""
+    size = len(parts.content)
+    parts.need(size - 8, size)
+    length = int.from_bytes(parts.content[size - 8 : size - 4], "little")
+    parts.need(size - 8 - length, size)
+
+
+def _bytes_of(group: pq.RowGroupMetaData) -> tuple[int, int]:
+    """Where the bytes of a group begin and end: its columns lie side by side."""
+    columns = [group.column(place) for place in range(group.num_columns)]
+    starts = [each.dictionary_page_offset if each.has_dictionary_page else each.data_page_offset for each in columns]
+    ends = [start + each.total_compressed_size for start, each in zip(starts, columns, strict=True)]
+    return min(starts), max(ends)
 
 
 def ways_from_parquet(data: bytes, name: str, after: int, until: int) -> Iterator[KeyWays] | None:
@@ -288,14 +314,14 @@ def _opened(source: pa.NativeFile, name: str) -> pq.ParquetFile:
     return file
 
 
-def _groups(file: pq.ParquetFile, values: list[Any]) -> list[int]:
+def _groups(metadata: pq.FileMetaData, column: int, values: list[Any]) -> list[int]:
     """The groups of rows, which lie by key, that may have one with these keys, or with none: these are the last."""
-    column, places = file.schema_arrow.names.index("key"), range(file.num_row_groups)
+    places = range(metadata.num_row_groups)
 
     @cache
     def ends(place: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """The least key and the greatest: what is less than any, and more than any, where that is not known."""
-        statistics = file.metadata.row_group(place).column(column).statistics
+        statistics = metadata.row_group(place).column(column).statistics
         if statistics is None or not statistics.has_min_max:
             return (0,), (1,)
         return (0, statistics.min), (1,) if statistics.null_count else (0, statistics.max)
@@ -309,25 +335,13 @@ def _groups(file: pq.ParquetFile, values: list[Any]) -> list[int]:
     return sorted(found)
 
 
-def _of_groups(file: pq.ParquetFile, groups: list[int]) -> pa.Table:
-    """Some groups, of which no column is read that has the same in each row, or nothing; nor the numbers of commits."""
-    import pyarrow as pa
+def _unknown(names: list[str], same: dict[str, str | None]) -> list[str]:
+    """The columns to read for the rows of keys: not those that are the same in all rows, nor the numbers of commits.
 
-    there, schema = [file.metadata.row_group(group) for group in groups], file.schema_arrow
-    count = sum(group.num_rows for group in there)
-    constant = {"commit": pa.nulls(count, schema.field("commit").type)}
-    for name, word in _same(there).items():
-        if word is None:
-            constant[name] = pa.nulls(count, schema.field(name).type)
-        else:
-            constant[name] = pa.DictionaryArray.from_arrays(np.zeros(count, np.int32), [word])
-    if "kind" in constant and "op" in constant:  # of a revision each key has one row
-        constant["row"] = pa.array(np.zeros(count, np.int32))
-    names = [name for name in schema.names if name not in constant]
-    table = file.read_row_groups(groups, columns=names, use_threads=False)
-    for name, column in constant.items():
-        table = table.append_column(name, column)
-    return table
+    Where every row puts a key, or every row removes one, no revision has two of a key, and which comes first is known.
+    """
+    known = {"commit", *same, *(("row",) if "kind" in same and "op" in same else ())}
+    return [name for name in names if name == "key" or name not in known]
 
 
 def _same(groups: Sequence[pq.RowGroupMetaData]) -> dict[str, str | None]:
@@ -455,7 +469,7 @@ def _heads(table: pa.Table) -> tuple[Integers, Integers, Rows, Integers]:
     return revision, counts, belongs, np.arange(count) - np.repeat(starts, counts)
 
 
-def _of_keys(table: pa.Table, values: list[Any]) -> Rows:
+def _rows_of(table: pa.Table, values: list[Any]) -> pa.Table:
     """The rows of some keys, and of none, by revision and place."""
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -469,25 +483,32 @@ def _of_keys(table: pa.Table, values: list[Any]) -> Rows:
     else:
         chosen = pc.or_(pc.is_in(key, value_set=wanted), pc.is_null(key)).to_numpy()
     rows = np.flatnonzero(chosen)
-    revision, place = _integers(table, "revision", NO_TIME)[rows], _integers(table, "row", NO_TIME)[rows]
-    found: Rows = rows[np.lexsort((place, revision))]
-    return found
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
+        some = table.slice(int(rows[0]), len(rows))
+    else:
+        some = table.take(pa.array(rows))
+    revision = _integers(some, "revision", NO_TIME)
+    place = _integers(some, "row", NO_TIME) if "row" in some.schema.names else np.zeros_like(revision)
+    order = np.lexsort((place, revision))
+    return some if bool((np.diff(order) == 1).all()) else some.take(pa.array(order))
 
 
-def _columns(table: pa.Table, found: dict[bytes, bytes], order: Rows) -> SegmentColumns:
-    """Some rows in an order."""
+def _columns(table: pa.Table, same: dict[str, str | None], found: dict[bytes, bytes]) -> SegmentColumns:
+    """Some rows, of which some columns are the same everywhere."""
     identity: Any = found[b"dynhull.identity"].decode()
+    count = len(table)
     codes, words = _coded(table.column("key"))
-    codes = codes[order]
     keyed = codes != NONE
     keys = _packed([words], codes[keyed], identity)
-    arrays = {name: values[order] for name, values in _arrays(table).items()}
-    arrays.setdefault(ACCURACY, _exact(len(order)))
-    for name, column in (("revision", "revision"), ("place", "row")):
-        arrays[name] = _integers(table, column, NO_TIME)[order]
-    of_detail, said = _coded(table.column("detail"))
-    texts = [*said.to_pylist(), None]
-    detail = [texts[code] for code in of_detail[order].tolist()]
+    arrays = {name: _constant(none, count) for name, none in NOTHING.items()} | _arrays(table)
+    for name, words_of in CONSTANT.items():
+        if name in same:
+            arrays[name] = np.broadcast_to(_code(same[name], name, words_of), count)
+    arrays.setdefault(ACCURACY, _exact(count))
+    arrays["revision"] = _integers(table, "revision", NO_TIME)
+    arrays["place"] = _integers(table, "row", NO_TIME) if "row" in table.schema.names else _constant(0, count)
+    arrays.setdefault("points", np.full((count, 2), np.nan))
+    detail = table.column("detail").to_pylist() if "detail" in table.schema.names else [None] * count
     return SegmentColumns(identity=identity, **arrays, keyed=keyed, keys=keys, detail=detail)
 
 
