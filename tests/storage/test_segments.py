@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from filed_fleet import BEGIN, KEYS, SECOND, SETTINGS, Fleet, move, read_back
 from folders import no_progress, same
+from postgresql import query
 
 from dynhull.keys import PackedKeys
 from dynhull_cluster.postgres.database import Database
@@ -31,7 +32,8 @@ from dynhull_server.state.records import (
     QuarantineRules,
     Record,
 )
-from dynhull_server.storage.port import NEWEST, DamagedError
+from dynhull_server.storage.durability import Durability
+from dynhull_server.storage.port import NEWEST, DamagedError, TakenOverError
 from dynhull_server.storage.rows import filed, filing, past_rows, storage
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments import archive
@@ -475,6 +477,60 @@ def test_a_copy_has_the_past_or_says_that_it_has_not(tmp_path):
     assert 0 < oldest == without.oldest(1)
     same(read_back(without, len(records)), records[oldest:])
     without.close()
+
+
+def test_an_owner_that_was_replaced_removes_no_file_of_the_next_one(postgres, tmp_path):
+    url, archive, heard = postgres.new_database(), Archive(tmp_path / "history"), []
+    fleet = Fleet(tmp_path, archive=archive, make=lambda: PostgresStorage(Database(url), heard.append, archive=archive))
+    first = fleet.storage
+    fleet.put(4)
+    fleet.snapshot()
+    fleet.put(4)
+    fleet.snapshot()
+    steps = first.file_history(fleet.time)
+    next(steps)
+    steps.close()  # the commit of the name has failed: nothing of it is in the database
+    query(url, "UPDATE owners SET epoch = epoch + 1, until = '-infinity', process = ''")
+    fleet.storage = fleet.make()
+    fleet.storage.open(no_progress)
+    steps = fleet.storage.file_history(fleet.time)
+    fleet.storage.commit([next(steps)], fleet.time)
+    closes = next(steps)  # the file is written, and no segment has it yet
+    with pytest.raises(TakenOverError):
+        next(first.file_history(fleet.time))
+    assert fleet.files
+    fleet.storage.commit([closes], fleet.time)
+    fleet.carry_out(steps)
+    assert fleet.storage.oldest(1) > 0
+    require_all(fleet.storage, fleet.records)
+    first.close()
+    fleet.storage.close()
+
+
+def test_a_file_is_removed_once_a_power_failure_cannot_bring_its_segment_back(tmp_path, monkeypatch):
+    archive = Archive(tmp_path / "history")
+    make = lambda: SQLiteStorage(tmp_path / "data", Durability.INTERVAL, archive=archive)  # noqa: E731
+    fleet = Fleet(tmp_path, archive=archive, make=make).fill()
+    log = fleet.storage._folder.log
+    durable = []
+    sync, remove = fleet.storage._folder.disk.sync, fleet.archive.remove
+
+    def synced(file):
+        sync(file)
+        durable.append(log.stat().st_size)
+
+    def removed(file):
+        assert durable[-1:] == [log.stat().st_size], "what it follows from may be lost"
+        remove(file)
+        durable.append(0)
+
+    monkeypatch.setattr(fleet.storage._folder.disk, "sync", synced)
+    monkeypatch.setattr(fleet.archive, "remove", removed)
+    files = fleet.files
+    fleet.storage.commit([fleet.storage.set_history(1, SECOND, 0)])
+    fleet.file()
+    assert len(fleet.files) < len(files)
+    fleet.storage.close()
 
 
 def test_history_begins_where_the_journal_does_when_it_is_set(tmp_path):

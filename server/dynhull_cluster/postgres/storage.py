@@ -326,6 +326,9 @@ class PostgresStorage(RowStorage):
                 self._not_durable = True
                 raise
 
+    def _confirm(self) -> None:
+        self._owner.renew()
+
     def checkpoint(self) -> None:
         """Look at the size of the database now and then. Its housekeeping is PostgreSQL's own."""
         if time.monotonic() < self._size_due:

@@ -109,6 +109,14 @@ class RowStorage(ABC):
     def _lend(self) -> AbstractContextManager[Lent]:
         """A reader, for one thread. Errors of the database become StorageError."""
 
+    @abstractmethod
+    def _confirm(self) -> None:
+        """Make all commits durable, or raise TakenOverError if another server decides by now.
+
+        What cannot be undone waits for it: a crash must not take back the commit that it follows from, and what was
+        read before it is nobody else's.
+        """
+
     # Committing
 
     def ahead(
@@ -523,6 +531,7 @@ class RowStorage(ABC):
             if any(number in hulls for number, _ in rows):  # its commit was taken for a failure, and was none
                 self._ledger.dead["segments"].remove(ids[0])
                 continue
+            self._confirm()
             for _, file in rows:
                 if file:
                     archive.remove(file)

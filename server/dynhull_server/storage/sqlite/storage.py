@@ -241,6 +241,9 @@ class SQLiteStorage(RowStorage):
             self._log_in_doubt = True
             raise
 
+    def _confirm(self) -> None:
+        self.sync()
+
     @_as_storage_errors()
     def checkpoint(self) -> None:
         """Copy a long log into the database, during commits, then restart it.
