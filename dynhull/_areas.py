@@ -39,6 +39,9 @@ class Area(Protocol):
     def edges(self) -> list[tuple[Point, Point]]:
         """The edges of the boundary; none of a disk."""
 
+    def around(self, p: Point) -> list[list[tuple[Point, Point]]]:
+        """The edges of each polygon that p is inside of, and not on a ring of; none of a disk."""
+
 
 @dataclass(frozen=True, slots=True)
 class Polygons:
@@ -61,10 +64,9 @@ class Polygons:
 
     def is_clear(self, p: Point, margin: float, error: float) -> bool:
         """Whether p is farther than the error from the rings of a polygon that it is in, or with the margin of all."""
-        inside = [polygon for polygon in self.polygons if _where(polygon, p) > 0]
-        if inside:
-            return any(_distance_above(p, polygon, Fraction(error)) for polygon in inside)
-        return all(_distance_above(p, polygon, Fraction(margin) + Fraction(error)) for polygon in self.polygons)
+        if around := self.around(p):
+            return any(_is_farther(p, edges, Fraction(error)) for edges in around)
+        return _is_farther(p, self.edges(), Fraction(margin) + Fraction(error))
 
     def distance(self, p: Point) -> float:
         """The distance of p, rounded once. O(k)."""
@@ -83,6 +85,11 @@ class Polygons:
     def edges(self) -> list[tuple[Point, Point]]:
         """The edges of all rings. O(k)."""
         return [edge for polygon in self.polygons for ring in polygon for edge in _edges(ring)]
+
+    def around(self, p: Point) -> list[list[tuple[Point, Point]]]:
+        """The edges of each polygon that p is inside of. O(k)."""
+        inside = [polygon for polygon in self.polygons if _where(polygon, p) > 0]
+        return [[edge for ring in polygon for edge in _edges(ring)] for polygon in inside]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +127,10 @@ class DiskArea:
         """None."""
         return []
 
+    def around(self, p: Point) -> list[list[tuple[Point, Point]]]:  # noqa: ARG002
+        """None."""
+        return []
+
 
 @dataclass(frozen=True, slots=True)
 class Segment:
@@ -151,6 +162,10 @@ class Segment:
     def edges(self) -> list[tuple[Point, Point]]:
         """The segment."""
         return [(self.a, self.b)]
+
+    def around(self, p: Point) -> list[list[tuple[Point, Point]]]:  # noqa: ARG002
+        """None: it has no inside."""
+        return []
 
 
 NOTHING = Polygons(())
@@ -192,9 +207,9 @@ def root_minus(square: Fraction, less: Fraction) -> float:
         bits *= 2
 
 
-def _distance_above(p: Point, polygon: Polygon, length: Fraction) -> bool:
-    """Whether p is farther than a length from each ring."""
-    return all(squared_distance(p, a, b) > length**2 for ring in polygon for a, b in _edges(ring))
+def _is_farther(p: Point, edges: list[tuple[Point, Point]], length: Fraction) -> bool:
+    """Whether p is farther than a length from each edge."""
+    return all(squared_distance(p, a, b) > length**2 for a, b in edges)
 
 
 def _edges(ring: Ring) -> list[tuple[Point, Point]]:

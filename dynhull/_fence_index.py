@@ -283,6 +283,8 @@ class FenceIndex:
     def distances(self, fence: int, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """The distances of points to the area of a fence, as `take` returns those of subjects. O(log n) a point.
 
+        With `without_self` that is the hull without the only subject at the point, if there is one.
+
         Args:
             fence: the number.
             xy: (k, 2) points.
@@ -293,7 +295,7 @@ class FenceIndex:
 
         Raises:
             KeyError: there is no such fence.
-            ValueError: a point is not finite, or the fence was set with `without_self`: it has no area of its own.
+            ValueError: a point is not finite.
 
         >>> import dynhull
         >>> fences = dynhull.FenceIndex(dynhull.KeyedHull())
@@ -301,30 +303,29 @@ class FenceIndex:
         >>> fences.distances(7, [[1, 1], [4, -3], [-3, -4]]).tolist()
         [0.0, 3.0, 5.0]
         """
-        distances = self._fences.distances(self._present(fence), as_points(xy, "xy"))
-        if distances is None:
-            raise ValueError(f"fence {fence} was set with without_self: each subject has an area of its own")
-        return distances
+        return self._fences.distances(self._present(fence), as_points(xy, "xy"))
 
     def clear(self, fence: int, xy: npt.ArrayLike, errors: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether positions that may be wrong by an error are certainly on their side of the boundary. Exact.
+        """Whether positions that may be wrong by an error are certainly on their side of the boundary.
 
         A point inside is if its distance to the rings of a polygon that it is in, or to the circle, is more than its
         error; one outside, if its distance to the area is more than the fence's margin and its error together. O(log n)
-        a point, and O(1) for each edge so near.
+        a point, and O(1) for each edge so near. With `without_self` the area is the hull without the only subject at
+        the point, if there is one. In the plane it is exact; with a `frame`, errors are in metres, and distances are
+        those of `distances`.
 
         Args:
             fence: the number.
             xy: (k, 2) points.
-            errors: (k,) how far each may be from where it really is; finite, not negative.
+            errors: (k,) how far each may be from where it really is; finite, not negative. With a `frame`, at most
+                250,000 less the margin: a greater distance is not known.
 
         Returns:
             (k,) True for a point without an error, wherever it is, and for all of an empty area.
 
         Raises:
             KeyError: there is no such fence.
-            ValueError: a number is not finite, or an error is negative; the fence was set with `without_self`; or the
-                index has a `frame`.
+            ValueError: a number is not finite, or an error is negative or too great.
 
         >>> import dynhull
         >>> fences = dynhull.FenceIndex(dynhull.KeyedHull())
@@ -332,8 +333,6 @@ class FenceIndex:
         >>> fences.clear(7, [[3, 4], [3, 4], [9, 12], [9, 12]], [5, 4.5, 5, 4.5]).tolist()
         [False, True, False, True]
         """
-        if self._on_globe:
-            raise ValueError("clear is for the plane: the index has a frame")
         points, radii = as_points(xy, "xy"), np.asarray(errors, np.float64)
         if radii.shape != (len(points),):
             raise ValueError(f"errors have the shape {radii.shape}: must be ({len(points)},), one for each point")
@@ -341,10 +340,15 @@ class FenceIndex:
         if bad.any():
             row = int(np.argmax(bad))
             raise ValueError(f"errors row {row} is {radii[row]}: must be finite and not negative")
-        clear = self._fences.clear(self._present(fence), points, np.ascontiguousarray(radii))
-        if clear is None:
-            raise ValueError(f"fence {fence} was set with without_self: each subject has an area of its own")
-        return clear
+        number = self._present(fence)
+        if self._on_globe:
+            most = MOST_METRES - self._fences.margin(number)
+            if (radii > most).any():
+                row = int(np.argmax(radii > most))
+                raise ValueError(
+                    f"errors row {row} is {radii[row]}: at most {most:g} metres with the margin of the fence"
+                )
+        return self._fences.clear(number, points, np.ascontiguousarray(radii))
 
     def __contains__(self, fence: object) -> bool:
         """Whether there is a fence of this number."""

@@ -131,18 +131,35 @@ class Fences:
         """The number of keys inside."""
         return len(self._fences[fence].inside)
 
-    def distances(self, fence: int, places: Points) -> npt.NDArray[np.float64] | None:
-        """The distances of places to the area; None if that is the hull of the entities."""
-        each = self._fences[fence]
-        return None if each.own else np.array([self._distance(each.area, p) for p in as_tuples(places)], np.float64)
+    def margin(self, fence: int) -> float:
+        """The margin."""
+        return self._fences[fence].margin
 
-    def clear(self, fence: int, places: Points, errors: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_] | None:
-        """Which places are farther than their errors from the boundary; None if that is of the hull of the entities."""
-        each = self._fences[fence]
-        if each.own:
-            return None
+    def distances(self, fence: int, places: Points) -> npt.NDArray[np.float64]:
+        """The distances of places to the area; of entities, to that of the others."""
+        each = self._looked_at(fence)
+        return np.array([self._distance(self._area_for(each, p), p) for p in as_tuples(places)], np.float64)
+
+    def clear(self, fence: int, places: Points, errors: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+        """Which places are farther than their errors from the boundary; of entities, from that of the others."""
+        each = self._looked_at(fence)
         rows = zip(as_tuples(places), errors.tolist(), strict=True)
-        return np.array([not error or each.area.is_clear(p, each.margin, error) for p, error in rows], np.bool_)
+        return np.array([not error or self._is_clear(each, p, error) for p, error in rows], np.bool_)
+
+    def _is_clear(self, fence: _Fence, p: Point, error: float) -> bool:
+        area = self._area_for(fence, p)
+        if self._metres is None:
+            return area.is_clear(p, fence.margin, error)
+        if around := area.around(p):
+            return any(self._nearest(p, edges) > error for edges in around)
+        return not area.holds(p, closed=True) and self._nearest(p, area.edges()) > fence.margin + error
+
+    def _looked_at(self, number: int) -> _Fence:
+        """A fence, with its area as it is now."""
+        fence = self._fences[number]
+        if fence.own:
+            fence.area = hull_area(as_tuples(self._entities.vertices()), fence.closed)
+        return fence
 
     def _set(self, number: int, fence: _Fence, inside: Keys | None) -> None:
         present = self._fences.get(number)
@@ -188,9 +205,7 @@ class Fences:
         places = self._entities.places()
         moved = bool(self._journal.before)
         for number in sorted(self._fences):
-            fence = self._fences[number]
-            if fence.own:
-                fence.area = hull_area(as_tuples(self._entities.vertices()), fence.closed)
+            fence = self._looked_at(number)
             changed = fence.settings() != fence.decided
             everyone = changed or (fence.own and moved)
             for key in sorted({*self._journal.before, *(places if everyone else ())}):
@@ -238,9 +253,12 @@ class Fences:
     def _distance(self, area: Area, p: Point) -> float:
         if self._metres is None:
             return area.distance(p)
-        if area.holds(p, closed=True):
-            return 0.0
-        ends = np.array(area.edges(), np.float64).reshape(-1, 2, 2)
+        return 0.0 if area.holds(p, closed=True) else self._nearest(p, area.edges())
+
+    def _nearest(self, p: Point, edges: list[tuple[Point, Point]]) -> float:
+        """The distance in metres from a place to the nearest of some edges."""
+        assert self._metres is not None  # there is a frame
+        ends = np.array(edges, np.float64).reshape(-1, 2, 2)
         return float(self._metres.to_edges(np.broadcast_to(p, (len(ends), 2)), ends[:, 0], ends[:, 1]).min(initial=inf))
 
     def _area_for(self, fence: _Fence, p: Point) -> Area:

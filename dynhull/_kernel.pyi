@@ -314,14 +314,17 @@ class Fences:
     def count(self, fence: int) -> int:
         """The number of keys inside."""
 
-    def distances(self, fence: int, places: dynhull.arrays.Points) -> numpy.typing.NDArray[numpy.float64] | None:
+    def margin(self, fence: int) -> float:
+        """The margin."""
+
+    def distances(self, fence: int, places: dynhull.arrays.Points) -> numpy.typing.NDArray[numpy.float64]:
         """
-        The distances of places to the area; None if that is the hull of the entities.
+        The distances of places to the area; of entities, to that of the others.
         """
 
-    def clear(self, fence: int, places: dynhull.arrays.Points, errors: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.bool_] | None:
+    def clear(self, fence: int, places: dynhull.arrays.Points, errors: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.bool_]:
         """
-        Which places are farther than their errors from the boundary; None if that is of the hull of the entities.
+        Which places are farther than their errors from the boundary; of entities, from that of the others.
         """
 
     def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]:

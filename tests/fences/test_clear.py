@@ -8,6 +8,8 @@ import pytest
 from hulls import KEYED_HULLS
 
 from dynhull import FenceIndex, KeyedHull, convex_hull
+from dynhull._metres import Metres
+from dynhull.globe import Gnomonic
 
 kinds = pytest.mark.parametrize("make", [kind for kind in KEYED_HULLS if kind != "python, tiny leaves"], indirect=True)
 
@@ -146,10 +148,77 @@ def test_the_greatest_and_least_numbers(make):
     assert index.clear(2, [[1.5e-323, 0]], [5e-324]).tolist() == [True]
 
 
+@kinds
+def test_each_subject_against_the_others(make):
+    """Who is the only one at a vertex is compared with the hull without it, also before `take` has seen a change."""
+    random = np.random.default_rng(7)
+    hull = make()
+    index = FenceIndex(hull)
+    index.set_hull(1, [], margin=0.5, without_self=True)
+    attained = 0
+    for step in range(40):
+        places = random.integers(0, 9, (int(random.integers(1, 12)), 2)).astype(float)
+        keys = [f"k{number}" for number in range(len(places))]
+        hull.remove_many(list(hull.keys()), missing="ignore")
+        hull.put_many(keys, places)
+        if step % 2:
+            index.take()
+        for p in np.unique(places, axis=0).tolist():
+            alone = (places == p).all(axis=1).sum() == 1
+            others = places[(places != p).any(axis=1)] if alone else places
+            corners = convex_hull(others).tolist() if len(others) else []
+            polygons = [[corners]] if corners else []
+            errors = near_errors(random, p, polygons, 0.5)
+            expected = [is_clear(p, polygons, 0.5, error) for error in errors]
+            assert index.clear(1, [p] * len(errors), errors).tolist() == expected, (places, p)
+            attained += len(set(expected[2:5])) > 1
+            (distance,) = index.distances(1, [p]).tolist()
+            around = [squared(p, a, b) for a, b in edges(corners)] if corners else []
+            inside = len(corners) > 2 and (is_inside(p, [corners]) or not min(around))
+            nearest = Fraction(0) if inside else min(around, default=inf)
+            assert distance == pytest.approx(float(nearest) ** 0.5, rel=1e-15, abs=0)
+    assert attained > 20
+
+
+@kinds
+def test_metres_on_the_globe(make):
+    """Inside of one of the polygons, or outside of all with the margin, by more than an error in metres."""
+    random = np.random.default_rng(8)
+    frame = Gnomonic((13.4, 52.5))
+    square = np.array([[0, 0], [0.6, 0], [0.6, 0.4], [0, 0.4]])
+    rings = [square + np.array(corner) for corner in ((13.2, 52.3), (13.5, 52.5))]
+    segment_ends = rings[0][::2]
+    laid = [[frame.project_all(ring).tolist()] for ring in rings]
+    metres, looked = Metres(frame), set()
+    index = FenceIndex(make(), frame=frame)
+    index.set_polygons(1, laid, margin=1000)
+    index.set_hull(2, frame.project_all(np.array(sorted(map(tuple, segment_ends)))), margin=1000)
+    index.set_hull(3, [])
+    for place in frame.project_all(random.random((40, 2)) * [1.6, 1.2] + [12.9, 52]).tolist():
+        far = [nearest_metres(metres, place, polygon) for polygon in laid]
+        inside = [near for near, polygon in zip(far, laid, strict=True) if is_inside(place, polygon)]
+        guesses = [each for near in far for each in (near, max(near - 1000, 0))]
+        errors = [0.0, *guesses, *np.nextafter(guesses, 0).tolist(), *np.nextafter(guesses, inf).tolist()]
+        expected = [not e or (max(inside) > e if inside else min(far) > 1000 + e) for e in errors]
+        assert index.clear(1, [place] * len(errors), errors).tolist() == expected
+        looked.update(zip([bool(inside)] * len(errors), expected, strict=True))
+        segment = nearest_metres(metres, place, [frame.project_all(segment_ends).tolist()])
+        errors = np.maximum([segment - 1000.001, segment - 999.999, segment], 0).tolist()
+        assert index.clear(2, [place] * 3, errors).tolist() == [not e or segment > 1000 + e for e in errors]
+        assert index.clear(3, [place], [250_000]).tolist() == [True]
+    with pytest.raises(ValueError, match=r"row 1 is 249500\.0: at most 249000 metres with the margin"):
+        index.clear(1, [[0, 0], [0, 0]], [1, 249_500])
+    assert looked == {(True, True), (True, False), (False, True), (False, False)}
+
+
+def nearest_metres(metres, place, polygon):
+    ends = np.array([edge for ring in polygon for edge in edges(ring)])
+    return float(metres.to_edges(np.broadcast_to(place, (len(ends), 2)), ends[:, 0], ends[:, 1]).min())
+
+
 def test_what_is_refused():
     index = FenceIndex(KeyedHull())
     index.set_circle(1, 0, 0, 1)
-    index.set_hull(2, [], margin=1, without_self=True)
     for errors, message in [
         ([1, -1], "row 1 is -1.0"),
         ([nan, 1], "row 0 is nan"),
@@ -158,7 +227,5 @@ def test_what_is_refused():
     ]:
         with pytest.raises(ValueError, match=message):
             index.clear(1, [[0, 0], [1, 1]], errors)
-    with pytest.raises(ValueError, match="without_self"):
-        index.clear(2, [[0, 0]], [1])
     with pytest.raises(KeyError):
         index.clear(3, [[0, 0]], [1])

@@ -102,8 +102,7 @@ def test_distances_of_other_areas(make):
     assert [index.distances(number, points).tolist() for number in (1, 2)] == [[3.0, 0.0, 0.0], [3.0, 0.0, 0.0]]
     assert index.distances(3, points).tolist() == [np.inf] * 3
     assert index.distances(1, np.empty((0, 2))).tolist() == []
-    with pytest.raises(ValueError, match="fence 4 was set with without_self"):
-        index.distances(4, points)
+    assert index.distances(4, [[0, 0], [1, 1], [3, 4]]).tolist() == [2**0.5, 2**0.5, 13**0.5]
     with pytest.raises(KeyError, match="there is no fence 5"):
         index.distances(5, points)
     with pytest.raises(ValueError, match=r"xy row 1 is \(nan, 0.0\)"):

@@ -325,9 +325,11 @@ struct Area {
     return distance_to_nearest(p, by([p](const Box& box) { return least_distance(p, box); }));
   }
   // Whether the distance from p to an edge is at most the margin.
-  bool is_near(Point p, Edge edge) const {
-    if (!metres) return compare_distance(p, nearest_part(p, edge), margin) <= 0;
-    return Metres::least(p, Box::of(edge)) <= margin && metres->to_edge(p, edge) <= margin;
+  bool is_near(Point p, Edge edge) const { return is_near(p, edge, margin); }
+  // Whether it is at most r + s; of metres, at most the rounded sum.
+  bool is_near(Point p, Edge edge, double r, double s = 0) const {
+    if (!metres) return compare_distance(p, nearest_part(p, edge), r, s) <= 0;
+    return Metres::least(p, Box::of(edge)) <= r + s && metres->to_edge(p, edge) <= r + s;
   }
   // At least how far from an edge, in the plane, points are that are near it.
   double reach(Edge edge) const { return metres && margin > 0 ? Metres::reach(edge, margin) : margin; }
@@ -342,16 +344,16 @@ struct Area {
       if (at < 0) return compare_distance(p, center, radius, margin, error) > 0;
       return error < radius && compare_distance(p, center, radius, -error) < 0;
     }
-    if (kind == Kind::SEGMENT) return compare_distance(p, nearest_part(p, segment), margin, error) > 0;
+    if (kind == Kind::SEGMENT) return !is_near(p, segment, margin, error);
     const double more = at > 0 ? 0 : margin;  // rounding is monotone: what is beyond the rounded sum is beyond the sum
     const auto near = [&](const Box& box) {
+      if (metres) return Metres::least(p, box) <= more + error;
       return std::max({box.least.x - p.x, p.x - box.greatest.x, box.least.y - p.y, p.y - box.greatest.y}) <=
              error + more;
     };
     const auto is_near_ring = [&](const Polygon& polygon) {
-      return polygon.any_edge_meeting(near, [&](Edge edge) {
-        return near(Box::of(edge)) && compare_distance(p, nearest_part(p, edge), more, error) <= 0;
-      });
+      return polygon.any_edge_meeting(near,
+                                      [&](Edge edge) { return near(Box::of(edge)) && is_near(p, edge, more, error); });
     };
     if (at < 0) return !any_polygon(near, is_near_ring);
     return any_polygon([&](const Box& box) { return box.holds(p); },

@@ -41,10 +41,8 @@ class Fences {
   std::size_t size() const { return numbers_.size(); }
   bool has(std::int64_t number) const { return numbers_.contains(number); }
   std::int64_t count(std::int64_t number) const { return fence(number).count; }
-  // None around the subjects' own hull.
-  std::shared_ptr<const Area> area(std::int64_t number) const {
-    return fence(number).own ? nullptr : fence(number).area;
-  }
+  std::shared_ptr<const Area> area(std::int64_t number) const { return fence(number).area; }
+  bool is_own(std::int64_t number) const { return fence(number).own; }
 
   // Adds a fence, or replaces the area of one. `inside`: slots to be inside of a fence that is then new in any case.
   void set(const HullTree& tree, std::int64_t number, Area area, bool cross, bool own,

@@ -105,7 +105,41 @@ class OwnHulls {
     fence.outside = std::move(outside);
   }
 
+  // Of some places of subjects, the distance of each to the hull of the others, and which are farther from its boundary
+  // than their errors; a place where there is no single subject has the hull of all.
+  static void measure_own(HullTree& tree, std::span<const Point> places, double* distances) {
+    const Area all = Area::of_hull(vertices_of(tree), true, 0);
+    for_each_own(tree, places, [&](std::size_t i, bool alone) {
+      distances[i] = alone ? dynhull::distance(tree.nodes(), places[i]) : all.distance(places[i]);
+    });
+  }
+  static void clear_own(HullTree& tree, std::span<const Point> places, double margin, const double* errors,
+                        bool* clear) {
+    const Area all = Area::of_hull(vertices_of(tree), true, margin);
+    for_each_own(tree, places, [&](std::size_t i, bool alone) {
+      if (alone && errors[i] > 0) {  // a vertex is outside of the hull of the others
+        const std::optional<Edge> part = nearest_part(tree.nodes(), places[i]);
+        clear[i] = !part || compare_distance(places[i], *part, margin, errors[i]) > 0;
+      } else {
+        clear[i] = all.is_clear(places[i], errors[i]);
+      }
+    });
+  }
+
  private:
+  // Calls `visit` with the row of each place, and whether the tree is then without the single subject at a vertex
+  // there.
+  template <class Visit>
+  static void for_each_own(HullTree& tree, std::span<const Point> places, Visit visit) {
+    const std::vector<Point> vertices = single_vertices(tree);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (std::binary_search(vertices.begin(), vertices.end(), places[i]))
+        tree.without(places[i], [&] { visit(i, true); });
+      else
+        visit(i, false);
+    }
+  }
+
   // In order.
   static std::vector<Point> single_vertices(const HullTree& tree) {
     std::vector<Point> vertices = vertices_of(tree);

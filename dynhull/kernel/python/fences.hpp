@@ -42,6 +42,9 @@ class FenceIndex {
   std::int64_t count(std::int64_t fence) {
     return alone(0, [&](Fences& fences) { return fences.count(fence); });
   }
+  double margin(std::int64_t fence) {
+    return alone(0, [&](Fences& fences) { return fences.area(fence)->margin; });
+  }
 
   void set_polygons(std::int64_t fence, const nb::list& polygons, bool closed, double margin, bool cross,
                     const nb::object& inside) {
@@ -74,27 +77,32 @@ class FenceIndex {
     return packed(alone(ALL_ROWS, [&](Fences& fences) { return fences.inside(fence); }));
   }
 
-  // The distances of some places to the area; None around the subjects' own hull.
+  // The distances of some places to the area; around the subjects' own hull, to that of the others.
   nb::object distances(std::int64_t fence, const Rows& places) {
-    const auto area = alone(0, [&](Fences& fences) { return fences.area(fence); });
-    if (!area) return nb::none();
     const std::size_t count = places.shape(0);
+    const Point* points = points_of(places);
     const Output<double> distances(count);
-    beside_others(count, [&] {
-      for (std::size_t i = 0; i < count; ++i) distances.data()[i] = area->distance(points_of(places)[i]);
-    });
+    measure(
+        fence, count, [&](HullTree& tree, double) { OwnHulls::measure_own(tree, {points, count}, distances.data()); },
+        [&](const Area& area) {
+          for (std::size_t i = 0; i < count; ++i) distances.data()[i] = area.distance(points[i]);
+        });
     return nb::cast(distances.array());
   }
 
-  // Which of some places are farther than their errors from the boundary; None around the subjects' own hull.
+  // Which of some places are farther than their errors from the boundary; around the subjects' own hull likewise.
   nb::object clear(std::int64_t fence, const Rows& places, const Doubles& errors) {
-    const auto area = alone(0, [&](Fences& fences) { return fences.area(fence); });
-    if (!area) return nb::none();
     const std::size_t count = places.shape(0);
+    const Point* points = points_of(places);
     const Output<bool> clear(count);
-    beside_others(count, [&] {
-      for (std::size_t i = 0; i < count; ++i) clear.data()[i] = area->is_clear(points_of(places)[i], errors.data()[i]);
-    });
+    measure(
+        fence, count,
+        [&](HullTree& tree, double margin) {
+          OwnHulls::clear_own(tree, {points, count}, margin, errors.data(), clear.data());
+        },
+        [&](const Area& area) {
+          for (std::size_t i = 0; i < count; ++i) clear.data()[i] = area.is_clear(points[i], errors.data()[i]);
+        });
     return nb::cast(clear.array());
   }
 
@@ -176,6 +184,21 @@ class FenceIndex {
   }
 
  private:
+  // Measures rows by `own`, with the tree and the margin, around the subjects' own hull, else by `other`, with the
+  // area.
+  template <class Own, class Other>
+  void measure(std::int64_t fence, std::size_t rows, Own own, Other other) {
+    std::shared_ptr<const Area> area;
+    const bool is_own = alone(0, [&](Fences& fences) {
+      area = fences.area(fence);
+      return fences.is_own(fence);
+    });
+    if (is_own)
+      hull_->alone(ALL_ROWS, [&](Entities&, FramedTree& tree) { own(tree.plane(), area->margin); });
+    else
+      beside_others(rows, [&] { other(*area); });
+  }
+
   void set(std::int64_t fence, Area area, bool cross, bool own, const nb::object& keys) {
     std::optional<std::vector<std::uint32_t>> inside;
     if (!keys.is_none()) {

@@ -213,15 +213,16 @@ void add_fences(nb::module_& module) {
       .def("inside", &FenceIndex::inside, nb::sig("def inside(self, fence: int) -> dynhull.keys.Keys"), "fence"_a,
            "The keys inside, in order.")
       .def("count", &FenceIndex::count, "fence"_a, "The number of keys inside.")
+      .def("margin", &FenceIndex::margin, "fence"_a, "The margin.")
       .def("distances", &FenceIndex::distances,
            nb::sig("def distances(self, fence: int, places: dynhull.arrays.Points) -> "
-                   "numpy.typing.NDArray[numpy.float64] | None"),
-           "fence"_a, "places"_a, "The distances of places to the area; None if that is the hull of the entities.")
+                   "numpy.typing.NDArray[numpy.float64]"),
+           "fence"_a, "places"_a, "The distances of places to the area; of entities, to that of the others.")
       .def("clear", &FenceIndex::clear,
            nb::sig("def clear(self, fence: int, places: dynhull.arrays.Points, errors: "
-                   "numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.bool_] | None"),
+                   "numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.bool_]"),
            "fence"_a, "places"_a, "errors"_a,
-           "Which places are farther than their errors from the boundary; None if that is of the hull of the entities.")
+           "Which places are farther than their errors from the boundary; of entities, from that of the others.")
       .def("carry", &FenceIndex::carry,
            nb::sig("def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]"),
            "source"_a, "keys"_a, "Let keys that were removed there and are new here have moved.")

@@ -209,8 +209,6 @@ def _refuse_contradictions(config: FenceConfig) -> None:
             raise InvalidFieldError("config.margin", config.margin, "must be positive with without_self")
         if not config.closed:
             raise InvalidFieldError("config.boundary", "FENCE_BOUNDARY_OPEN", "closed with without_self")
-        if config.by_accuracy:
-            raise InvalidFieldError("config.by_accuracy", "true", "cannot be combined with without_self")
 
 
 def _refuse_for_other_hull(config: FenceConfig) -> None:

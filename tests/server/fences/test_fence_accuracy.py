@@ -14,6 +14,7 @@ from live_engine import LIMITS
 from mortal_server import MortalServer
 from patience import PATIENCE
 from server_process import server_process
+from support.sides import shape_of_hull
 
 from dynhull.keys import PackedKeys, key_list
 from dynhull_client import AsyncHullClient, Batch, Circle, HullClient, InvalidRequestError, Quarantine
@@ -181,6 +182,66 @@ def test_events_are_those_of_the_judge(kind, margin, seed):
     assert len(expected) > 20
 
 
+class JudgeOfOthers:
+    """Who is inside of the hull of the others, by whole numbers of halves, and the events of that."""
+
+    def __init__(self, margin):
+        self.margin, self.exact, self.reported, self.events = int(2 * margin), {}, {}, []
+
+    def look(self, held):
+        places = {key: (int(2 * x), int(2 * y)) for key, ((x, y), _) in held.items()}
+        for key in sorted({*self.reported, *held}):
+            was = self.reported.pop(key, False)
+            if key not in held:
+                self.exact.pop(key, None)
+                self.events += [("EXIT", key)] * was
+                continue
+            p, error = places[key], int(2 * held[key][1])
+            others = shape_of_hull(place for other, place in places.items() if other != key)
+            held_by = others.holds(p, closed=True)
+            stays = self.exact.get(key, False) and not others.farther(p, self.margin, closed=True)
+            self.exact[key] = side = held_by or stays
+            far = (
+                others.clear(p, error, closed=True) if held_by else others.farther(p, self.margin + error, closed=True)
+            )
+            self.reported[key] = now = side if not error or far else was
+            if now != was:
+                self.events.append(("ENTER" if now else "EXIT", key))
+
+
+@pytest.mark.parametrize(("margin", "seed"), [(0.5, 1), (2.0, 2), (5.0, 3)])
+def test_who_leaves_the_pack_by_more_than_the_error(margin, seed):
+    """Also where only those who were inside have moved, and the outline of all stays as it was."""
+
+    async def life():
+        rng, judge, held = random.Random(seed), JudgeOfOthers(margin), {}
+        async with served() as engine:
+            area = HullArea("fleet/a", without_self=True)
+            config = FenceConfig(area, "hull", "fleet/a", margin=margin, by_accuracy=True, initial="none")
+            await engine.fences.create("pack", config)
+            for _ in range(300):
+                keys = rng.sample(KEYS, rng.randint(1, 3))
+                if rng.random() < 0.1:
+                    await apply(engine, "fleet/a", {}, keys)
+                    held = {key: each for key, each in held.items() if key not in keys}
+                else:
+                    places = {key: (rng.randint(0, 24) / 2, rng.randint(0, 12) / 2) for key in keys}
+                    errors = [rng.choice([0.0, 0.5, 1.0, 2.5, 30.0]) for _ in places]
+                    await apply(engine, "fleet/a", places, (), errors if any(errors) else None)
+                    held |= {key: (places[key], e) for key, e in zip(places, errors, strict=True)}
+                judge.look(held)
+            live = engine.fences.get("pack")
+            inside = {key for each in (await live.inside()).members for key in key_list(each.keys)}
+            assert inside == {key for key, now in judge.reported.items() if now}
+            return await live.events(0, 10_000), judge.events
+
+    found, expected = asyncio.run(life())
+    assert [(e.type.name, e.key) for e in found] == expected
+    assert len(expected) > 30
+    for event in found:
+        assert event.type is EventType.EXIT or event.distance == 0
+
+
 # From outside
 
 
@@ -339,8 +400,6 @@ def test_bad_accuracies_are_refused_with_field_row_and_value(client, bad):
         client.put("bad", ["a", "b"], [[0, 0], [1, 1]], accuracies=[1])
     with pytest.raises(ValueError, match="are given with keys to put"):
         Batch(remove=["a"], accuracies=[1])
-    with pytest.raises(InvalidRequestError, match="by_accuracy"):
-        client.create_fence("bad", "bad", "bad", without_self=True, margin=1, by_accuracy=True)
 
 
 def test_doubts_and_accuracies_survive_kills(tmp_path):

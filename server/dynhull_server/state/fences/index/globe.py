@@ -14,7 +14,7 @@ from ...errors import HullUnsuitableError, InvalidFenceError
 from ...frames import off_globe, out_of_reach
 from ...hull import Hull
 from ...records import Center
-from ..model.config import Area, CircleArea, FenceConfig, HullArea, PolygonArea, Ring
+from ..model.config import Area, CircleArea, FenceConfig, PolygonArea, Ring
 
 # A circle is a polygon with this many corners, every half degree of azimuth, each at the radius on WGS 84: its edges
 # are at most 1e-5 of the radius inside of the circle.
@@ -66,7 +66,7 @@ def require_centers(hulls: Sequence[Hull], rule: str, lacking: Collection[Hull] 
 
 def require_margin(config: FenceConfig) -> None:
     """Raise InvalidFenceError if a fence on the globe has too wide a margin, or `without_self`."""
-    if isinstance(config.area, HullArea) and config.area.without_self:
+    if config.of_others:
         raise InvalidFenceError("hull_area.without_self", "true", "is for hulls in the plane")
     if config.margin > MOST_METRES:
         raise InvalidFenceError("margin", config.margin, f"at most {MOST_METRES:.0f} metres on the globe")

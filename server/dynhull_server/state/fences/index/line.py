@@ -244,10 +244,11 @@ class Line:
         """The revisions of the hulls that are areas of keys, by name."""
         return {name: area.hull.state.counts.revision for name, area in self.areas.items()}
 
-    def changed(self, hulls: Iterable[Hull], doubting: set[Fence]) -> Iterator[tuple[Subjects, Crossings]]:
+    def changed(self, hulls: Iterable[Hull], doubting: dict[Fence, bool]) -> Iterator[tuple[Subjects, Crossings]]:
         """The subjects whose side has changed, now that these hulls have; who has nothing to say costs nothing.
 
-        Fences whose area has moved, and may now be certain of others, are added to those `doubting`.
+        Fences that may now be certain of others are added to those `doubting`, with whether their area has moved. It
+        may not have, and the hull of the others has, of which a point that was inside is now a vertex.
         """
         touched: dict[str, Subjects] = {}
         for hull in hulls:
@@ -255,12 +256,14 @@ class Line:
             subjects = self.subjects.get(name)
             if subjects is not None:
                 touched[name] = subjects
+                of_others = [each for each in subjects.delaying if each.row.config.of_others]
+                doubting.update((each, False) for each in of_others if each.row.config.by_accuracy)
             area = self.areas.get(name)
             for fence, vertices in () if area is None else area.moved():
                 for each in fence.subjects.values():
                     each.lay(fence.number, fence.row.config, vertices)
                     if fence in each.delaying and fence.row.config.by_accuracy:
-                        doubting.add(fence)
+                        doubting[fence] = True
                 touched |= fence.subjects
         for _, subjects in sorted(touched.items()):
             crossings = subjects.take()

@@ -31,10 +31,6 @@ if TYPE_CHECKING:
     from ..trip.leg import FenceLeg
 
 
-# The number of no fence, and the least distance.
-SPARE, LEAST = -1, 5e-324
-
-
 class Subjects:
     """The keys of a hull, and the fences that compare them.
 
@@ -182,22 +178,9 @@ class Subjects:
             if away.any():
                 found[away] = self._metres(leg.row.number, config, leg.area, points[away])
             distances = found.tolist()
-        elif isinstance(config.area, HullArea) and config.area.without_self:
-            distances = self._distances_to_others(config, keys)
         else:
             distances = self.index.distances(leg.row.number, points).tolist()
         return distances
-
-    def _distances_to_others(self, config: FenceConfig, keys: Keys) -> list[float]:
-        """The distance from each of some keys to the hull of all others."""
-        bare = replace(config, margin=LEAST, crosses=False)
-        lay(self.index, SPARE, bare, NO_POINTS, keys)  # as if all were inside: those leave that are outside
-        try:
-            left = self.index.take()
-        finally:
-            self.index.drop(SPARE)
-        far = dict(zip(key_list(left.keys), left.distances.tolist(), strict=True))
-        return [far.get(key, 0.0) for key in key_list(keys)]
 
     def _metres(self, number: int, config: FenceConfig, area: Hull | None, places: Points) -> npt.NDArray[np.float64]:
         """The distances of places to the boundary of a fence on the globe, also where the index measures none."""

@@ -103,6 +103,11 @@ class FenceConfig:
         return bool(self.confirmations or self.min_dwell)
 
     @property
+    def of_others(self) -> bool:
+        """Whether each subject is compared with the hull of the others."""
+        return isinstance(self.area, HullArea) and self.area.without_self
+
+    @property
     def area_hull(self) -> str | None:
         """The name of the hull that is the area, or which the rule of an alarm names; None for others."""
         if isinstance(self.area, AlarmRule):

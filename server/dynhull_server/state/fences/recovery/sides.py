@@ -189,7 +189,7 @@ def _wrong_delays(hull: str, side: Side, inside: set[int], rows: Mapping[Key, in
 def _allowed(search: RangeSearch, points: Points, side: Side, frame: Gnomonic | None) -> tuple[Rows, Rows]:
     """The rows of the points that must be inside, and of those that may be; on the globe without the margin."""
     config, area = side.config, side.config.area
-    if isinstance(area, HullArea) and area.without_self:
+    if config.of_others:
         return _of_the_others(points, config.margin)
 
     def select(margin: float) -> Rows:

@@ -1,6 +1,6 @@
 """What a change of hulls means for their fences: who has crossed, and the events of that."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -30,6 +30,7 @@ from .leg import NOBODY, FenceLeg
 # The hull removes keys whose time has come.
 EXPIRY: Swap = Cause.REMOVED, Cause.EXPIRED
 NOTHING: Mapping[str, KeysChanged] = MappingProxyType({})
+NO_DOUBT: Mapping[Fence, bool] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +116,7 @@ class Comparison:
                 crossed: dict[str, tuple[Subjects, Crossings | None]] = {
                     name: (line.subjects[name], None) for name in changed if name in line.subjects
                 }
-                doubting = set[Fence]()
+                doubting: dict[Fence, bool] = {}
                 crossed |= {each.hull.name: (each, crossings) for each, crossings in line.changed(hulls, doubting)}
                 for fence in doubting:
                     for name, subjects in fence.subjects.items():
@@ -147,11 +148,11 @@ class Comparison:
         now: int,
         changed: KeysChanged | None = None,
         origins: Mapping[Key, Origin] = NOBODY,
-        doubting: Collection[Fence] = (),
+        doubting: Mapping[Fence, bool] = NO_DOUBT,
     ) -> None:
         """Make the events of a change of the keys of a hull, or of the areas of its fences with these revisions.
 
-        The areas of those `doubting` have moved.
+        Those `doubting` may be certain of others now, with whether their areas have moved.
         """
         crossed = set()
         if crossings is not None and len(crossings):
@@ -168,7 +169,7 @@ class Comparison:
                     if fence.delays is None:
                         leg.crossed(subjects, crossings, rows, swap, now, own)
                     else:
-                        delay(leg, subjects, crossings, rows, swap, now, changed, own, moved=fence in doubting)
+                        delay(leg, subjects, crossings, rows, swap, now, changed, own, moved=doubting.get(fence))
                 crossings = some(crossings, np.flatnonzero(~apart))
             if len(crossings):
                 self.log.add(subjects, crossings, areas, swap, now)
@@ -176,7 +177,7 @@ class Comparison:
             if fence not in crossed and (
                 changed is not None or fence in doubting
             ):  # they may have reported that they stay
-                leg, own, moved = self.leg(fence), known_to(fence, origins), fence in doubting
+                leg, own, moved = self.leg(fence), known_to(fence, origins), doubting.get(fence)
                 delay(leg, subjects, None, NO_ROWS, None, now, changed, own, moved=moved)
 
     def _apart(self, crossings: Crossings, origins: Mapping[Key, Origin]) -> npt.NDArray[np.bool_] | None:

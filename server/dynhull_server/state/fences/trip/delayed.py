@@ -31,7 +31,7 @@ def delay(
     changed: KeysChanged | None,
     origins: Mapping[Key, Origin] = NOBODY,
     *,
-    moved: bool = False,
+    moved: bool | None = None,
 ) -> None:
     """Begin and end delays, and make the events for which nothing is missing any more.
 
@@ -44,7 +44,7 @@ def delay(
         now: the time.
         changed: what has happened to the keys; None where only the area has changed.
         origins: where subjects of this fence come from, with their delays.
-        moved: whether the area has.
+        moved: whether the area has; None where that of nobody has, also not the hull of the others.
     """
     delays, hull = leg.fence.delays, subjects.hull.name
     assert delays is not None  # the caller checks it
@@ -67,7 +67,7 @@ def delay(
                 leg.put_delay((hull, key), each._replace(reports=each.reports + 1))
                 touched.add(key)
     if waiting and leg.row.config.by_accuracy:
-        looked = delays.doubts(hull) if moved else [key for key in reports if waiting[key].doubt]
+        looked = delays.doubts(hull) if moved is not None else [key for key in reports if waiting[key].doubt]
         touched.update(_certain(leg, subjects, [key for key in looked if key not in begun], reports, now, moved=moved))
     ripe = [(hull, key) for key in touched if key in waiting and delays.ripe(waiting[key], leg.time(now))]
     end_some(leg, subjects, ripe, Cause(0), now)
@@ -83,9 +83,18 @@ def delay(
 
 
 def _certain(
-    leg: FenceLeg, subjects: Subjects, doubtful: Collection[Key], reports: Collection[Key], now: int, *, moved: bool
+    leg: FenceLeg,
+    subjects: Subjects,
+    doubtful: Collection[Key],
+    reports: Collection[Key],
+    now: int,
+    *,
+    moved: bool | None,
 ) -> list[Key]:
-    """End the doubt of those of some keys that are on their side by more than their accuracy. Returns these."""
+    """End the doubt of those of some keys that are on their side by more than their accuracy. Returns these.
+
+    Who has not moved is certain because the area `moved`, or the hull of the others, unless that is None.
+    """
     delays, hull, config = leg.fence.delays, subjects.hull.name, leg.row.config
     if delays is None or not doubtful:
         return []
@@ -96,7 +105,8 @@ def _certain(
         if not is_clear:
             continue
         own, each = key in reported, waiting[key]
-        causes = (Cause.MOVED if own else Cause(0)) | (Cause.AREA if moved else Cause(0))
+        area = moved or (moved is not None and not own)
+        causes = (Cause.MOVED if own else Cause(0)) | (Cause.AREA if area else Cause(0))
         since = leg.time(now) if config.confirms else each.since
         ends = each._replace(since=since, reports=int(own and config.confirmations > 0), causes=causes, doubt=False)
         leg.put_delay((hull, key), ends)
@@ -158,7 +168,7 @@ def end_all(leg: FenceLeg, now: int) -> None:
     for hull, subjects in leg.fence.subjects.items():
         doubtful = delays.doubts(hull)
         if config.by_accuracy:
-            _certain(leg, subjects, doubtful, (), now, moved=False)
+            _certain(leg, subjects, doubtful, (), now, moved=None)
         for key in () if config.by_accuracy else doubtful:
             leg.put_delay((hull, key), delays.of(hull)[key]._replace(doubt=False))
     ripe: dict[str, list[Subject]] = {}
