@@ -7,7 +7,7 @@ import subprocess
 import tarfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -19,6 +19,7 @@ from gateway_process import Gateway, gateway_process
 from mortal_server import MortalServer
 from peers import program, typescript
 from playwright.sync_api import Browser, Page, expect
+from ports import free_port
 from run_in import run
 from server_process import PATIENCE
 
@@ -158,6 +159,37 @@ def test_a_writer_and_a_watch_outlive_servers(way: str, server: MortalServer, ga
         assert hull.revision == said["sequence"], "a batch was applied twice, or not at all"
         assert hull.vertices.tolist() == said["vertices"]
         assert hull.info.points == said["keys"]
+
+
+@pytest.mark.parametrize("way", ["gateway", "grpc"])
+def test_batches_under_way_outlive_servers_and_gateways(way: str, server: MortalServer) -> None:
+    """Each is applied once, in its turn, whatever is killed while several of them are under way."""
+    name, port = f"typescript/pipelined/{way}", free_port()
+    url = f"http://127.0.0.1:{port}" if way == "gateway" else f"grpc://{server.address}"
+    command = [program("node"), str(HERE / "pipelined.mjs"), url, name]
+    with ExitStack() as gateways:
+        gateway = gateways.enter_context(gateway_process(server.address, "--port", str(port), killed=way == "gateway"))
+        with subprocess.Popen(command, cwd=typescript(), stdout=subprocess.PIPE, text=True) as running:
+            assert running.stdout is not None
+            for victim in ("server", "gateway", "server")[:: 1 if way == "gateway" else 2]:
+                for _ in range(40):
+                    running.stdout.readline()
+                if victim == "server":
+                    server.kill()
+                    server.start()
+                else:
+                    assert gateway.process is not None
+                    gateway.process.kill()
+                    gateway.process.wait(PATIENCE)
+                    gateway = gateways.enter_context(gateway_process(server.address, "--port", str(port)))
+            said = json.loads(running.stdout.read().splitlines()[-1])
+            assert running.wait(PATIENCE) == 0
+    with HullClient(server.address) as client:
+        hull, kept = client.get_hull(name), dict(said["kept"])
+        assert hull.revision == said["sequence"] == client.last_sequence(name, "pipelined")
+        assert hull.info.points == len(kept)
+        keys = np.array(list(kept), np.uint64)
+        assert client.positions(name, keys).positions.tolist() == list(kept.values())
 
 
 def test_what_the_page_of_documentation_says(gateway: Gateway, server: MortalServer) -> None:

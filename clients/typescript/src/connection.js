@@ -1,3 +1,4 @@
+import { carryOverHttp } from "./carrying.js"
 import { DynhullError } from "./errors.js"
 import { fromJson, toJson } from "./json.js"
 import { parsed } from "./sse.js"
@@ -62,6 +63,8 @@ export class Connection {
    */
   constructor(url, { token = null, timeout = 30, retries = 3, fetch = globalThis.fetch.bind(globalThis) }) {
     this.url = url.replace(/\/+$/, "")
+    /** Batches of a writer that are under way: browsers have six connections to an origin. */
+    this.inFlight = 3
     this.#token = token
     this.#timeout = timeout
     this.#retries = retries
@@ -76,6 +79,11 @@ export class Connection {
    */
   ask(path, call = {}) {
     return answered(() => this.#once(path, call), this.#retries, call)
+  }
+
+  /** Send the batches of a writer. @param {string} name @param {import("./in-flight.js").InFlight} batches @param {import("./carrying.js").Carried} options */
+  carry(name, batches, options) {
+    return carryOverHttp((path, call) => this.ask(path, call), name, batches, options)
   }
 
   /**

@@ -43,6 +43,19 @@ export class DynhullError extends Error {
   }
 }
 
+/**
+ * What a request has that no server would take.
+ * @param {string} field
+ * @param {number | null} row
+ * @param {unknown} value
+ * @param {string} detail
+ */
+export function invalid(field, row, value, detail) {
+  const shown = typeof value === "bigint" ? String(value) : JSON.stringify(value) ?? String(value)
+  const place = row === null ? field : `${field}/${row}`
+  return new DynhullError({ reason: "INVALID_FIELD", status: 400, field, row, value: shown, detail: `/${place}: ${detail}` })
+}
+
 const NOT_BEGUN = new Set(["DRAINING", "STARTING", "TOO_MANY_CALLS"])
 // The gateway has no answer of the server, or a proxy none of the gateway.
 const UNDECIDED = new Set([502, 503, 504])

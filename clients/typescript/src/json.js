@@ -29,7 +29,16 @@ const NEGATIVE_ZERO = { test: (/** @type {unknown} */ value) => Object.is(value,
  * @returns {string}
  */
 export function toJson(value) {
+  if (isPlain(value)) return JSON.stringify(value)
   return stringify(value, null, undefined, [NEGATIVE_ZERO]) ?? "null"
+}
+
+/** Whether a value has neither bigint nor -0: then JSON.stringify, which is much faster, writes the same. @param {unknown} value @returns {boolean} */
+function isPlain(value) {
+  if (typeof value === "number") return Number.isFinite(value) && !Object.is(value, -0)
+  if (typeof value === "string" || typeof value === "boolean" || value === null) return true
+  if (Array.isArray(value)) return value.every(isPlain)
+  return typeof value === "object" && Object.getPrototypeOf(value) === Object.prototype && Object.values(value).every((each) => each === undefined || isPlain(each))
 }
 
 // Fields whose integers may be large, and those that have times.

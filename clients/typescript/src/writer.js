@@ -1,35 +1,33 @@
+import { rowsOf } from "./batch.js"
 import { growing, path, pause } from "./connection.js"
 import { DynhullError } from "./errors.js"
-import { fromWire, isoTime } from "./json.js"
+import { fromWire } from "./json.js"
+import { InFlight } from "./in-flight.js"
 
 /**
- * @typedef {import("./exact.js").Point} Point
+ * @typedef {import("./batch.js").Point} Point
+ * @typedef {import("./batch.js").AnyKey} AnyKey
+ * @typedef {import("./batch.js").Time} Time
  * @typedef {import("./client.js").Transport["connection"]} Connection
- * @typedef {string | number | bigint} AnyKey
- * @typedef {bigint | Date | string} Time microseconds since 1970, a Date, or a text in ISO 8601 with its zone
  *
  * @typedef {object} WriterOptions
- * @property {string} [producer] the name under which batches are numbered; default: a new one
- * @property {bigint} [sequence] the number of the last batch that was sent before, to go on after it
+ * @property {string} [producer] the name under which batches are numbered; default: a new one. A writer with the name of an earlier
+ *   one goes on after the last batch of that which was applied. Two at the same time must not share a name.
+ * @property {bigint} [sequence] the number of the last batch that was sent before, to go on after it; default: as the server says
  * @property {number} [batchRows] rows of a batch at most
+ * @property {number} [inFlight] batches that are sent and not acknowledged, at most
  * @property {number} [room] rows that wait before `put` does
  * @property {number} [patience] seconds to try for while nobody answers
  * @property {boolean} [maySkip] accept that batches are passed over after a restore of the server
  * @property {AbortSignal} [signal] gives up
- *
- * @typedef {{op: "put", key: AnyKey, point: Point, time: string | undefined}
- *   | {op: "remove", key: AnyKey}
- *   | {op: "insert", point: Point, time: string | undefined}
- *   | {op: "delete", point: Point}} Row
- *
- * @typedef {{rows: Row[], keys: Set<string>}} Batch rows of one kind, and their keys
  */
 
 /**
  * Writes rows in batches that are applied exactly once, also over broken connections and restarts of the server.
  *
- * Batches are numbered. One that is not answered is sent again with its number, and the server applies no number twice.
- * While a batch is on its way, the next one gathers. What was not acknowledged is lost with the page.
+ * Batches are numbered, and several are under way. One that is not answered is sent again with its number, and the server applies
+ * no number twice and none before the one before it. Rows gather in the next batch until it is full, or until nothing is under
+ * way. What was not acknowledged is lost with the page.
  *
  *     const writer = client.writer("fleet")
  *     await writer.put(["LH400"], [[8.57, 50.03]]) // waits if the server is slower than the page
@@ -39,14 +37,13 @@ export class Writer {
   #connection
   #name
   #options
-  /** @type {Batch[]} batches that are full, and the last one, which gathers */
-  #batches = []
-  #rows = 0
-  /** @type {DynhullError | null} */
+  #batches
+  /** @type {unknown} */
   #failed = null
   /** @type {(() => void)[]} who waits for room, or for everything to be acknowledged */
   #waiters = []
   #sending = false
+  #begun
 
   /**
    * @param {Connection} connection
@@ -54,27 +51,38 @@ export class Writer {
    * @param {WriterOptions} options
    */
   constructor(connection, name, options) {
-    const { producer = crypto.randomUUID(), sequence = 0n, batchRows = 8192, patience = 60 } = options
+    const { producer = crypto.randomUUID(), sequence, batchRows = 8192, inFlight = connection.inFlight, patience = 60 } = options
+    for (const [option, value] of Object.entries({ batchRows, inFlight })) {
+      if (!Number.isSafeInteger(value) || value < 1) throw new RangeError(`${option} must be an integer from 1 on, got ${value}`)
+    }
     this.#connection = connection
     this.#name = name
-    this.#options = { batchRows, room: 4 * batchRows, patience, maySkip: false, ...options }
+    this.#options = { room: (inFlight + 1) * batchRows, patience, maySkip: false, signal: null, ...options, inFlight, producer }
+    this.#batches = new InFlight(batchRows)
+    this.#batches.onAcknowledged = () => this.#wake()
     this.producer = producer
-    /** The number of the last batch that was acknowledged. @type {bigint} */
-    this.sequence = sequence
-    /** What the server said of it. @type {import("./client.js").Applied | null} */
-    this.applied = null
+    this.#begun = sequence !== undefined || options.producer === undefined
+    this.#batches.begin(sequence ?? 0n)
+  }
+
+  /** The number of the last batch that was acknowledged. @returns {bigint} */
+  get sequence() {
+    return this.#batches.sequence
+  }
+
+  /** What the server said of it. @returns {import("./client.js").Applied | null} */
+  get applied() {
+    return this.#batches.applied
   }
 
   /**
-   * Put keys at positions. Resolves when there is room for more.
+   * Put keys at positions. Resolves when there is room for more. A bad value throws, and nothing was added.
    * @param {readonly AnyKey[]} keys
    * @param {readonly Point[]} points
    * @param {readonly Time[]} [times] of the positions
    */
   put(keys, points, times) {
-    sameLength("points", points, keys)
-    if (times) sameLength("times", times, keys)
-    return this.#add(keys.map((key, row) => ({ op: "put", key, point: points[row], time: timeOf(times, row) })))
+    return this.#add("put", { keys, points, times })
   }
 
   /**
@@ -82,7 +90,7 @@ export class Writer {
    * @param {readonly AnyKey[]} keys
    */
   remove(keys) {
-    return this.#add(keys.map((key) => ({ op: "remove", key })))
+    return this.#add("remove", { keys })
   }
 
   /**
@@ -91,8 +99,7 @@ export class Writer {
    * @param {readonly Time[]} [times]
    */
   insert(points, times) {
-    if (times) sameLength("times", times, points)
-    return this.#add(points.map((point, row) => ({ op: "insert", point, time: timeOf(times, row) })))
+    return this.#add("insert", { points, times })
   }
 
   /**
@@ -100,12 +107,14 @@ export class Writer {
    * @param {readonly Point[]} points
    */
   delete(points) {
-    return this.#add(points.map((point) => ({ op: "delete", point })))
+    return this.#add("delete", { points })
   }
 
-  /** Resolves when everything is acknowledged. Throws what the server has refused; nothing after it was sent. */
+  /** Resolves when everything is acknowledged. Throws what the server has refused; no batch after it was applied. */
   async flush() {
-    await this.#until(() => !this.#rows)
+    this.#batches.hurry()
+    this.#batches.onMore()
+    await this.#until(() => !this.#batches.rows)
   }
 
   /** Flush, and take nothing more. */
@@ -114,21 +123,14 @@ export class Writer {
     this.#failed = new DynhullError({ reason: "CLOSED", detail: "the writer is closed" })
   }
 
-  /** @param {Row[]} rows */
-  async #add(rows) {
+  /** @param {import("./batch.js").Operation} op @param {Parameters<typeof rowsOf>[1]} columns */
+  async #add(op, columns) {
     if (this.#failed) throw this.#failed
-    for (const row of rows) {
-      let last = this.#batches.at(-1)
-      if (last === undefined || !fits(last, row, this.#options.batchRows)) {
-        last = { rows: [], keys: new Set() }
-        this.#batches.push(last)
-      }
-      last.rows.push(row)
-      if ("key" in row) last.keys.add(String(row.key))
-    }
-    this.#rows += rows.length
+    this.#batches.add(rowsOf(op, columns))
+    this.#batches.onMore()
     void this.#send()
-    await this.#until(() => this.#rows <= this.#options.room)
+    const { room, inFlight } = this.#options
+    await this.#until(() => this.#batches.rows <= room && this.#batches.batches <= 2 * inFlight + 1)
   }
 
   async #send() {
@@ -136,38 +138,54 @@ export class Writer {
     this.#sending = true
     await null // what the caller adds in the same turn goes together
     try {
-      for (let batch = this.#batches.shift(); batch; batch = this.#batches.shift()) {
-        this.applied = await this.#deliver(batch.rows)
-        this.sequence += 1n
-        this.#rows -= batch.rows.length
-        this.#wake()
-      }
+      await this.#begin()
+      await this.#carry()
     } catch (error) {
-      this.#failed = /** @type {DynhullError} */ (error)
+      this.#failed = error
     } finally {
       this.#sending = false
       this.#wake()
     }
+    if (!this.#failed && !this.#batches.empty) void this.#send() // came while the last connection ended
   }
 
-  /** @param {Row[]} rows */
-  async #deliver(rows) {
-    const { patience, maySkip, signal } = this.#options
-    const until = performance.now() + patience * 1000
-    const call = {
-      method: "POST",
-      query: { may_skip: maySkip || undefined },
-      body: bodyOf(rows),
-      idempotencyKey: `${this.producer}:${this.sequence + 1n}`,
-      signal: signal ?? null,
+  /** After what an earlier writer with this name has sent. */
+  async #begin() {
+    if (this.#begun) return
+    const { producer, signal } = this.#options
+    const asked = path`/hulls/${this.#name}/producers/${producer}`
+    const ask = () => this.#connection.ask(asked, { repeatable: true, signal })
+    this.#batches.begin(fromWire(await this.#patiently(ask)).lastSequence)
+    this.#begun = true
+  }
+
+  /** Send what there is, over one connection after the other. */
+  async #carry() {
+    while (!this.#batches.empty) {
+      await this.#patiently(() => this.#connection.carry(this.#name, this.#batches, this.#options))
     }
-    for (const seconds of growing()) {
+  }
+
+  /**
+   * What somebody answers, who is asked until then; the time runs from the last acknowledgement on.
+   * @template T
+   * @param {() => Promise<T>} ask
+   * @returns {Promise<T>}
+   */
+  async #patiently(ask) {
+    const { patience, signal } = this.#options
+    let [since, sequence, pauses] = [/** @type {number | null} */ (null), this.sequence, growing()]
+    for (;;) {
       try {
-        return fromWire(await this.#connection.ask(path`/hulls/${this.#name}/points`, call))
+        return await ask()
       } catch (error) {
+        this.#batches.rewind()
+        signal?.throwIfAborted()
         const again = error instanceof DynhullError && (error.passing || error.unknown || error.reason === "DEADLINE")
-        if (!again || signal?.aborted || performance.now() > until) throw error
-        await pause(seconds, signal ?? null)
+        if (!again) throw error
+        if (since === null || this.sequence !== sequence) [since, sequence, pauses] = [performance.now(), this.sequence, growing()]
+        if (performance.now() - since > patience * 1000) throw error
+        await pause(pauses.next().value, signal)
       }
     }
   }
@@ -184,37 +202,4 @@ export class Writer {
   #wake() {
     for (const wake of this.#waiters.splice(0)) wake()
   }
-}
-
-/**
- * Whether a row may join a batch: a batch has a key once, and either puts or inserts.
- * @param {Batch} batch
- * @param {Row} row
- * @param {number} most
- */
-function fits({ rows, keys }, row, most) {
-  const first = rows[0]
-  if (rows.length >= most || first.op !== row.op) return false
-  if ("time" in row && "time" in first && (row.time === undefined) !== (first.time === undefined)) return false
-  return !("key" in row) || !keys.has(String(row.key))
-}
-
-/** @param {Row[]} rows */
-function bodyOf(rows) {
-  const [first] = rows
-  const column = (/** @type {string} */ name) => rows.map((row) => /** @type {any} */ (row)[name])
-  const times = "time" in first && first.time !== undefined ? { times: column("time") } : {}
-  if (first.op === "put") return { keys: column("key"), points: column("point"), ...times }
-  if (first.op === "remove") return { remove: column("key"), missing: "count" }
-  return { [first.op]: column("point"), ...times }
-}
-
-/** @param {readonly Time[] | undefined} times @param {number} row */
-function timeOf(times, row) {
-  return times && isoTime(times[row])
-}
-
-/** @param {string} name @param {readonly unknown[]} values @param {readonly unknown[]} keys */
-function sameLength(name, values, keys) {
-  if (values.length !== keys.length) throw new RangeError(`${name} has ${values.length} rows for ${keys.length}`)
 }

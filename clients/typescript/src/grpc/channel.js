@@ -94,6 +94,36 @@ export class Channel {
 
   /**
    * @param {string} method
+   * @param {AbortSignal | null} signal
+   * @param {(answer: any) => void} take what it throws ends the call
+   * @returns {Duplex}
+   */
+  duplex(method, signal, take) {
+    const { caller } = /** @type {any} */ (this.#calls.get(method))
+    signal?.throwIfAborted()
+    const call = caller[method](this.#metadata)
+    const abort = () => call.cancel()
+    signal?.addEventListener("abort", abort)
+    /** @type {Promise<void>} */
+    const ended = new Promise((resolve, reject) => {
+      call.on("data", (/** @type {any} */ answer) => {
+        try {
+          take(answer)
+        } catch (error) {
+          reject(error)
+          call.cancel()
+        }
+      })
+      call.on("error", (/** @type {any} */ error) => reject(signal?.aborted ? signal.reason : problemOf(error, this.url)))
+      call.on("end", () => resolve())
+    })
+    const done = () => signal?.removeEventListener("abort", abort)
+    ended.then(done, done)
+    return { write: (request) => call.write(request), end: () => call.end(), ended }
+  }
+
+  /**
+   * @param {string} method
    * @param {object} request
    * @param {{signal?: AbortSignal | null, timeout?: number}} [options]
    * @returns {AsyncGenerator<any, void, undefined>}
@@ -114,6 +144,14 @@ export class Channel {
     }
   }
 }
+
+/**
+ * A stream in both directions.
+ * @typedef {object} Duplex
+ * @property {(request: object) => void} write
+ * @property {() => void} end say that there is no more to write
+ * @property {Promise<void>} ended rejects with what ended it otherwise
+ */
 
 /** Whether nothing of a call was sent, because there was no connection. @param {DynhullError} error */
 export function notSent(error) {

@@ -1,4 +1,5 @@
 import { answered } from "../connection.js"
+import { carryOverGrpc } from "./carrying.js"
 import { Client } from "../client.js"
 import { routed } from "./calls.js"
 import { Channel, notSent } from "./channel.js"
@@ -24,6 +25,7 @@ class GrpcConnection {
   /** @param {Channel} channel @param {Followed} followed @param {GrpcOptions} options */
   constructor(channel, followed, { timeout = 30, retries = 3 }) {
     this.url = channel.url
+    this.inFlight = 32
     this.#channel = channel
     this.#followed = followed
     this.#timeout = timeout
@@ -57,6 +59,11 @@ class GrpcConnection {
         return parts
       },
     })
+  }
+
+  /** Send the batches of a writer. @param {string} name @param {import("../in-flight.js").InFlight} batches @param {import("../carrying.js").Carried} options */
+  carry(name, batches, options) {
+    return carryOverGrpc(this.#channel, name, batches, options)
   }
 
   /**

@@ -1,6 +1,7 @@
 // Bodies and queries of the gateway's calls as messages of the contract.
 
-import { duration, invalid, moment, packKeys, packNumbers, packPoints, packTimes, timestamp } from "./values.js"
+import { invalid } from "../errors.js"
+import { duration, moment, packKeys, packNumbers, packPoints, packTimes, timestamp } from "./values.js"
 
 const SPAN = /^\s*(\d+(?:\.\d+)?)\s*(ms|s|m|h|d)?\s*$/
 /** @type {Record<string, number>} */

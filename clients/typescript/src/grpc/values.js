@@ -1,24 +1,12 @@
 // Values of the contract as they are in JavaScript, and back.
 
-import { DynhullError } from "../errors.js"
+import { invalid } from "../errors.js"
 import { isoTime, micros } from "../json.js"
 
 /** @typedef {import("../hull-copy.js").Key} Key */
 
 const LARGEST = (1n << 64n) - 1n
-
-/**
- * What a request has that the contract cannot carry.
- * @param {string} field
- * @param {number | null} row
- * @param {unknown} value
- * @param {string} detail
- */
-export function invalid(field, row, value, detail) {
-  const shown = typeof value === "bigint" ? String(value) : JSON.stringify(value) ?? String(value)
-  const place = row === null ? field : `${field}/${row}`
-  return new DynhullError({ reason: "INVALID_FIELD", status: 400, field, row, value: shown, detail: `/${place}: ${detail}` })
-}
+const HALF = 2 ** 32
 
 /** @param {string} field @param {readonly (readonly number[])[] | null | undefined} rows */
 export function packPoints(field, rows) {
@@ -48,14 +36,20 @@ export function packKeys(field, keys) {
   if (keys.every((key) => typeof key === "string")) return { strings: keys }
   const packed = new DataView(new ArrayBuffer(8 * keys.length))
   keys.forEach((key, row) => {
-    const whole = typeof key === "bigint" || Number.isSafeInteger(key) ? BigInt(key) : -1n
-    if (whole < 0n || whole > LARGEST) throw invalid(field, row, key, "must be an integer from 0 to 2**64 - 1, as the others")
-    packed.setBigUint64(8 * row, whole, true)
+    if (typeof key === "number" && Number.isSafeInteger(key) && key >= 0) {
+      packed.setUint32(8 * row, key % HALF, true)
+      packed.setUint32(8 * row + 4, key / HALF, true)
+      return
+    }
+    if (typeof key !== "bigint" || key < 0n || key > LARGEST) {
+      throw invalid(field, row, key, "must be an integer from 0 to 2**64 - 1, as the others")
+    }
+    packed.setBigUint64(8 * row, key, true)
   })
   return { packedIntegers: Buffer.from(packed.buffer) }
 }
 
-/** @param {string} field @param {readonly string[] | null | undefined} times */
+/** @param {string} field @param {readonly (bigint | string)[] | null | undefined} times */
 export function packTimes(field, times) {
   if (times == null) return null
   const packed = new DataView(new ArrayBuffer(8 * times.length))

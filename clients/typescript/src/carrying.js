@@ -1,0 +1,88 @@
+// How the batches of a writer go over HTTP: one a call, several calls side by side.
+
+import { DynhullError } from "./errors.js"
+import { fromWire, isoTime } from "./json.js"
+import { path } from "./connection.js"
+
+/**
+ * @typedef {import("./batch.js").Batch} Batch
+ * @typedef {import("./in-flight.js").InFlight} InFlight
+ *
+ * @typedef {object} Carried
+ * @property {string} producer
+ * @property {number} inFlight
+ * @property {boolean} maySkip
+ * @property {AbortSignal | null} signal
+ */
+
+/**
+ * Send what there is until everything is acknowledged. Calls may overtake each other: a batch that arrives before the one before
+ * it is refused, since its number leaves a gap, and goes again when that is acknowledged.
+ * @param {(path: string, call: import("./connection.js").Call) => Promise<any>} ask
+ * @param {string} name
+ * @param {InFlight} batches
+ * @param {Carried} options
+ */
+export async function carryOverHttp(ask, name, batches, options) {
+  // Numbers that may be skipped hide that a batch was overtaken.
+  const most = options.maySkip ? 1 : options.inFlight
+  let first = most
+  while (!batches.empty) {
+    const { failure, overtaken } = await round(ask, name, batches, options, first, most)
+    batches.rewind()
+    if (failure) throw failure
+    first = overtaken ? 1 : most
+  }
+}
+
+/**
+ * @param {(path: string, call: import("./connection.js").Call) => Promise<any>} ask
+ * @param {string} name
+ * @param {InFlight} batches
+ * @param {Carried} options
+ * @param {number} limit calls side by side until one is answered,
+ * @param {number} most and from then on
+ */
+async function round(ask, name, batches, { producer, maySkip, signal }, limit, most) {
+  /** @type {Set<Promise<void>>} */
+  const calls = new Set()
+  /** @type {{sequence: bigint, error: unknown} | null} of the oldest batch that failed */
+  let failed = null
+  let overtaken = false
+  const post = async (/** @type {Batch} */ batch) => {
+    const early = !batches.isOldest(batch)
+    const call = { method: "POST", query: { may_skip: maySkip || undefined }, body: bodyOf(batch), signal }
+    try {
+      const answer = await ask(path`/hulls/${name}/points`, { ...call, idempotencyKey: `${producer}:${batch.sequence}` })
+      batches.acknowledge(batch, fromWire(answer))
+      limit = most
+    } catch (error) {
+      if (early && error instanceof DynhullError && error.reason === "SEQUENCE_GAP") overtaken = true
+      else if (failed === null || batch.sequence < failed.sequence) failed = { sequence: batch.sequence, error }
+    }
+  }
+  const fill = () => {
+    while (failed === null && !overtaken && calls.size < limit) {
+      const batch = batches.take()
+      if (batch === null) return
+      const call = post(batch).finally(() => calls.delete(call))
+      calls.add(call)
+    }
+  }
+  batches.onMore = fill
+  try {
+    for (fill(); calls.size; fill()) await Promise.race(calls)
+  } finally {
+    batches.onMore = () => {}
+  }
+  return { failure: /** @type {{error: unknown} | null} */ (failed)?.error, overtaken }
+}
+
+/** @param {Batch} batch */
+function bodyOf({ op, keys, coordinates, times }) {
+  const points = Array.from({ length: coordinates.length / 2 }, (_, row) => [coordinates[2 * row], coordinates[2 * row + 1]])
+  const timed = times.length ? { times: times.map(isoTime) } : {}
+  if (op === "put") return { keys, points, ...timed }
+  if (op === "remove") return { remove: keys, missing: "count" }
+  return { [op]: points, ...timed }
+}

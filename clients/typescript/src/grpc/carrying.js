@@ -1,0 +1,106 @@
+// How the batches of a writer go over gRPC: a stream of them, and one of acknowledgements.
+
+import { DynhullError } from "../errors.js"
+import { appliedOf } from "./answers.js"
+import { packKeys, packTimes } from "./values.js"
+
+/** The size up to which batches share a message: beyond that, the cost of a message does not count. */
+const MESSAGE_BYTES = 2 ** 16
+
+/**
+ * Send what there is until everything is acknowledged.
+ * @param {import("./channel.js").Channel} channel
+ * @param {string} name
+ * @param {import("../in-flight.js").InFlight} batches
+ * @param {import("../carrying.js").Carried} options
+ * @returns {Promise<void>}
+ */
+export async function carryOverGrpc(channel, name, batches, { producer, inFlight, maySkip, signal }) {
+  let [begun, closed] = [false, false]
+  let several = 0 // batches of a message, once the server has said that it takes several
+  const send = () => {
+    while (!closed) {
+      const taken = takes(batches, inFlight, several)
+      if (!taken.length) break
+      const first = begun ? {} : { name, producer, acceptResults: true, maySkip }
+      const numbered = taken.map((batch) => ({ batch: messageOf(batch), sequence: String(batch.sequence) }))
+      call.write({ ...first, ...(several ? { batches: numbered } : numbered[0]) })
+      begun = true
+    }
+    if (batches.empty && !closed) {
+      closed = true // a call that stays open would keep a program from ending
+      call.end()
+    }
+  }
+  const call = channel.duplex("Stream", signal, (answer) => {
+    if (answer.maxBatches) several = answer.maxBatches
+    for (const { result, sequence } of answer.results.length ? answer.results : answer.result ? [answer] : []) {
+      acknowledge(batches, producer, BigInt(sequence), /** @type {any} */ (appliedOf(result)))
+    }
+    send()
+  })
+  batches.onMore = send
+  try {
+    send()
+    await call.ended
+  } finally {
+    batches.onMore = () => {}
+  }
+  if (!closed) throw new DynhullError({ reason: "UNREACHABLE", detail: "the server ended the stream" })
+}
+
+/**
+ * The batches of the next message. While others are under way, small ones wait until there are as many as those, or as
+ * many as a message takes: then messages grow as long as batches come faster than they are acknowledged.
+ * @param {import("../in-flight.js").InFlight} batches
+ * @param {number} inFlight
+ * @param {number} several
+ */
+function takes(batches, inFlight, several) {
+  const { underWay } = batches
+  const most = Math.min(Math.max(several, 1), inFlight - underWay)
+  let [count, bytes] = [0, 0]
+  for (; count < most; count++) {
+    const batch = batches.peek(count)
+    if (batch === null || (count && (!batch.sequence || bytes + batch.size > MESSAGE_BYTES))) break
+    bytes += batch.size
+  }
+  if (several && count < Math.min(underWay, most) && bytes < MESSAGE_BYTES) return []
+  const taken = []
+  while (taken.length < count) taken.push(/** @type {import("../batch.js").Batch} */ (batches.take()))
+  return taken
+}
+
+/**
+ * @param {import("../in-flight.js").InFlight} batches
+ * @param {string} producer
+ * @param {bigint} sequence
+ * @param {import("../client.js").Applied} applied
+ */
+function acknowledge(batches, producer, sequence, applied) {
+  const batch = batches.oldest
+  if (batch === null || batch.sequence !== sequence) {
+    throw new DynhullError({ reason: "REFUSED", detail: `batch ${sequence} of ${producer} was acknowledged in place of ${batch?.sequence}` })
+  }
+  if (applied.duplicate && batch.sent === 1) {
+    const detail = `batch ${sequence} of producer ${producer} had been applied before it was sent: another writer uses the same name`
+    throw new DynhullError({ reason: "PRODUCER_IN_USE", status: 409, detail })
+  }
+  batches.acknowledge(batch, applied)
+}
+
+/** @param {import("../batch.js").Batch} batch */
+function messageOf({ op, keys, coordinates, times }) {
+  const stamps = times.length ? packTimes("times", times) : null
+  if (op === "remove") return { removes: packKeys("remove", keys) }
+  const points = { packed: packed(coordinates) }
+  if (op === "put") return { puts: { keys: packKeys("keys", keys), points, times: stamps } }
+  return op === "insert" ? { inserts: points, insertTimes: stamps } : { deletes: points }
+}
+
+/** @param {number[]} numbers */
+function packed(numbers) {
+  const view = new DataView(new ArrayBuffer(8 * numbers.length))
+  numbers.forEach((each, row) => view.setFloat64(8 * row, each, true))
+  return Buffer.from(view.buffer)
+}
