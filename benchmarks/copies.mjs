@@ -31,7 +31,6 @@ function nanoseconds(rounds, each, run) {
  * @param {{vertices: number, points: number, events: number}} sizes
  */
 export function measured(HullCopy, orient2d, { vertices: count, points: asked, events }) {
-
   const around = circle(count)
   const least = around.reduce((best, each, row) => (each[0] < around[best][0] ? row : best), 0)
   const hull = [...around.slice(least), ...around.slice(0, least)]
@@ -52,13 +51,19 @@ export function measured(HullCopy, orient2d, { vertices: count, points: asked, e
     return sum
   }
   const change = (/** @type {number} */ row, /** @type {number} */ revision) => ({
-    type: "change", revision: BigInt(revision), points: count, removed: [copy.vertices[row]], removedRows: [row], rotation: 0,
-    added: [[copy.vertices[row][0], copy.vertices[row][1]]], addedRows: [row], addedKeys: null, renamedRows: null, renamedKeys: null,
+    type: "change", revision: BigInt(revision), points: count, removed: [hull[row]], removedRows: [row], rotation: 0,
+    added: [[hull[row][0], hull[row][1]]], addedRows: [row], addedKeys: null, renamedRows: null, renamedKeys: null,
     measures: null, cause: "batch", clock: null, center: null, changed: null,
   })
   let revision = 1
   const apply = () => {
     for (let i = 0; i < events; i++) copy.update(change((i * 7919) % count, ++revision))
+  }
+  const applyAndAsk = () => {
+    for (let i = 0; i < events; i++) {
+      copy.update(change((i * 7919) % count, ++revision))
+      copy.side(near[i % asked])
+    }
   }
   const locate = (/** @type {number[][]} */ points) => nanoseconds(7, asked, () => copy.locate(points))
   return {
@@ -67,5 +72,6 @@ export function measured(HullCopy, orient2d, { vertices: count, points: asked, e
     predicate: nanoseconds(7, asked, alone(apart)),
     predicateBeside: nanoseconds(7, asked, alone(near)),
     events: 1e9 / nanoseconds(5, events, apply),
+    eventsAsked: 1e9 / nanoseconds(5, events, applyAndAsk),
   }
 }

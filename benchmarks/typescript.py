@@ -1,9 +1,9 @@
 """The TypeScript package: `python benchmarks/typescript.py [--vertices 10000] [--points 200000] [--seconds 3]`.
 
 Copies of a hull in Node and in Chromium: nanoseconds for a `locate`, of points anywhere and of points on edges, beside
-one `orient2d` of robust-predicates (a locate takes two, and two searches); changes of one vertex applied a second. Then
-the rows a second that a writer has acknowledged, in one process each, of a hull with integers as keys in memory: the
-Python SDK, Node over gRPC, and Node over a gateway, which take turns. Medians.
+one `orient2d` of robust-predicates (a locate takes two, and two searches); changes of one vertex applied a second, and
+with a `side` after each. Then the rows a second that a writer has acknowledged, in one process each, of a hull with
+integers as keys in memory: the Python SDK, Node over gRPC, and Node over a gateway, which take turns. Medians.
 
 Needs `make peers`. Clients, gateway and server share the machine.
 """
@@ -102,10 +102,10 @@ def in_python(address: str, hull: str, seconds: float) -> float:
 
 
 def copies(sizes: dict[str, int]) -> None:
-    print("where\tlocate ns\ton edges ns\torient2d ns\ton edges ns\tchanges/s")
+    print("where\tlocate ns\ton edges ns\torient2d ns\ton edges ns\tchanges/s\tand asked/s")
     for where, measure in (("Node", in_node), ("Chromium", in_chromium)):
         found = measure(sizes)
-        values = (found[name] for name in ("locate", "beside", "predicate", "predicateBeside", "events"))
+        values = (found[name] for name in ("locate", "beside", "predicate", "predicateBeside", "events", "eventsAsked"))
         print(where, *(f"{value:,.0f}" for value in values), sep="\t")
 
 
@@ -128,7 +128,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--vertices", type=int, default=10_000)
     parser.add_argument("--points", type=int, default=200_000)
-    parser.add_argument("--events", type=int, default=200)
+    parser.add_argument("--events", type=int, default=20_000)
     parser.add_argument("--seconds", type=float, default=3)
     parser.add_argument("--rounds", type=int, default=5)
     given = parser.parse_args()

@@ -1,5 +1,6 @@
 import { ahead, area, ascent, gap, gapToLine, turn } from "./exact.js"
 import { DynhullError } from "./errors.js"
+import { Ring } from "./ring.js"
 
 /**
  * @typedef {import("./exact.js").Point} Point
@@ -19,8 +20,12 @@ import { DynhullError } from "./errors.js"
  */
 export class HullCopy {
   #known = false
-  /** The place of the greatest vertex, by x, then y: up to it the vertices are the lower chain. */
-  #greatest = 0
+  /** Counter-clockwise from the smallest by x, then y. @type {Ring<Point>} */
+  #vertices = new Ring([])
+  /** @type {Ring<Key> | null} */
+  #keys = null
+  /** The row of the greatest vertex, once it was looked for. @type {number | null} */
+  #greatest = null
   #updated = -Infinity
 
   /**
@@ -34,43 +39,46 @@ export class HullCopy {
     this.revision = 0n
     /** The number of points at that revision. */
     this.points = 0
-    /** Counter-clockwise from the smallest by x, then y. @type {readonly Point[]} */
-    this.vertices = []
-    /** Their keys; null unless the watch has `keys: true`. @type {readonly Key[] | null} */
-    this.vertexKeys = null
     /** Longitude and latitude of the centre of a geographic hull. @type {Point | null} */
     this.center = null
   }
 
+  /** Counter-clockwise from the smallest by x, then y. O(h) after an event. @returns {readonly Point[]} */
+  get vertices() {
+    return this.#vertices.rows
+  }
+
+  /** Their keys; null unless the watch has `keys: true`. O(h) after an event. @returns {readonly Key[] | null} */
+  get vertexKeys() {
+    return this.#keys?.rows ?? null
+  }
+
   /**
-   * Apply an event. O(h).
+   * Apply an event. O(√h) for each vertex that comes or goes.
    * @param {HullEvent} event
    */
   update(event) {
     if (event.type === "deleted") return this.clear()
     if (event.type === "snapshot") {
-      this.vertices = event.vertices
-      this.vertexKeys = event.vertexKeys
+      this.#vertices = new Ring(event.vertices)
+      this.#keys = event.vertexKeys && new Ring(event.vertexKeys)
       this.center = event.center
       this.#known = true
     } else if (event.type === "change") {
-      this.vertexKeys = changedKeys(this.vertexKeys, this.vertices.length, event)
-      this.vertices = edited(this.vertices, event.added, event)
+      this.#keys = changedKeys(this.#keys, this.#vertices.length, event)
+      this.#vertices.edit(event, event.added)
     }
     if (event.type !== "snapshot" && event.center !== null) this.center = event.center
     this.revision = event.revision
     this.points = event.points
     this.#updated = performance.now()
-    this.#greatest = 0
-    for (let i = 1; i < this.vertices.length; i++) {
-      if (compared(this.vertices[i], this.vertices[this.#greatest]) > 0) this.#greatest = i
-    }
+    this.#greatest = null
   }
 
   /** Hold no hull, as after its deletion. */
   clear() {
-    this.vertices = []
-    this.vertexKeys = this.center = null
+    this.#vertices = new Ring([])
+    this.#keys = this.center = this.#greatest = null
     this.revision = 0n
     this.points = 0
     this.#known = false
@@ -118,7 +126,7 @@ export class HullCopy {
    */
   support(directions) {
     this.#require(directions)
-    if (!this.vertices.length) throw refusal("HULL_EMPTY", "a hull without points has no extreme points")
+    if (!this.#vertices.length) throw refusal("HULL_EMPTY", "a hull without points has no extreme points")
     directions.forEach((direction, row) => {
       if (!direction[0] && !direction[1]) throw new RangeError(`direction ${row} is (0, 0)`)
     })
@@ -145,7 +153,7 @@ export class HullCopy {
   tangents(points) {
     this.#require(points)
     return points.map((point) => {
-      if (!this.vertices.length || this.#side(point) >= 0) return null
+      if (!this.#vertices.length || this.#side(point) >= 0) return null
       return [this.#tangent(point, 1), this.#tangent(point, -1)]
     })
   }
@@ -175,18 +183,31 @@ export class HullCopy {
 
   /** @param {Point} point @returns {-1 | 0 | 1} */
   #side(point) {
-    const { vertices } = this
+    const vertices = this.#vertices
     const count = vertices.length
     if (!count) return -1
-    const least = vertices[0]
-    const greatest = vertices[this.#greatest]
-    if (compared(point, least) < 0 || compared(point, greatest) > 0) return -1
+    const greatest = this.#last()
+    if (compared(point, vertices.at(0)) < 0 || compared(point, vertices.at(greatest)) > 0) return -1
     if (count === 1) return 0
     // The edges below and above the point: the last of each chain that does not begin after it.
-    const [low, high] = [this.#edge(0, this.#greatest, 1, point), this.#edge(this.#greatest, count, -1, point)]
-    const below = turn(vertices[low], vertices[low + 1], point)
-    const above = turn(vertices[high], vertices[(high + 1) % count], point)
+    const low = this.#edge(0, greatest, 1, point)
+    const high = this.#edge(greatest, count, -1, point)
+    const below = turn(vertices.at(low), vertices.at(low + 1), point)
+    const above = turn(vertices.at(high), vertices.at(high + 1 < count ? high + 1 : 0), point)
     return below < 0 || above < 0 ? -1 : below && above ? 1 : 0
+  }
+
+  /** The row of the greatest vertex by x, then y: up to it the vertices ascend, and from it on they descend. */
+  #last() {
+    if (this.#greatest !== null) return this.#greatest
+    const vertices = this.#vertices
+    let [low, high] = [0, vertices.length - 1]
+    while (low < high) {
+      const middle = (low + high) >> 1
+      if (compared(vertices.at(middle), vertices.at(middle + 1)) < 0) low = middle + 1
+      else high = middle
+    }
+    return (this.#greatest = low)
   }
 
   /**
@@ -197,10 +218,11 @@ export class HullCopy {
    * @param {Point} point
    */
   #edge(first, last, order, point) {
+    const vertices = this.#vertices
     let [low, high] = [first, last]
     while (high - low > 1) {
       const middle = (low + high) >> 1
-      if (order * compared(this.vertices[middle], point) <= 0) low = middle
+      if (order * compared(vertices.at(middle), point) <= 0) low = middle
       else high = middle
     }
     return low
@@ -208,12 +230,11 @@ export class HullCopy {
 
   /** @param {Point} direction @returns {Point} */
   #extreme(direction) {
-    const { vertices } = this
+    const vertices = this.#vertices
     const count = vertices.length
-    const upper = direction[1] > 0
-    let [low, high] = upper ? [this.#greatest, count] : [0, this.#greatest]
+    let [low, high] = direction[1] > 0 ? [this.#last(), count] : [0, this.#last()]
     // Along a chain the vertices ascend in the direction, and then descend.
-    const at = (/** @type {number} */ i) => vertices[i % count]
+    const at = (/** @type {number} */ i) => vertices.at(i % count)
     while (low < high) {
       const middle = (low + high) >> 1
       if (ascent(at(middle), at(middle + 1), direction) > 0) low = middle + 1
@@ -281,34 +302,15 @@ function refusal(reason, detail) {
 }
 
 /**
- * @template T
- * @param {readonly T[]} rows
- * @param {readonly T[]} added
- * @param {{removedRows: number[], rotation: number, addedRows: number[]}} change
- * @returns {T[]}
- */
-function edited(rows, added, { removedRows, rotation, addedRows }) {
-  const gone = new Set(removedRows)
-  const kept = rows.filter((_, row) => !gone.has(row))
-  const turned = kept.slice(rotation).concat(kept.slice(0, rotation))
-  /** @type {T[]} */
-  const changed = []
-  let [next, place] = [0, 0]
-  for (let row = 0; row < turned.length + added.length; row++) {
-    changed.push(addedRows[place] === row ? added[place++] : turned[next++])
-  }
-  return changed
-}
-
-/**
  * The keys after a change; those of a copy that had none are all among the renamed ones.
- * @param {readonly Key[] | null} keys
+ * @param {Ring<Key> | null} keys
  * @param {number} count
  * @param {Extract<HullEvent, {type: "change"}>} change
  */
 function changedKeys(keys, count, change) {
   if (change.addedKeys === null || change.renamedKeys === null || change.renamedRows === null) return null
-  const changed = edited(keys ?? new Array(count).fill(""), change.addedKeys, change)
-  for (const [place, row] of change.renamedRows.entries()) changed[row] = change.renamedKeys[place]
+  const changed = keys ?? new Ring(new Array(count).fill(""))
+  changed.edit(change, change.addedKeys)
+  for (const [place, row] of change.renamedRows.entries()) changed.set(row, change.renamedKeys[place])
   return changed
 }

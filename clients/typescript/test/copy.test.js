@@ -4,6 +4,7 @@ import { test } from "node:test"
 
 import { HullCopy } from "../src/index.js"
 import { fromJson } from "../src/json.js"
+import { Ring } from "../src/ring.js"
 
 /** @param {any} vertices */
 function copyOf(vertices) {
@@ -42,6 +43,105 @@ test("questions without a hull, to an old copy, and about no point are refused",
   assert.throws(() => copy.locate([[8, 50]]), { reason: "HULL_UNSUITABLE" })
   copy.update({ type: "deleted", revision: 2n })
   assert.throws(() => copy.area, { reason: "HULL_NOT_FOUND" })
+})
+
+/** Numbers from 0 to 1, the same each time. @param {number} seed */
+function dice(seed) {
+  let state = seed
+  return () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0
+    return state / 2 ** 32
+  }
+}
+
+/** What an edit leaves, row by row. @param {any[]} rows @param {any} change @param {any[]} added */
+function edited(rows, { removedRows, rotation, addedRows }, added) {
+  const kept = rows.filter((_, row) => !removedRows.includes(row))
+  const turned = kept.slice(rotation).concat(kept.slice(0, rotation))
+  const changed = []
+  let [next, place] = [0, 0]
+  while (changed.length < turned.length + added.length) changed.push(addedRows[place] === changed.length ? added[place++] : turned[next++])
+  return changed
+}
+
+test("a ring after edits has the rows that it should have", () => {
+  const roll = dice(41)
+  const below = (/** @type {number} */ most) => Math.floor(roll() * most)
+  const some = (/** @type {number} */ of, /** @type {number} */ most) => {
+    const chosen = new Set(Array.from({ length: of ? below(most) : 0 }, () => below(of)))
+    return [...chosen].sort((a, b) => a - b)
+  }
+  for (const size of [0, 1, 2, 17, 700]) {
+    let expected = Array.from({ length: size }, (_, row) => row)
+    const ring = new Ring(expected)
+    for (let step = 0; step < 1500; step++) {
+      const grows = step % 500 < 250 ? 4 : 2
+      const removedRows = some(expected.length, step % 97 ? 6 - grows : expected.length)
+      const left = expected.length - removedRows.length
+      const added = Array.from({ length: below(grows + 1) }, (_, row) => 1e6 + 10 * step + row)
+      const addedRows = some(left + added.length, 1e3).slice(0, added.length)
+      while (addedRows.length < added.length) addedRows.push(left + addedRows.length)
+      const change = { removedRows, rotation: left && step % 3 === 0 ? below(left + 1) : 0, addedRows: [...new Set(addedRows)] }
+      if (change.addedRows.length < added.length) continue
+      const before = ring.rows
+      const kept = [...before]
+      expected = edited(expected, change, added)
+      ring.edit(change, added)
+      if (expected.length && step % 5 === 0) {
+        const row = below(expected.length)
+        expected[row] = -step
+        ring.set(row, -step)
+      }
+      assert.equal(ring.length, expected.length)
+      for (let asked = 0; asked < 5 && expected.length; asked++) {
+        const row = below(expected.length)
+        assert.equal(ring.at(row), expected[row], `size ${size}, step ${step}, row ${row}`)
+      }
+      if (step % 4 === 0) assert.deepEqual(ring.rows, expected, `size ${size}, step ${step}`)
+      assert.deepEqual(before, kept, "an array that was read changed")
+    }
+  }
+})
+
+test("a copy after changes answers as one that begins there", () => {
+  const roll = dice(7)
+  const place = (/** @type {number} */ angle) => /** @type {[number, number]} */ ([Math.cos(angle), Math.sin(angle)])
+  const ordered = (/** @type {number[]} */ angles) => {
+    const all = angles.map(place)
+    const least = all.reduce((best, each, row) => (each[0] < all[best][0] || (each[0] === all[best][0] && each[1] < all[best][1]) ? row : best), 0)
+    return all.slice(least).concat(all.slice(0, least))
+  }
+  let angles = Array.from({ length: 300 }, () => roll() * 2 * Math.PI).sort((a, b) => a - b)
+  const copy = copyOf(ordered(angles))
+  for (let step = 0; step < 400; step++) {
+    const before = ordered(angles)
+    const gone = Math.floor(roll() * angles.length)
+    angles = angles.filter((_, row) => row !== gone).concat(roll() * 2 * Math.PI).sort((a, b) => a - b)
+    const after = ordered(angles)
+    const is = (/** @type {any} */ one) => (/** @type {any} */ other) => one[0] === other[0] && one[1] === other[1]
+    const removedRows = before.flatMap((each, row) => (after.some(is(each)) ? [] : [row]))
+    const addedRows = after.flatMap((each, row) => (before.some(is(each)) ? [] : [row]))
+    const kept = before.filter((_, row) => !removedRows.includes(row))
+    const rotation = kept.findIndex(is(after.filter((_, row) => !addedRows.includes(row))[0]))
+    copy.update({
+      type: "change", revision: BigInt(step + 2), points: 300, removed: removedRows.map((row) => before[row]), removedRows, rotation,
+      added: addedRows.map((row) => after[row]), addedRows, addedKeys: null, renamedRows: null, renamedKeys: null,
+      measures: null, cause: "batch", clock: null, center: null, changed: null,
+    })
+    const fresh = copyOf(after)
+    const near = Array.from({ length: 20 }, () => {
+      const [a, b] = [after[Math.floor(roll() * after.length)], after[Math.floor(roll() * after.length)]]
+      return /** @type {[number, number]} */ ([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2])
+    })
+    const asked = [...near, ...after.slice(0, 5), [0, 0], [-2, 0]].map((each) => /** @type {[number, number]} */ (each))
+    assert.deepEqual(asked.map((point) => copy.side(point)), [...fresh.locate(asked)], `step ${step}`)
+    assert.deepEqual(copy.support(near), fresh.support(near), `step ${step}`)
+    if (step % 7 === 0) {
+      assert.deepEqual(copy.vertices, after)
+      assert.deepEqual(copy.tangents([[3, 1]]), fresh.tangents([[3, 1]]))
+      assert.equal(copy.area, fresh.area)
+    }
+  }
 })
 
 test("changes are applied to vertices and keys", () => {
