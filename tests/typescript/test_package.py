@@ -279,7 +279,7 @@ def test_a_map_of_a_hull_a_fence_and_an_alarm(gateway: Gateway, server: MortalSe
     name = "typescript/map.html"
     with served(tmp_path, gateway, "map.html") as url, HullClient(server.address) as client, chromium() as browser:
         client.create_hull(name, keyed="str")
-        client.create_fence("yard", [(2, -1), (9, -1), (9, 9), (2, 9)], subjects=name)
+        client.create_fence("yard", [(2, -1), (9, -1), (9, 9), (2, 9)], subjects=name, margin=3)
         client.create_alarm("spread", hull=name, when="area > 100")
         client.put(name, list("abc"), [(0, 0), (4, 0), (4, 3)])
         seen, errors = watched(browser)
@@ -289,6 +289,8 @@ def test_a_map_of_a_hull_a_fence_and_an_alarm(gateway: Gateway, server: MortalSe
         seen.wait_for_function("document.title === 'revision 1'")
         for colour in (HULL, FENCE):
             seen.wait_for_function(f"({INKED})('{colour}') > 200")
+        # A line of dashes at the margin is more than the area's own border and the name.
+        assert seen.evaluate(INKED, FENCE) > seen.evaluate(INKED, HULL) > 200
         assert seen.evaluate(INKED, ALARM) == 0
         client.put(name, ["c"], [(4, 90)])
         shown = seen.locator("dynhull-map .alarms li")

@@ -25,6 +25,7 @@
  */
 import { Boxes, FONT, is_inside, square_box, text_width } from "./boxes.js"
 import { STAR_SIZE, add_marker, sizes_in_crowds } from "./hulls.js"
+import { offset_hull_on_globe } from "./offset.js"
 import { box_around, wound } from "./views.js"
 export const ARC_STEPS = 96, NAME_FONT = `bold 13px ${FONT}`, NAME_HEIGHT = 18, NAME_GAP = 9, LONGEST_NAME = 28
 export const AREA_ALPHA = 0.08, HALO_ALPHA = 0.25, HALO_WIDTH = 8, MARGIN_DASH = [3, 3], MARK_RADIUS = 6
@@ -35,6 +36,8 @@ export const NOBODY = {hull: [], key: [], x: [], y: []}
 export class Fence {
   area = NO_AREA
   inside = NOBODY
+  /** Around the hull that it is, as that was. @type {{corners: Ring, margin: Rings[], globe: boolean} | undefined} */
+  outer = undefined
   /** @param {string} name @param {Look} look */
   constructor(name, look) {
     this.name = name
@@ -43,7 +46,8 @@ export class Fence {
   /** @param {FenceMessage} message */
   take(message) {
     if (message.kind == "inside") this.inside = message
-    else this.area = {...message, polygons: message.globe ? message.polygons.map(wound) : message.polygons}
+    else if (!message.globe) this.area = message
+    else this.area = {...message, polygons: message.polygons.map(wound), around: message.around.map(wound)}
   }
   /**
    * The polygons of the area, each a list of rings: its own, and those of hulls.
@@ -57,9 +61,14 @@ export class Fence {
   }
   /** @param {View} view @param {Map<string, Hull>} hulls @returns {Rings[]} */
   margins(view, hulls) {
-    const hull = this.area.margin && !view.globe && hulls.get(this.area.hulls[0])
-    const outer = hull && hull.corners.length ? [[offset_outline(hull.corners, this.area.margin)]] : []
-    return [...this.area.around, ...outer]
+    const hull = this.area.margin ? hulls.get(this.area.hulls[0]) : undefined
+    const own = view.globe == this.area.globe || !view.globe ? this.area.around : []
+    if (!hull?.corners.length) return own
+    if (this.outer?.corners != hull.corners) {
+      const outer = hull.globe ? offset_hull_on_globe(hull.corners, this.area.margin).map(wound) : [[offset_outline(hull.corners, this.area.margin)]]
+      this.outer = {corners: hull.corners, margin: outer, globe: hull.globe}
+    }
+    return this.outer.globe == view.globe ? [...own, ...this.outer.margin] : own
   }
   /**
    * The subjects inside: where the hulls draw them, which are newer than what the fence knows.

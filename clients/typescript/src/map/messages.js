@@ -2,6 +2,7 @@
 
 import { geoCircle } from "d3-geo"
 
+import { offset_on_globe, offset_rings } from "./offset.js"
 import { EARTH_RADIUS, RADIAN } from "./views.js"
 
 /**
@@ -10,6 +11,9 @@ import { EARTH_RADIUS, RADIAN } from "./views.js"
  */
 
 const STEPS = 96
+/** Corners of an area around which its margin is drawn: of more, each of some. */
+const MOST_CORNERS = 1000
+const LEAST_CORNERS = 3
 
 /**
  * The outline of a hull, with the names of its vertices.
@@ -35,7 +39,18 @@ export function areaMessage(fence, globe) {
   if (fence.otherHull) hulls.push(fence.otherHull)
   const margin = (fence.otherHull ? fence.near : fence.margin) ?? 0
   const polygons = parts.flatMap((part) => ("hull" in part ? [] : [ringsOf(part, globe)]))
-  return { kind: "area", fence: fence.name, hulls, margin, polygons, around: [], globe }
+  const around = margin && polygons.length ? (globe ? offset_on_globe : offset_rings)(thinned(polygons), margin) : []
+  return { kind: "area", fence: fence.name, hulls, margin, polygons, around, globe }
+}
+
+/** @param {Point[][][]} polygons */
+function thinned(polygons) {
+  const step = Math.ceil(polygons.flat(2).length / MOST_CORNERS)
+  const thin = (/** @type {Point[]} */ ring) => {
+    const each = Math.max(1, Math.min(step, Math.floor(ring.length / LEAST_CORNERS)))
+    return ring.filter((_, row) => row % each === 0)
+  }
+  return polygons.map((rings) => rings.map(thin))
 }
 
 /**

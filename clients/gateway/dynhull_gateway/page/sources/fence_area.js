@@ -1,10 +1,9 @@
 // The area of a fence and its margin as they are drawn. For the eye: the server decides who is inside.
-import * as d3 from "d3-geo"
+import { offset_on_globe, offset_rings } from "../dynhull/map/offset.js"
 import { EARTH_RADIUS, RADIAN, box_around } from "../dynhull/map/views.js"
 import { shown } from "../degrees.js"
 import { MOST_DRAWN } from "./hull_state.js"
-import { offset_rings } from "./offset.js"
-const LEAST_CORNERS = 3, MOST_POLYGONS = Math.floor(MOST_DRAWN / LEAST_CORNERS), CORNERS_OF_CIRCLE = 180, RIM = 1.55
+const LEAST_CORNERS = 3, MOST_POLYGONS = Math.floor(MOST_DRAWN / LEAST_CORNERS), CORNERS_OF_CIRCLE = 180
 // The hulls whose outlines are the area; in a fence around another hull, both.
 export function area_hulls({area, otherHull}) {
   const own = [area].flat().flatMap(part => "hull" in part ? [part.hull] : [])
@@ -26,7 +25,7 @@ export function area_of(name, fence, center = null) {
   if (!fence) return {message: empty, bounds: undefined, drawn: 0}
   const margin = (fence.otherHull == null ? fence.margin : fence.near) ?? 0
   const polygons = polygons_of(fence, center != null).map(rings => rings.map(ring => shown(ring, center)))
-  const around = !polygons.length || !margin ? [] : center ? offset_on_globe(polygons, margin, center) : offset_rings(polygons, margin)
+  const around = !polygons.length || !margin ? [] : center ? offset_on_globe(polygons, margin).map(rings => rings.map(ring => shown(ring, center))) : offset_rings(polygons, margin)
   const drawn = polygons.flat().reduce((sum, ring) => sum + ring.length, 0)
   const bounds = polygons.length ? box_around([...polygons, ...around].flatMap(([exterior]) => exterior)) : undefined
   return {message: {...empty, hulls: area_hulls(fence), margin, globe: center != null, polygons, around}, bounds, drawn}
@@ -57,13 +56,4 @@ export function circle({center: [x, y], radius}, on_globe) {
     const north = Math.asin(sin(lat) * cos(away) + cos(lat) * sin(away) * sin(angle))
     return [x + Math.atan2(cos(angle) * sin(away) * cos(lat), cos(away) - sin(lat) * sin(north)) / RADIAN, north / RADIAN]
   })
-}
-// The margin in metres, in a plane that is true from the middle of the area; none where an area is nearly a hemisphere.
-function offset_on_globe(polygons, margin, center) {
-  const middle = d3.geoCentroid({type: "MultiPoint", coordinates: polygons.flatMap(([exterior]) => exterior)})
-  const projection = d3.geoAzimuthalEquidistant().scale(EARTH_RADIUS).translate([0, 0]).rotate([-middle[0], -middle[1]])
-  const far = RIM * EARTH_RADIUS, flat = polygons.map(rings => rings.map(ring => ring.map(place => projection(place))))
-  if (flat.flat(2).some(([x, y]) => !(Math.hypot(x, y) < far))) return []
-  const back = ([x, y]) => projection.invert([x, y].map(each => each * Math.min(1, far / Math.hypot(x, y) || 1)))
-  return offset_rings(flat, margin).map(rings => rings.map(ring => shown(ring.map(back), center)))
 }
