@@ -1,5 +1,6 @@
 """Every unary call over HTTP, and what errors say."""
 
+import asyncio
 import http.client
 import json
 import socket
@@ -7,12 +8,17 @@ import threading
 
 import numpy as np
 import pytest
+from application_call import called
 from command_line import dynhull
+from fastapi.routing import APIRoute
 from gateway_process import NDJSON, Gateway, gateway_process
 from patience import PATIENCE
 from server_process import server_process
 
 from dynhull_client import HullClient
+from dynhull_gateway.app import application
+from dynhull_gateway.parameters import taken
+from dynhull_gateway.settings import Settings
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 
@@ -314,6 +320,21 @@ def test_refusals_of_the_server_have_their_status_and_reason(hasty: Gateway, gat
     assert (
         "must be PRODUCER:SEQUENCE" in gateway.post(f"{at}/points", SQUARE, Idempotency_Key="no number").json["detail"]
     )
+
+
+def test_parameters_are_those_of_the_description_which_no_request_waits_for() -> None:
+    app = application(None, Settings())  # type: ignore[arg-type]  # the refused request goes no further
+    status, _ = asyncio.run(called(app, "/hulls/a/measures?layr=2"))
+    assert (status, app.openapi_schema) == (400, None)
+    described = app.openapi()["paths"]
+    compared = 0
+    for route in app.state.routes:
+        for method in route.methods if isinstance(route, APIRoute) else ():
+            parameters = described[route.path_format][method.lower()].get("parameters", ())
+            named = [each["name"] for each in parameters if each["in"] == "query"]
+            assert taken(route.dependant) == named, (method, route.path_format)
+            compared += bool(named)
+    assert compared > 30
 
 
 def test_head_is_get_without_the_body(gateway: Gateway, square: str) -> None:
