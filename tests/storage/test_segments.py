@@ -360,6 +360,27 @@ def test_what_is_read_of_a_few_keys_is_as_it_was_written_or_refused(tmp_path, bl
     fleet.storage.close()
 
 
+def test_what_is_before_a_hole_is_read_of_a_key_and_then_the_hole_is_named(fleet):
+    fleet.fill()
+    storage, keys = fleet.make_reader(), PackedKeys.pack(KEYS[:1])
+    segments = storage._ledger.hulls[1].segments
+    whole, _ = storage.key_changes(1, keys, 0, NEWEST)
+    assert len(segments) > 3
+    assert whole == segments[-1].last
+    for place in range(len(segments)):
+        hole = segments[place]
+        path = fleet.archive.path / (hole.file + BATCHES)
+        aside = path.rename(path.with_suffix(".aside"))
+        at = 0
+        while at < hole.first - 1:
+            at, changes = storage.key_changes(1, keys, at, NEWEST)
+            assert changes.revisions.tolist() == sorted(set(changes.revisions.tolist()))
+        assert at == hole.first - 1
+        with pytest.raises(DamagedError, match=f"revisions {hole.first} to {hole.last} cannot be read"):
+            storage.key_changes(1, keys, at, NEWEST)
+        aside.rename(path)
+
+
 def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():
     rng = np.random.default_rng(1)
     hard = np.array([[-0.0, 5e-324], [1.1, 1e308], [0.1 + 0.2, -1 / 3], [2.0**60, 179.9999999]])

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator, Mapping, Set
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
+from itertools import chain, zip_longest
 from threading import Lock, Thread
 
 from ...state.records import CommitStamp, Kept, Keys, Record
@@ -14,7 +16,7 @@ from ..of_keys import changes_of_keys
 from ..past import Found, Hole, Moment, created
 from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive
-from ..segments.columns import Batches, contents_of
+from ..segments.columns import Batches, SegmentColumns, contents_of, joined
 from ..segments.gathered import gathered
 from ..segments.parquet import from_parquet, keys_from_parquet, ways_from_parquet
 from .chunks import state_from
@@ -25,6 +27,8 @@ from .segment_rows import StoredSegment
 # Segments whose columns stay in memory, since what is read next is mostly in the same: these, and more of few rows, as
 # those of many hulls that are read in the order of their commits.
 KEPT_OPEN, KEPT_ROWS = 3, 2**20
+# Segments that are looked at for some keys in one read, half of them beside the caller.
+TOGETHER = 16
 
 
 class Filed:
@@ -95,12 +99,40 @@ class Filed:
         return self._read_state(_begins(hull, until), keys)
 
     def key_changes(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
-        """What the batches of one segment do to some keys, from a revision on."""
-        segment = _segment(hull, after + 1)
-        name, facts, last = segment.file + BATCHES, segment.facts, min(until, segment.last)
-        with self._noted(segment, BATCHES), self._archive.parts(name, facts.wrote) as file:
-            columns, _, _ = keys_from_parquet(file, name, keys)
+        """What the batches of some segments do to some keys, from a revision on."""
+        segments = _run(hull, after + 1, until)[:TOGETHER]
+        beside: Future[list[SegmentColumns | StorageError]] = Future()
+        if len(segments) > 1:
+            read = partial(self._rows_of_keys, segments[1::2], keys)
+            Thread(target=_settle, args=(beside, read), name="read beside").start()
+        here = self._rows_of_keys(segments[::2], keys)
+        found: list[SegmentColumns] = []
+        for each in chain.from_iterable(zip_longest(here, beside.result() if len(segments) > 1 else ())):
+            if isinstance(each, StorageError) and not found:
+                raise each
+            if not isinstance(each, SegmentColumns):  # what is before it comes first
+                break
+            found.append(each)
+        last = min(until, segments[len(found) - 1].last)
+        columns = joined(found, hull.row.settings.identity)
         return last, changes_of_keys(columns.between(after, last), keys)
+
+    def _rows_of_keys(self, segments: list[StoredSegment], keys: Keys) -> list[SegmentColumns | StorageError]:
+        """The rows of keys in some segments: of the first, and of others until that are many, or one fails."""
+        found: list[SegmentColumns | StorageError] = []
+        rows = 0
+        for segment in segments:
+            name = segment.file + BATCHES
+            try:
+                with self._noted(segment, BATCHES), self._archive.parts(name, segment.facts.wrote) as file:
+                    columns, _, _ = keys_from_parquet(file, name, keys)
+            except StorageError as error:
+                return [*found, error]
+            found.append(columns)
+            rows += len(columns)
+            if rows >= STEP_POINTS:
+                break
+        return found
 
     def ways(
         self, hull: HullRows, after: int, until: int, read: Callable[[Iterator[KeyWays]], Found]
@@ -220,6 +252,14 @@ def holes(hulls: Mapping[int, HullRows], files: Set[str]) -> Iterator[Hole]:
                 yield Hole(number, segment.first - 1, segment.first - 1)
 
 
+def _settle(future: "Future[Found]", function: Callable[[], Found]) -> None:
+    """Have a future end as a function does."""
+    try:
+        future.set_result(function())
+    except BaseException as error:
+        future.set_exception(error)
+
+
 def _begins(hull: HullRows, until: int) -> StoredSegment:
     """The last segment beside which there is a state that is not after a revision."""
     begins = [each for each in _usable(hull) if each.begins and each.first - 1 <= until]
@@ -247,6 +287,14 @@ def _segment(hull: HullRows, revision: int) -> StoredSegment:
     found = next((each for each in _usable(hull) if each.first <= revision <= each.last), None)
     if found is None:
         raise _not_kept(hull, revision)
+    return found
+
+
+def _run(hull: HullRows, first: int, last: int) -> list[StoredSegment]:
+    """The segments that have some revisions, from the first of these on."""
+    found = [each for each in _usable(hull) if first <= each.last and each.first <= last]
+    if not found or found[0].first > first:
+        raise _not_kept(hull, first)
     return found
 
 

@@ -1,16 +1,15 @@
 """The folder of the past: two files for each segment, written once, and read with the hash of all their bytes."""
 
+import io
 import os
 from base64 import b64decode, b64encode
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from typing import NamedTuple
-
-import numpy as np
 
 from ..durable import TEMPORARY, make_durable, write_durably
 from ..port import DamagedError, StorageError
@@ -31,57 +30,59 @@ class Written(NamedTuple):
     blocks: str
 
 
-class Parts:
-    """A file whose bytes are read, and checked, as they are needed.
+class _Blocks(io.RawIOBase):
+    """A file whose bytes are checked, a block at a time, as they are read.
 
     Args:
         path: the file.
         written: what it was written with.
-
-    Attributes:
-        content: as many bytes as the file has: 0 where they have not been read.
     """
 
     def __init__(self, path: Path, written: Written) -> None:
         self._path = path
         self._digests = b64decode(written.blocks)
         self._size = written.bytes
+        self._at = 0
+        self._blocks: dict[int, bytes] = {}  # those that have been read: columns of a group share them
         self._file = path.open("rb", buffering=0)
         if os.fstat(self._file.fileno()).st_size != self._size:
             self.close()
             raise _changed(path)
-        self._there: set[int] = set()  # the blocks that have been read: columns of a group share them
-        self.content = np.zeros(self._size, np.uint8).data  # its pages take memory as they are read
 
     def close(self) -> None:
-        """Read no more."""
         self._file.close()
+        super().close()
 
-    def need(self, start: int, end: int) -> None:
-        """Read some bytes, with the blocks that they are in.
+    def readable(self) -> bool:
+        return True
 
-        Raises:
-            DamagedError: they are not those that were written.
-            OSError: they cannot be read at present.
-        """
-        for block in range(max(start, 0) // BLOCK, -(-min(end, self._size) // BLOCK)):
-            if block not in self._there:
-                part = self.content[block * BLOCK : (block + 1) * BLOCK]
-                size = os.preadv(self._file.fileno(), [part], block * BLOCK)
-                digest = self._digests[block * BLOCK_DIGEST_BYTES : (block + 1) * BLOCK_DIGEST_BYTES]
-                if size != len(part) or _digests_of(part) != digest:
-                    raise _changed(self._path)
-                self._there.add(block)
+    def seekable(self) -> bool:
+        return True
 
+    def tell(self) -> int:
+        return self._at
 
-class WholeFile:
-    """A file that has been read and checked: as `Parts`."""
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        self._at = offset + (0 if whence == os.SEEK_SET else self._at if whence == os.SEEK_CUR else self._size)
+        return self._at
 
-    def __init__(self, content: bytes) -> None:
-        self.content = memoryview(content)
+    def read(self, size: int = -1) -> bytes:
+        start = self._at
+        self._at = end = self._size if size < 0 else min(start + size, self._size)
+        if start >= end:
+            return b""
+        first, last = start // BLOCK, (end - 1) // BLOCK
+        content = self._block(first) if first == last else b"".join(map(self._block, range(first, last + 1)))
+        return content[start - first * BLOCK : end - first * BLOCK]
 
-    def need(self, start: int, end: int) -> None:
-        """Nothing is left to read."""
+    def _block(self, number: int) -> bytes:
+        content = self._blocks.get(number)
+        if content is None:
+            content = os.pread(self._file.fileno(), min(BLOCK, self._size - number * BLOCK), number * BLOCK)
+            if _digests_of(content) != self._digests[number * BLOCK_DIGEST_BYTES : (number + 1) * BLOCK_DIGEST_BYTES]:
+                raise _changed(self._path)
+            self._blocks[number] = content
+        return content
 
 
 def is_installed() -> bool:
@@ -140,7 +141,7 @@ class Archive:
         return content
 
     @contextmanager
-    def parts(self, file: str, wrote: Written) -> Iterator[Parts | WholeFile]:
+    def parts(self, file: str, wrote: Written) -> Iterator[io.IOBase]:
         """A file that is read in parts. What is read of it is checked; and all of it, where its blocks have no hashes.
 
         Raises:
@@ -148,9 +149,9 @@ class Archive:
             StorageError: the file cannot be read at present.
         """
         if not self.has_parts or not wrote.blocks:
-            yield WholeFile(self.read(file, wrote))
+            yield io.BytesIO(self.read(file, wrote))
             return
-        with self._reading(file), closing(Parts(self.path / file, wrote)) as parts:
+        with self._reading(file), _Blocks(self.path / file, wrote) as parts:
             yield parts
 
     @contextmanager
@@ -237,7 +238,7 @@ def digest_of(content: bytes) -> str:
     return blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
 
 
-def _digests_of(content: bytes | memoryview) -> bytes:
+def _digests_of(content: bytes) -> bytes:
     """The hashes of the blocks of a file, or of some of them."""
     blocks = (content[start : start + BLOCK] for start in range(0, len(content), BLOCK))
     return b"".join(blake2b(block, digest_size=BLOCK_DIGEST_BYTES).digest() for block in blocks)

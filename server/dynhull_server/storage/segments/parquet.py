@@ -24,14 +24,13 @@ from .gathered import key_codes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from io import IOBase
 
     import numpy.typing as npt
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     from dynhull.keys import Keys
-
-    from .archive import Parts, WholeFile
 
     Rows = npt.NDArray[np.intp]
 
@@ -178,7 +177,7 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
         raise DamagedError(f"{name} is damaged: {error}") from error
 
 
-def keys_from_parquet(parts: Parts | WholeFile, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
+def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
     """The same with the rows of some keys, and of none, alone: no more is read than the groups that have these.
 
     Raises:
@@ -187,36 +186,17 @@ def keys_from_parquet(parts: Parts | WholeFile, name: str, keys: Keys) -> tuple[
     import pyarrow as pa
 
     try:
-        _need_footer(parts)
-        file = _opened(pa.BufferReader(parts.content), name)
+        file = _opened(pa.PythonFile(source, mode="r"), name)
         schema, metadata = file.schema_arrow, file.metadata
         values = sorted(key_list(keys))
         groups = _groups(metadata, schema.names.index("key"), values)
         some = [metadata.row_group(group) for group in groups]
-        for group in some:
-            parts.need(*_bytes_of(group))
         same = _same(some) if some else {}
         table = _rows_of(file.read_row_groups(groups, columns=_unknown(schema.names, same), use_threads=False), values)
         found = schema.metadata
         return _columns(table, same, found), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
-
-
-def _need_footer(parts: Parts | WholeFile) -> None:
-    """Read the end of a file, which says where its groups are: its last eight bytes say how long that is."""
-    size = len(parts.content)
-    parts.need(size - 8, size)
-    length = int.from_bytes(parts.content[size - 8 : size - 4], "little")
-    parts.need(size - 8 - length, size)
-
-
-def _bytes_of(group: pq.RowGroupMetaData) -> tuple[int, int]:
-    """Where the bytes of a group begin and end: its columns lie side by side."""
-    columns = [group.column(place) for place in range(group.num_columns)]
-    starts = [each.dictionary_page_offset if each.has_dictionary_page else each.data_page_offset for each in columns]
-    ends = [start + each.total_compressed_size for start, each in zip(starts, columns, strict=True)]
-    return min(starts), max(ends)
 
 
 def ways_from_parquet(data: bytes, name: str, after: int, until: int) -> Iterator[KeyWays] | None:
