@@ -1,11 +1,13 @@
 // An index for many point locations between two changes of the hull: both chains in flat arrays with a grid in x, and
-// inner boxes that settle most of the points inside.
+// boxes that settle most of the points inside and outside.
 #pragma once
 
 #include <memory>
+#include <span>
 
 #include "../hull_tree.hpp"
 #include "../static/inner_boxes.hpp"
+#include "../static/outer_bounds.hpp"
 #include "queries.hpp"
 
 namespace dynhull {
@@ -17,19 +19,19 @@ class LocateIndex {
   // Whether the number of queries since the hull's last change pays for a refresh. The chains cost about as much as one
   // query for each vertex, the boxes as much as BOXES_PAY queries.
   bool stale(const HullTree& tree, std::uint64_t queries) const {
-    return fresh(tree) ? !inner_boxes_ && queries > BOXES_PAY : queries > vertices_ / 20 + 200;
+    return fresh(tree) ? !boxes_ && queries > BOXES_PAY : queries > vertices_ / 20 + 200;
   }
 
   // O(h log n).
   void refresh(const HullTree& tree, std::uint64_t queries) {
     version_ = STALE;
     usable_ = false;
-    inner_boxes_.reset();
+    boxes_.reset();
     for (Side side : SIDES) chain_[side] = tree.chain(side);
     const std::size_t longest = std::max(chain_[UPPER].size(), chain_[LOWER].size());
     vertices_ = chain_[UPPER].size() + chain_[LOWER].size();
     if (longest > 1 && longest < CELLS_LIMIT) lay_grid(2 * longest + 64);
-    if (queries > BOXES_PAY) inner_boxes_ = std::make_unique<InnerBoxes>(chain_[LOWER], chain_[UPPER]);
+    if (queries > BOXES_PAY) boxes_ = std::make_unique<Boxes>(chain_[LOWER], chain_[UPPER]);
     version_ = tree.version();
   }
 
@@ -58,6 +60,12 @@ class LocateIndex {
     std::uint32_t before[2];
   };
 
+  struct Boxes {
+    Boxes(std::span<const Point> lower, std::span<const Point> upper) : inner(lower, upper), outer(lower, upper) {}
+    InnerBoxes inner;
+    OuterBounds outer;
+  };
+
   void lay_grid(std::size_t cells) {
     least_ = chain_[UPPER].front().x;
     greatest_ = chain_[UPPER].back().x;
@@ -79,19 +87,19 @@ class LocateIndex {
     for (std::size_t i = 0; i < count; ++i) {
       where[i] = 1;
       rest[no_box] = static_cast<std::uint8_t>(i);
-      no_box += !(inner_boxes_ && inner_boxes_->holds(points[i]));
+      no_box += !(boxes_ && boxes_->inner.holds(points[i]));
     }
     std::size_t cells[BLOCK];
     std::uint32_t left[BLOCK][2];
     for (std::size_t k = 0; k < no_box; ++k) {
-      const double x = points[rest[k]].x;
-      const bool beside = usable_ & either(x < least_, greatest_ < x);
-      const bool within = usable_ & (x > least_) & (x < greatest_);
-      where[rest[k]] = static_cast<std::int8_t>(1 - 2 * beside);
-      cells[left_over] = within ? cell(x) : NOWHERE;
+      const Point p = points[rest[k]];
+      const bool out = (usable_ & either(p.x < least_, greatest_ < p.x)) | (boxes_ && boxes_->outer.leave_out(p));
+      const bool within = usable_ & (p.x > least_) & (p.x < greatest_) & !out;
+      where[rest[k]] = static_cast<std::int8_t>(1 - 2 * out);
+      cells[left_over] = within ? cell(p.x) : NOWHERE;
       prefetch(grid_.data() + (within ? cells[left_over] : 0));
       rest[left_over] = rest[k];
-      left_over += !beside;
+      left_over += !out;
     }
     for (std::size_t k = 0; k < left_over; ++k) {
       if (cells[k] == NOWHERE) continue;
@@ -132,7 +140,7 @@ class LocateIndex {
 
   std::vector<Point> chain_[2];
   std::vector<Cell> grid_;
-  std::unique_ptr<const InnerBoxes> inner_boxes_;
+  std::unique_ptr<const Boxes> boxes_;
   double least_ = 0, greatest_ = 0, scale_ = 0;
   std::size_t vertices_ = 0;
   std::uint64_t version_ = STALE;

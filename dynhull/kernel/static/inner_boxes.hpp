@@ -8,6 +8,7 @@
 
 #include "../sort/columns.hpp"
 #include "chain.hpp"
+#include "walk.hpp"
 
 namespace dynhull {
 
@@ -47,7 +48,6 @@ class InnerBoxes {
 
  private:
   static constexpr unsigned COLUMNS = 1024;
-  static constexpr double OVERLAP = 0x1p-6;  // of adjacent columns, as a part of their width, to cover rounding
   static constexpr double MARGIN = 0x1p-20;  // of a box, as a part of its height, to cover rounding
   struct Box {
     double low, high;
@@ -60,14 +60,12 @@ class InnerBoxes {
 
   void lay_boxes(std::span<const Point> lower, std::span<const Point> upper) {
     if (lower.size() + upper.size() < 5) return;
-    const double left = lower.front().x, right = lower.back().x;
-    columns_ = Columns(left, right, COLUMNS);
-    const double width = (right - left) / (COLUMNS - 1);
-    const auto of_column = [&](unsigned column, double x) { return columns_(x) == column; };
+    const Strips strips(lower.front().x, lower.back().x, COLUMNS);
+    columns_ = strips.columns;
     Walk lower_from(lower), lower_to(lower), upper_from(upper), upper_to(upper);
     for (unsigned j = 1; j + 1 < COLUMNS; ++j) {
-      const double from = left + (j - OVERLAP) * width, to = left + (j + 1 + OVERLAP) * width;
-      if (!(left < from && to < right && of_column(j - 1, from) && of_column(j + 1, to))) continue;
+      const auto [from, to, covers] = strips(j);
+      if (!covers) continue;
       lower_from.advance(from);
       lower_to.advance(to);
       upper_from.advance(from);
@@ -82,19 +80,6 @@ class InnerBoxes {
         boxes_[j] = box;
     }
   }
-
-  // The edge of a chain at an increasing x, strictly between the chain's ends.
-  struct Walk {
-    explicit Walk(std::span<const Point> chain) : edge(chain.data()) {}
-    void advance(double x) {
-      while (edge[1].x < x) ++edge;
-    }
-    double height(double x) const {
-      return edge[0].y + (x - edge[0].x) / (edge[1].x - edge[0].x) * (edge[1].y - edge[0].y);
-    }
-    int side(Point p) const { return orientation(edge[0], edge[1], p); }
-    const Point* edge;
-  };
 
   Columns columns_;
   std::array<Box, COLUMNS> boxes_ = no_boxes();
