@@ -54,6 +54,10 @@ def test_what_is_no_area(nowhere: HullClient, area: object, complaint: str) -> N
     [
         ({}, "give either subjects or other_hull"),
         ({"subjects": "a", "other_hull": "b"}, "give either subjects or other_hull"),
+        (
+            {"subjects": "a", "expected": ["k"], "expected_by": "18:00 UTC", "expected_within": 60},
+            "give either expected_by or expected_within, not both",
+        ),
         ({"subjects": "a", "without_self": True}, "without_self is for an area that is a hull"),
         ({"subjects": "a", "boundary": "half"}, "boundary must be one of 'closed', 'open', got 'half'"),
         ({"subjects": "a", "initial": "all"}, "initial must be one of 'snapshot', 'events', 'none', got 'all'"),

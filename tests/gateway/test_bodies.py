@@ -354,6 +354,8 @@ def test_rows_and_batches_have_accuracies(gateway: Gateway, name: str) -> None:
     assert made["by_accuracy"] is True
     refused = gateway.post("/fences", fence | {"name": f"{name}2", "expected": ["a"], "expected_by": "noon"})
     assert (refused.status, refused.json["field"]) == (400, "expected_by")
+    both = gateway.post("/fences", fence | {"name": f"{name}2", "expected_within": 5} | expected)
+    assert (both.status, "expected_by or expected_within" in both.json["detail"]) == (400, True)
 
 
 def test_a_row_of_the_distant_future_is_a_bad_row_without_a_window_too(gateway: Gateway, name: str) -> None:

@@ -556,9 +556,11 @@ class FenceModel:
         """An alarm was acknowledged or muted for a hull: that is kept until it is cleared, or somebody else does."""
         fence = self.alive.get(name)
         known = None if fence is None else fence.known.get(status.hull)
-        if known is None:
+        if fence is None or known is None:
             return
-        same = known.raised and status.raised and known.since == status.since
+        raises = [each for each in fence.events if each.hull == status.hull and each.type is EventType.BEGIN]
+        once = sum(each.event_time == status.since for each in raises) == 1  # else it may have been another raise
+        same = known.raised and status.raised and known.since == status.since and once
         forgotten = same and status.acknowledged != NO_TIME == known.acknowledged
         muted = status.muted != NO_TIME == known.muted and (status.hull, NO_TIME) not in self.asked[name]
         if forgotten or (same and muted):

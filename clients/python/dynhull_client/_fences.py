@@ -255,6 +255,8 @@ def encode_fence(given: dict[str, Any]) -> fence_pb2.FenceConfig:
     subjects, other_hull = given["subjects"], given["other_hull"]
     if (subjects is None) == (other_hull is None):
         raise ValueError("give either subjects or other_hull")
+    if given["expected_by"] is not None and given["expected_within"] is not None:
+        raise ValueError("give either expected_by or expected_within, not both")
     config = fence_pb2.FenceConfig()
     encode_area(as_area(given["area"]), config)
     if given["confirmations"] == 1:  # each report agrees with itself

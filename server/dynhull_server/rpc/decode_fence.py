@@ -172,14 +172,14 @@ def _decode_expected(config: fence_pb2.FenceConfig) -> tuple[Key, ...]:
         raise InvalidFieldError("config.expected", f"{len(found)} keys", f"from 1 to {MOST_EXPECTED} keys")
     if len(set(found)) < len(found):
         row = next(row for row, key in enumerate(found) if key in found[:row])
-        raise InvalidFieldError("config.expected", repr(found[row]), "each key is named once", row)
+        raise InvalidFieldError("config.expected", str(found[row]), "each key is named once", row)
     if config.WhichOneof("expected_deadline") is None:
         raise InvalidFieldError("config.expected", f"{len(found)} keys", "give expected_by or expected_within, too")
     if config.HasField("expected_by"):
         try:
             daily(config.expected_by)
         except ValueError as error:
-            raise InvalidFieldError("config.expected_by", repr(config.expected_by), str(error)) from None
+            raise InvalidFieldError("config.expected_by", config.expected_by, str(error)) from None
     return tuple(found)
 
 

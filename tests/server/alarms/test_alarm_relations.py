@@ -206,6 +206,10 @@ def test_what_is_refused(client: HullClient, name: str) -> None:
     for when, words in [
         (f"near {name}/globe 5", "is a plane"),
         ("vertex a", "points without keys"),
+        (
+            "vertex in polygon(0 0, 1 1, 2 2)",
+            rf"the hull '{name}' is a plane: 'vertex in .*' does not suit it: .* no area",
+        ),
         ("vertex in circle(0, 0, 1)", ""),
     ]:
         if words:

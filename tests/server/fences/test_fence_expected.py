@@ -262,6 +262,8 @@ def test_what_is_refused():
             with pytest.raises(InvalidRequestError) as refused:
                 client.create_fence("fence", Circle(0, 0, 5), "fleet", **settings)
             assert refused.value.metadata["field"] == field, settings
+            if "expected_by" in settings:
+                assert refused.value.metadata["value"] in (settings["expected_by"], "given")
         client.create_hull("other", keyed="str")
         with pytest.raises(InvalidRequestError, match="expected"):
             client.create_fence("fence", "fleet", other_hull="other", expected=["a"], expected_within=1)

@@ -119,8 +119,17 @@ function polygons(area) {
   return [area]
 }
 
+/** Refuse a second one of what excludes each other: the message has room for one, and would drop the others.
+ * @param {any} body @param {string[]} names */
+function atMostOne(body, ...names) {
+  const given = names.filter((name) => body[name] != null)
+  if (given.length > 1) throw invalid(given[1], null, body[given[1]], `give one of ${names.join(", ")}`)
+}
+
 /** @param {any} body */
 export function fenceConfig(body) {
+  atMostOne(body, "subjects", "subject_prefix", "other_hull")
+  atMostOne(body, "expected_by", "expected_within")
   const config = /** @type {any} */ ({
     ...areaOf(body.area),
     ...(body.subjects != null && { subjectHull: body.subjects }),

@@ -292,14 +292,16 @@ def _require_area(hull: Hull, rule: AlarmRule) -> None:
         try:
             require_area(rule.raises.subject, geographic=hull.row.settings.geographic)
         except ValueError as error:
-            raise HullUnsuitableError(
-                hull.name, f"{rule.when!r} does not suit it: {error}", field="rule.when"
-            ) from None
+            reason = f"{_frame(hull)}: {rule.when!r} does not suit it: {error}"
+            raise HullUnsuitableError(hull.name, reason, field="rule.when") from None
+
+
+def _frame(hull: Hull) -> str:
+    return "is geographic" if hull.row.settings.geographic else "is a plane"
 
 
 def _why_unsuited(hull: Hull, rule: AlarmRule, area: Hull | None) -> str:
-    settings = hull.row.settings
-    frame = "is geographic" if settings.geographic else "is a plane"
+    settings, frame = hull.row.settings, _frame(hull)
     if area is not None and area.row.settings.geographic != settings.geographic:
         return f"{frame}, and {area.name!r} is not"
     if rule.raises.measure == "vertex":
