@@ -1,10 +1,13 @@
 """What the TypeScript package has is what the Python SDK and the gateway have, name by name."""
 
 import inspect
+import json
 import re
 from pathlib import Path
 
 import pytest
+from peers import program, typescript
+from run_in import run
 
 import dynhull_client as sdk
 
@@ -40,6 +43,58 @@ LEFT_OUT_OF_COPIES = {
     "wkt": "`vertices.join`",
 }
 ADDED = {"feed_many", "ack_feed_many", "delete_feed_many_consumer"}  # the SDK's feed takes a prefix
+LEFT_OUT_OF_WRITERS = {
+    "uid": "the gateway takes none with a batch: a gap in the numbers says that the hull is another one"
+}
+ADDED_TO_WRITERS = {
+    **dict.fromkeys(("insert", "delete", "move"), "a call each, in place of arguments of `put`"),
+    "applied": "`put` resolves when there is room, and has no future of its batch",
+}
+# Parameters of the Python SDK that have another name, by the method or everywhere.
+RENAMED = {
+    "xy": "points",
+    "time": "when",
+    "for_": "for",
+    "max_rate": "rate",
+    "contents": "outlines",
+    "batch_points": "batchRows",
+    "ack_feed.after": "revision",
+    "distance.xy": "about",
+    "locate.xy": "about",
+    "intersect_lines.p": "origins",
+    "intersect_lines.q": "targets",
+    "layers.k": "count",
+    "set_quarantine.quarantine": "rules",
+    "watch_many.prefix": "which",
+    "watch_many.names": "which",
+}
+# Those that the package does without, and why.
+NO_UID = "the place to go on after, which a stream keeps, has the uid"
+NO_PARAMETER = {
+    "timeout": "`signal`; the client has one for all calls",
+    "prefix": "`feedMany`, `ackFeedMany`, `deleteFeedManyConsumer`",
+    "progress_interval": "the gateway has the one of its `--keepalive`",
+    "resume": "a stream resumes by itself",
+    "follow": "a watch that is broken off after its first event",
+    "directions": "the gateway has no sketches by directions; `maxVertices`",
+    "outline": "events without outlines: `watchMany`",
+    "get_hull.layer": "the gateway has `layers` for it",
+    "list_held.min_revision": "the gateway has none",
+    "watch.min_revision": "`waitForHull` has it",
+    "watch_many.position": "a stream keeps its position",
+    "watch_fence.max_rate": "the gateway has no rate of fences; `conflate`",
+    "watch_fence.uid": NO_UID,
+    "watch_alarm.uid": NO_UID,
+    "feed.uid": NO_UID,
+    "transfer.uids": "the gateway takes none",
+    "writer.uid": LEFT_OUT_OF_WRITERS["uid"],
+    "writer.acknowledged": LEFT_OUT_OF_WRITERS["uid"],
+    "writer.linger": "rows gather while others are under way",
+    "writer.coalesce": "a key that comes again begins a batch",
+    "writer.stop_on_error": "a writer stops at the first refusal",
+    **dict.fromkeys(("put.insert", "put.delete", "put.move"), ADDED_TO_WRITERS["insert"]),
+    **dict.fromkeys(("put.sequence", "remove.sequence"), "a writer counts its batches"),
+}
 TYPES = {
     "AlarmEvent": "AlarmEvent",
     "AlarmStatus": "AlarmStatus",
@@ -95,6 +150,40 @@ def test_copies() -> None:
     theirs = public(sdk.HullCopy)
     assert LEFT_OUT_OF_COPIES.keys() <= theirs
     assert {camel(name) for name in theirs - LEFT_OUT_OF_COPIES.keys()} <= methods("hull-copy.js")
+
+
+def test_writers() -> None:
+    theirs = public(sdk.AsyncWriter)
+    assert methods("writer.js") - ADDED_TO_WRITERS.keys() == theirs - LEFT_OUT_OF_WRITERS.keys()
+    assert ADDED_TO_WRITERS.keys() <= methods("writer.js")
+
+
+def test_methods_have_the_parameters_of_the_python_sdk() -> None:
+    said = run(
+        program("node"),
+        str(Path(__file__).with_name("parameters.mjs")),
+        "tsconfig.json",
+        "Client",
+        "Writer",
+        folder=typescript(),
+    )
+    ours = json.loads(said)
+    missing, known = set(), set()
+    for name, kind in (("Client", sdk.AsyncHullClient), ("Writer", sdk.AsyncWriter)):
+        for method, call in inspect.getmembers(kind, callable):
+            if method.startswith("_") or camel(method) not in ours[name]:
+                continue
+            for parameter in list(inspect.signature(call).parameters)[1:]:
+                places = f"{method}.{parameter}", parameter
+                renamed = next((RENAMED[place] for place in places if place in RENAMED), camel(parameter))
+                if renamed in ours[name][camel(method)]:
+                    known |= {place for place in places if place in RENAMED}
+                elif place := next((place for place in places if place in NO_PARAMETER), None):
+                    known.add(place)
+                else:
+                    missing.add(f"{name}.{method}: {parameter}")
+    assert missing == set()
+    assert known == RENAMED.keys() | NO_PARAMETER.keys(), "what is listed as missing or renamed is not"
 
 
 def documented() -> dict[str, set[str]]:

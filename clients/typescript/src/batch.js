@@ -7,38 +7,74 @@ import { isoTime, micros } from "./json.js"
  * @typedef {import("./exact.js").Point} Point
  * @typedef {string | number | bigint} AnyKey
  * @typedef {bigint | Date | string} Time microseconds since 1970, a Date, or a text in ISO 8601 with its zone
- * @typedef {"put" | "remove" | "insert" | "delete"} Operation
+ * @typedef {"put" | "remove" | "insert" | "delete" | "move"} Operation
  *
- * @typedef {object} Rows checked, of one call
+ * @typedef {object} Columns of one call
+ * @property {readonly AnyKey[]} [keys]
+ * @property {readonly Point[]} [points]
+ * @property {readonly Point[]} [destinations] of moves
+ * @property {readonly Time[]} [times]
+ * @property {readonly Time[]} [expireTimes]
+ * @property {readonly number[]} [accuracies]
+ *
+ * @typedef {object} Conditions what all rows of a batch have in common
+ * @property {"absent" | "present"} [only]
+ * @property {number} [ttl] seconds
+ * @property {"raise" | "count"} [missing]
+ *
+ * @typedef {object} Rows checked
  * @property {Operation} op
  * @property {number} count
- * @property {readonly AnyKey[] | null} keys integers that are exact numbers are numbers
- * @property {readonly Point[] | null} points
- * @property {readonly bigint[] | null} times microseconds since 1970
+ * @property {string} kind only rows of one kind go into one batch
+ * @property {Conditions} conditions
+ * @property {readonly AnyKey[]} keys integers that are exact numbers are numbers
+ * @property {readonly Point[]} points
+ * @property {readonly Point[]} destinations
+ * @property {readonly bigint[]} times microseconds since 1970
+ * @property {readonly bigint[]} expireTimes
+ * @property {readonly number[]} accuracies
  */
 
 const LARGEST = (1n << 64n) - 1n
-/** Of a row without its key: a point, a time, and what frames them. */
-const ROW_BYTES = 32
+/** Of a row without its key: places, times, and what frames them. */
+const ROW_BYTES = 48
 
 /**
  * Rows as they go into batches; a bad value is refused with its field and row.
  * @param {Operation} op
- * @param {{keys?: readonly AnyKey[], points?: readonly Point[], times?: readonly Time[] | undefined}} columns
+ * @param {Columns} columns
+ * @param {Conditions} [conditions]
  * @returns {Rows}
  */
-export function rowsOf(op, { keys, points, times }) {
-  const count = (keys ?? points ?? []).length
-  for (const [name, values] of Object.entries({ points, times })) {
+export function rowsOf(op, columns, conditions = {}) {
+  const { keys = [], points = [], destinations = [], times = [], expireTimes = [], accuracies = [] } = columns
+  const count = (columns.keys ?? points).length
+  for (const [name, values] of Object.entries(columns)) {
     if (values && values.length !== count) throw new RangeError(`${name} has ${values.length} rows for ${count}`)
   }
-  points?.forEach((point, row) => {
+  finites(columns.keys ? "points" : op === "move" ? "move/origins" : op, points)
+  finites("move/destinations", destinations)
+  accuracies.forEach((each, row) => {
+    if (!Number.isFinite(each) || each < 0) throw invalid("accuracies", row, each, "must be a finite number that is not negative")
+  })
+  const checked = keys.map((key, row) => keyOf(op === "remove" ? "remove" : "keys", row, key))
+  const stamps = times.map((time, row) => instantOf("times", row, time))
+  const ends = expireTimes.map((time, row) => instantOf("expire_times", row, time))
+  const named = typeof checked[0] === "string"
+  checked.forEach((key, row) => {
+    if ((typeof key === "string") !== named) throw invalid("keys", row, key, `must be ${named ? "a string" : "an integer"}, as the first one`)
+  })
+  const kind = [op, named, !!columns.times, !!columns.expireTimes, !!columns.accuracies, JSON.stringify(conditions)].join()
+  return { op, count, kind, conditions, keys: checked, points, destinations, times: stamps, expireTimes: ends, accuracies }
+}
+
+/** @param {string} field @param {readonly Point[]} points */
+function finites(field, points) {
+  points.forEach((point, row) => {
     for (const axis of [0, 1]) {
-      if (!Number.isFinite(point?.[axis])) throw invalid(keys ? "points" : op, row, point?.[axis], "must be a finite number")
+      if (!Number.isFinite(point?.[axis])) throw invalid(field, row, point?.[axis], "must be a finite number")
     }
   })
-  const checked = keys ? keys.map((key, row) => keyOf(op === "remove" ? "remove" : "keys", row, key)) : null
-  return { op, count, keys: checked, points: points ?? null, times: times?.map(instantOf) ?? null }
 }
 
 /** @param {string} field @param {number} row @param {AnyKey} key @returns {AnyKey} */
@@ -50,12 +86,12 @@ function keyOf(field, row, key) {
   return key <= Number.MAX_SAFE_INTEGER ? Number(key) : key
 }
 
-/** @param {Time} time @param {number} row @returns {bigint} */
-function instantOf(time, row) {
+/** @param {string} field @param {number} row @param {Time} time @returns {bigint} */
+function instantOf(field, row, time) {
   try {
     return typeof time === "bigint" ? time : micros(isoTime(time))
   } catch {
-    throw invalid("times", row, time, "must be a time with its zone")
+    throw invalid(field, row, time, "must be a time with its zone")
   }
 }
 
@@ -66,24 +102,31 @@ export class Batch {
   size = 0
   /** @type {AnyKey[]} */
   keys = []
-  /** x and y of one point after the other. @type {number[]} */
+  /** x and y of one point after the other, and of one destination. @type {number[]} */
   coordinates = []
+  /** @type {number[]} */
+  destinations = []
   /** @type {bigint[]} */
   times = []
+  /** @type {bigint[]} */
+  expireTimes = []
+  /** @type {number[]} */
+  accuracies = []
   /** Its number, once it takes no more rows. */
   sequence = 0n
   /** How often it was sent. */
   sent = 0
   /** What the server said. @type {import("./client.js").Applied | null} */
   applied = null
+  #kind
   /** @type {Set<AnyKey>} */
   #seen = new Set()
 
-  /** @param {Rows} rows what it begins with: its kind */
-  constructor({ op, keys, times }) {
+  /** @param {Rows} rows what it begins with */
+  constructor({ op, kind, conditions }) {
     this.op = op
-    this.timed = times !== null
-    this.named = keys !== null && typeof keys[0] === "string"
+    this.conditions = conditions
+    this.#kind = kind
   }
 
   /**
@@ -93,22 +136,27 @@ export class Batch {
    * @param {number} most rows of a batch
    * @returns {number} the first row that was not added
    */
-  add({ op, count, keys, points, times }, from, most) {
-    if (op !== this.op || (times !== null) !== this.timed) return from
+  add(rows, from, most) {
+    const { count, kind, keys, points, destinations, times, expireTimes, accuracies } = rows
+    if (kind !== this.#kind) return from
+    const end = Math.min(count, from + most - this.rows)
     let row = from
-    for (; row < count && this.rows < most; row++) {
-      if (keys) {
+    for (; row < end; row++) {
+      if (keys.length) {
         const key = keys[row]
-        if ((typeof key === "string") !== this.named || this.#seen.has(key)) break
+        if (this.#seen.has(key)) break
         this.#seen.add(key)
         this.keys.push(key)
         this.size += typeof key === "string" ? 3 * key.length : 8
       }
-      if (points) this.coordinates.push(points[row][0], points[row][1])
-      if (times) this.times.push(times[row])
-      this.rows++
-      this.size += ROW_BYTES
+      if (points.length) this.coordinates.push(points[row][0], points[row][1])
+      if (destinations.length) this.destinations.push(destinations[row][0], destinations[row][1])
+      if (times.length) this.times.push(times[row])
+      if (expireTimes.length) this.expireTimes.push(expireTimes[row])
+      if (accuracies.length) this.accuracies.push(accuracies[row])
     }
+    this.rows += row - from
+    this.size += (row - from) * ROW_BYTES
     return row
   }
 

@@ -79,10 +79,20 @@ async function round(ask, name, batches, { producer, maySkip, signal }, limit, m
 }
 
 /** @param {Batch} batch */
-function bodyOf({ op, keys, coordinates, times }) {
-  const points = Array.from({ length: coordinates.length / 2 }, (_, row) => [coordinates[2 * row], coordinates[2 * row + 1]])
-  const timed = times.length ? { times: times.map(isoTime) } : {}
-  if (op === "put") return { keys, points, ...timed }
-  if (op === "remove") return { remove: keys, missing: "count" }
-  return { [op]: points, ...timed }
+function bodyOf({ op, conditions, keys, coordinates, destinations, times, expireTimes, accuracies }) {
+  const points = pairs(coordinates)
+  const timed = {
+    ...(times.length && { times: times.map(isoTime) }),
+    ...(expireTimes.length && { expire_times: expireTimes.map(isoTime) }),
+    ...(accuracies.length && { accuracies }),
+  }
+  const body = { ...conditions, ...timed }
+  if (op === "put") return { ...body, keys, points }
+  if (op === "remove") return { ...body, remove: keys }
+  return { ...body, [op]: op === "move" ? { origins: points, destinations: pairs(destinations) } : points }
+}
+
+/** @param {number[]} flat */
+function pairs(flat) {
+  return Array.from({ length: flat.length / 2 }, (_, row) => [flat[2 * row], flat[2 * row + 1]])
 }

@@ -113,7 +113,7 @@ export class Streams extends Reads {
 
   /**
    * The events that a fence would have made between two moments. No fence is created.
-   * @param {import("./client.js").FenceSettings & {start?: Moment, end?: Moment, signal?: AbortSignal | null}} settings
+   * @param {import("./client.js").FenceSettings & {initial?: "snapshot" | "events" | "none", start?: Moment, end?: Moment, signal?: AbortSignal | null}} settings
    * @returns {AsyncGenerator<FenceEvent, void, undefined>}
    */
   async *fenceEventsBetween({ signal = null, start, end, ...settings }) {

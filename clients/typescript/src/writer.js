@@ -18,8 +18,17 @@ import { InFlight } from "./in-flight.js"
  * @property {number} [inFlight] batches that are sent and not acknowledged, at most
  * @property {number} [room] rows that wait before `put` does
  * @property {number} [patience] seconds to try for while nobody answers
+ * @property {"raise" | "count"} [missing] whether a point or key to delete, move or remove that is not there refuses the batch;
+ *   default: a point does, and a key does not
  * @property {boolean} [maySkip] accept that batches are passed over after a restore of the server
  * @property {AbortSignal} [signal] gives up
+ *
+ * @typedef {object} Putting
+ * @property {readonly Time[]} [times] of the positions
+ * @property {"absent" | "present"} [only] puts keys only if they are new, or only if they are there
+ * @property {number} [ttl] seconds after which the keys leave,
+ * @property {readonly Time[]} [expireTimes] or the moments
+ * @property {readonly number[]} [accuracies] how far the positions may be from where the keys really are
  */
 
 /**
@@ -79,10 +88,11 @@ export class Writer {
    * Put keys at positions. Resolves when there is room for more. A bad value throws, and nothing was added.
    * @param {readonly AnyKey[]} keys
    * @param {readonly Point[]} points
-   * @param {readonly Time[]} [times] of the positions
+   * @param {readonly Time[] | Putting} [times] of the positions, or with what else `Client.put` takes
    */
   put(keys, points, times) {
-    return this.#add("put", { keys, points, times })
+    const { only, ttl, ...columns } = isList(times) ? { times } : (times ?? {})
+    return this.#add("put", { keys, points, ...columns }, { ...(only && { only }), ...(ttl !== undefined && { ttl }) })
   }
 
   /**
@@ -90,7 +100,7 @@ export class Writer {
    * @param {readonly AnyKey[]} keys
    */
   remove(keys) {
-    return this.#add("remove", { keys })
+    return this.#add("remove", { keys }, { missing: this.#options.missing ?? "count" })
   }
 
   /**
@@ -107,7 +117,16 @@ export class Writer {
    * @param {readonly Point[]} points
    */
   delete(points) {
-    return this.#add("delete", { points })
+    return this.#add("delete", { points }, this.#missing)
+  }
+
+  /**
+   * Move points of a hull without keys.
+   * @param {readonly Point[]} origins
+   * @param {readonly Point[]} destinations
+   */
+  move(origins, destinations) {
+    return this.#add("move", { points: origins, destinations }, this.#missing)
   }
 
   /** Resolves when everything is acknowledged. Throws what the server has refused; no batch after it was applied. */
@@ -123,10 +142,15 @@ export class Writer {
     this.#failed = new DynhullError({ reason: "CLOSED", detail: "the writer is closed" })
   }
 
-  /** @param {import("./batch.js").Operation} op @param {Parameters<typeof rowsOf>[1]} columns */
-  async #add(op, columns) {
+  get #missing() {
+    const { missing } = this.#options
+    return missing ? { missing } : {}
+  }
+
+  /** @param {import("./batch.js").Operation} op @param {import("./batch.js").Columns} columns @param {import("./batch.js").Conditions} [conditions] */
+  async #add(op, columns, conditions) {
     if (this.#failed) throw this.#failed
-    this.#batches.add(rowsOf(op, columns))
+    this.#batches.add(rowsOf(op, columns, conditions))
     this.#batches.onMore()
     void this.#send()
     const { room, inFlight } = this.#options
@@ -202,4 +226,9 @@ export class Writer {
   #wake() {
     for (const wake of this.#waiters.splice(0)) wake()
   }
+}
+
+/** @param {readonly Time[] | Putting | undefined} given @returns {given is readonly Time[]} */
+function isList(given) {
+  return Array.isArray(given)
 }

@@ -2,7 +2,8 @@
 
 import { DynhullError } from "../errors.js"
 import { appliedOf } from "./answers.js"
-import { packKeys, packTimes } from "./values.js"
+import { conditionOf } from "./requests.js"
+import { duration, packKeys, packTimes } from "./values.js"
 
 /** The size up to which batches share a message: beyond that, the cost of a message does not count. */
 const MESSAGE_BYTES = 2 ** 16
@@ -90,12 +91,21 @@ function acknowledge(batches, producer, sequence, applied) {
 }
 
 /** @param {import("../batch.js").Batch} batch */
-function messageOf({ op, keys, coordinates, times }) {
+function messageOf({ op, conditions, keys, coordinates, destinations, times, expireTimes, accuracies }) {
   const stamps = times.length ? packTimes("times", times) : null
-  if (op === "remove") return { removes: packKeys("remove", keys) }
+  const { missing } = conditions
+  if (op === "remove") return { removes: packKeys("remove", keys), ...(missing === "raise" && { missingKeys: "MISSING_KEY_POLICY_REFUSE" }) }
   const points = { packed: packed(coordinates) }
-  if (op === "put") return { puts: { keys: packKeys("keys", keys), points, times: stamps } }
-  return op === "insert" ? { inserts: points, insertTimes: stamps } : { deletes: points }
+  if (op === "put") {
+    const errors = accuracies.length ? { values: accuracies } : null
+    const ends = expireTimes.length ? packTimes("expire_times", expireTimes) : null
+    const rules = { condition: conditionOf(conditions.only), ttl: duration(conditions.ttl, "ttl") }
+    return { puts: { keys: packKeys("keys", keys), points, times: stamps, expireTimes: ends, accuracies: errors, ...rules } }
+  }
+  if (op === "insert") return { inserts: points, insertTimes: stamps }
+  const counted = missing === "count" ? { missingPoints: "MISSING_POINT_POLICY_COUNT" } : {}
+  if (op === "delete") return { deletes: points, ...counted }
+  return { moves: { origins: points, destinations: { packed: packed(destinations) } }, ...counted }
 }
 
 /** @param {number[]} numbers */

@@ -62,6 +62,11 @@ export function hullConfig(body) {
   }
 }
 
+/** @param {any} only */
+export function conditionOf(only) {
+  return choice("only", only, { absent: "PUT_CONDITION_IF_ABSENT", present: "PUT_CONDITION_IF_PRESENT" })
+}
+
 /** @param {any} body */
 export function batch(body) {
   const { insert, keys, missing } = body
@@ -78,7 +83,7 @@ export function batch(body) {
       keys: packKeys("keys", keys),
       points: packPoints("points", body.points ?? []),
       times,
-      condition: choice("only", body.only, { absent: "PUT_CONDITION_IF_ABSENT", present: "PUT_CONDITION_IF_PRESENT" }),
+      condition: conditionOf(body.only),
       ttl: duration(body.ttl, "ttl"),
       expireTimes: packTimes("expire_times", body.expire_times),
       accuracies: packNumbers("accuracies", body.accuracies),
