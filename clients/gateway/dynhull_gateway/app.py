@@ -35,6 +35,7 @@ from .problems import RESPONSES
 from .read_only import ReadOnly
 from .settings import Settings
 from .short_way import ShortWay
+from .waits import WaitsForCallers
 
 DESCRIPTION = """Exact convex hulls of points that are inserted, moved and deleted.
 
@@ -88,6 +89,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.router.routes.extend(described)
     app.state.routes = [*pages, *described, *(route for router in routers for route in router.routes)]
     handlers.install(app)
+    app.add_middleware(WaitsForCallers)
     app.add_middleware(ShortWay, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
     if settings.origins:

@@ -73,6 +73,16 @@ def body_of(request: Request) -> Any:
         return None
 
 
+def again(message: Event, receive: Receive) -> Receive:
+    """Receives a message once more, and then what follows."""
+    first = [message]
+
+    async def received() -> Event:
+        return first.pop() if first else await receive()
+
+    return received
+
+
 class JsonRoute(APIRoute):
     """A route that takes its body, if it has one, as JSON and as nothing else; its JSON ends with a newline."""
 

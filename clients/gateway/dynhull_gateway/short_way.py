@@ -16,7 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dynhull_client import DynhullError
 
-from .bodies import JSON, read_json
+from .bodies import JSON, again, read_json
 from .callers import client_of, token_of
 from .figures import SHORT
 from .gathering import Gatherer
@@ -65,7 +65,7 @@ class ShortWay:
             message = await receive()
             content = _content(message, work)
             if content is None:
-                await self._app(scope, _again(message, receive), send)
+                await self._app(scope, again(message, receive), send)
                 return
             scope[SHORT] = work.route
             request = Request(scope)
@@ -101,13 +101,3 @@ def _content(message: Message, work: _Work) -> Any:
         return work.read(message["body"])
     except (ValidationError, FieldError):
         return None
-
-
-def _again(message: Message, receive: Receive) -> Receive:
-    """Receives a message once more, and then what follows."""
-    first = [message]
-
-    async def again() -> Message:
-        return first.pop() if first else await receive()
-
-    return again
