@@ -1,7 +1,6 @@
 """Where settings come from: flags, the environment and a file.
 
-Apart from the settings themselves: help and shell completion need only their names and descriptions, and do without
-pydantic-settings.
+Flags take precedence over the environment, and the environment over the file.
 """
 
 import logging
@@ -14,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
-from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
 
 from .settings import PREFIX, RENAMED, Settings
 
@@ -36,31 +34,22 @@ def load(flags: Mapping[str, Any], file: Path | None) -> Settings:
     """The settings from flags, environment and file, or raise SettingsError."""
     _refuse_ignored(flags)
     in_file = with_present_names(read_file(file))
-    renamed = {RENAMED[old]: os.environ[variable] for old, variable in old_variables().items()}
-    ignored = set(service_links())
-
-    class Sources(Settings, BaseSettings):
-        model_config = SettingsConfigDict(env_prefix=PREFIX, enable_decoding=False)
-
-        @classmethod
-        def settings_customise_sources(
-            cls, settings_cls: type[BaseSettings], *sources: Any, **more: Any
-        ) -> tuple[PydanticBaseSettingsSource, ...]:
-            """Flags take precedence over the environment, and the environment over the file."""
-            named = dict(zip(("init_settings", "env_settings"), sources, strict=False)) | more
-
-            def environment() -> dict[str, Any]:
-                found = renamed | named["env_settings"]()
-                return {name: value for name, value in found.items() if name not in ignored}
-
-            return named["init_settings"], environment, InitSettingsSource(settings_cls, in_file)  # type: ignore[return-value]
-
+    in_environment = from_environment()
     try:
-        return Sources(**with_present_names(flags))
+        return Settings.model_validate(in_file | in_environment | with_present_names(flags))
     except ValidationError as error:
         sources = origins(flags, file)
         lines = [_explained(each, sources, file) for each in error.errors()]
         raise SettingsError("\n".join(lines)) from None
+
+
+def from_environment() -> dict[str, str]:
+    """The settings that the environment has, under present or former names of variables in any case."""
+    given = {name.upper(): value for name, value in os.environ.items()}
+    renamed = {RENAMED[old]: os.environ[variable] for old, variable in old_variables().items()}
+    named = {name: given[each] for name in Settings.model_fields if (each := f"{PREFIX}{name.upper()}") in given}
+    ignored = service_links()
+    return {name: value for name, value in (renamed | named).items() if name not in ignored}
 
 
 def origins(flags: Mapping[str, Any], file: Path | None) -> dict[str, str]:
