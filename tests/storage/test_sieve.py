@@ -179,3 +179,29 @@ def test_what_is_too_small_or_too_far_away_has_no_cells():
     areas.append(PolygonArea(((ring(*(square * 1e-3 + 1e12)),),)))
     for area in areas:
         assert cells_of(FenceConfig(area, "hull", "hull")) is None
+
+
+@pytest.mark.parametrize("name", sorted(AREAS))
+@pytest.mark.parametrize("margin", [0.0, 0.3])
+def test_what_is_in_a_box_that_stays_on_a_side_is_on_that_side(name, margin):
+    cells = cells_of(FenceConfig(AREAS[name], "hull", "hull", margin=margin))
+    random = np.random.default_rng(17)
+    count, many = 20_000, 8
+    middles = random.uniform(-7, 7, (count, 1, 2))
+    points = middles + random.uniform(-1, 1, (count, many, 2)) * 10.0 ** random.uniform(-5, -1, (count, 1, 1))
+    points[::50, 0] = np.nan
+    x, y = points[..., 0], points[..., 1]
+    boxes = [(each.min(axis=1), each.max(axis=1)) for each in (x, y)]
+    sides = cells.sides(x.ravel(), y.ravel()).reshape(count, many)
+    alike = (sides == sides[:, :1]).all(axis=1) & (sides[:, 0] != NEAR) & (sides[:, 0] != GONE)
+    stays = cells.stays(*boxes, crosses=False)
+    assert not (stays & ~alike).any()
+    assert {OUT, IN} <= set(sides[stays, 0].tolist()) or name == "thin"
+    assert stays.sum() > 0.7 * alike.sum()
+    through = cells.stays(*boxes, crosses=True)
+    assert not (through & ~stays).any()
+    passes = cells.passes(x.ravel(), y.ravel())
+    outside = through & (sides[:, 0] == OUT)
+    for step in range(many - 1):
+        assert not passes[step::many][:count][outside].any()
+    assert outside.sum() > 0.5 * (alike & (sides[:, 0] == OUT)).sum()

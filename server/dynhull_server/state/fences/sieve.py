@@ -151,42 +151,71 @@ class _Sifting:
     def sifted(self, part: KeyWays) -> _SiftedPart:
         """The rows of a part that may mean something: each key has the place before it in front of its rows."""
         names = key_list(part.keys)
-        count = len(names)
         lengths = np.diff(part.starts, append=len(part))
-        own = np.repeat(np.arange(count), lengths + 1)  # whose row it is
-        heads = part.starts + np.arange(count)
-        rows = np.ones(len(own), np.bool_)
-        rows[heads] = False
         standing = self.hull.positions(part.keys)
-        goes_on = count > 0 and names[0] == self._last
+        goes_on = len(names) > 0 and names[0] == self._last
         if goes_on:
             standing[0] = self._place
+        if self.sieve.waits:
+            self.all.append(part.all_stamps())
+        loud = np.flatnonzero(~self._quiet(part, standing, names, goes_on=goes_on))
+        found = self._of_loud(part, standing, names, lengths, loud, goes_on=goes_on)
+        if names:
+            ends = part.starts + lengths - 1
+            found.names, found.lasts = names, np.column_stack([part.x[ends], part.y[ends]])
+            self._last, self._place = names[-1], found.lasts[-1]
+        return found
+
+    def _quiet(self, part: KeyWays, standing: Points, names: list[Key], *, goes_on: bool) -> Flags:
+        """Keys of which no row can mean anything: they stay where all is on one side, and the fence does not wait."""
+        if not names:
+            return np.empty(0, np.bool_)
+        boxes = [
+            (
+                np.minimum(np.minimum.reduceat(values, part.starts), at),
+                np.maximum(np.maximum.reduceat(values, part.starts), at),
+            )
+            for values, at in zip((part.x, part.y), standing.T, strict=True)
+        ]
+        quiet = self.sieve.cells.stays(*boxes, crosses=self.sieve.crosses)
+        if self.sieve.waits:
+            quiet &= np.array([name not in self.waiting for name in names], np.bool_)
+            quiet[0] &= not (goes_on and self._tells)
+        return quiet
+
+    def _of_loud(
+        self, part: KeyWays, standing: Points, names: list[Key], lengths: Rows, loud: Rows, *, goes_on: bool
+    ) -> _SiftedPart:
+        """The rows of some keys that may mean something."""
+        some, lengths_of_all = [names[each] for each in loud.tolist()], lengths
+        lengths = lengths_of_all[loud]
+        count = len(some)
+        own = np.repeat(np.arange(count), lengths + 1)  # whose row it is
+        heads = np.cumsum(lengths + 1) - lengths - 1
+        rows = np.ones(len(own), np.bool_)
+        rows[heads] = False
+        at = np.arange(len(own)) - np.repeat(heads + 1 - part.starts[loud], lengths + 1)  # its place in the part
         x, y = np.empty(len(own)), np.empty(len(own))
         for place, (column, values) in enumerate(((x, part.x), (y, part.y))):
-            column[rows], column[heads] = values, standing[:, place]
-        tells = self._telling(x, y, rows, names, own, heads, goes_on=goes_on)
+            column[rows], column[heads] = values[at[rows]], standing[loud, place]
+        goes_on = goes_on and count > 0 and loud[0] == 0
+        tells = self._telling(x, y, rows, some, own, heads, goes_on=goes_on)
         untold = rows & ~tells
         if goes_on:
             untold[0] = not self._told
         chosen = np.flatnonzero(tells)
-        ends = heads + lengths
-        stamps = NO_STAMPS
-        if len(chosen):
-            stamps = part.stamps()[chosen - own[chosen] - 1]
-        if self.sieve.waits:
-            self.all.append(part.all_stamps())
-        lasts = np.column_stack([x[ends], y[ends]])
-        if count:
-            self._last, self._place, self._told = names[-1], lasts[-1], bool(tells[-1])
-        whose = own[chosen].tolist()
+        if names:
+            is_last = count > 0 and int(loud[-1]) == len(names) - 1
+            self._told = is_last and bool(tells[-1])
+            self._tells = is_last and self._tells
         return _SiftedPart(
-            [names[each] for each in whose],
+            [some[each] for each in own[chosen].tolist()],
             np.column_stack([x[chosen], y[chosen]]),
             np.column_stack([x[chosen - 1], y[chosen - 1]]),
             untold[chosen - 1],
-            stamps,
-            names,
-            lasts,
+            part.stamps()[at[chosen]] if len(chosen) else NO_STAMPS,
+            [],
+            np.empty((0, 2)),
         )
 
     def _telling(

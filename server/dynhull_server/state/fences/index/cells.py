@@ -19,6 +19,7 @@ from .globe import rings_of
 from .subjects import lay
 
 Sides = npt.NDArray[np.int8]
+Coordinates = npt.NDArray[np.float64]
 OUT, IN, NEAR, GONE = range(4)
 
 CELLS, BORDER = 1024, 4  # of each axis; those on each side of it that are away from the area
@@ -59,6 +60,26 @@ class Cells:
         if len(there):
             found[there] = self._exact(np.column_stack([x[there], y[there]]))
         found[np.isnan(x)] = GONE
+        return found
+
+    def stays(
+        self, x: tuple[Coordinates, Coordinates], y: tuple[Coordinates, Coordinates], *, crosses: bool
+    ) -> npt.NDArray[np.bool_]:
+        """Of boxes, given their least and greatest coordinates, whether all points of each are on the same side.
+
+        Where subjects that pass through the area matter, not even the ways between these may meet it.
+        """
+        low, high = self._places(x[0], y[0]), self._places(x[1], y[1])
+        found = ~np.isnan(x[0] + y[0])
+        for first, last in zip(low, high, strict=True):
+            found &= last - first <= BESIDE  # so that all of its cells are those of its corners
+        cells = [rows * CELLS + columns for columns in (low[0], high[0]) for rows in (low[1], high[1])]
+        side = self._sides.take(cells[0])
+        found &= side != NEAR
+        for cell in cells:
+            found &= self._sides.take(cell) == side
+            if crosses:
+                found &= (side == IN) | self._clear.take(cell)
         return found
 
     def passes(self, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
