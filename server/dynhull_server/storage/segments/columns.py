@@ -345,10 +345,13 @@ class Batches:
 
     def __init__(self, columns: SegmentColumns) -> None:
         self.columns = columns
-        self.starts = np.append(np.flatnonzero(np.diff(columns.revision, prepend=NO_TIME)), len(columns))
-        self._revisions = columns.revision[self.starts[:-1]]
+        revision = columns.revision
+        begins = np.flatnonzero(revision[1:] != revision[:-1]) + 1
+        self.starts = np.concatenate([[0], begins, [len(columns)]] if len(columns) else [[0]])
+        self._revisions = revision[self.starts[:-1]]
         self._committed = columns.committed[self.starts[:-1]]
-        self._keys_before = np.concatenate([[0], np.cumsum(columns.keyed)])
+        # The number of keys before each row; None where every row has one.
+        self._keys_before = None if columns.keyed.all() else np.concatenate([[0], np.cumsum(columns.keyed)])
 
     def between(self, after: int, until: int) -> Iterator[Record]:
         """The batches after one revision up to another one."""
@@ -379,7 +382,10 @@ class Batches:
 
     def keys(self, start: int, end: int) -> Keys:
         """The keys of some rows."""
-        return self.columns.keys[int(self._keys_before[start]) : int(self._keys_before[end])]
+        before = self._keys_before
+        if before is None:
+            return self.columns.keys[start:end]
+        return self.columns.keys[int(before[start]) : int(before[end])]
 
     def _record(self, start: int, end: int) -> Record:
         """The record in some rows, which are all that it has."""

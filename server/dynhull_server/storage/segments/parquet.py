@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -359,10 +360,11 @@ def _all(file: pq.ParquetFile) -> SegmentColumns:
     import pyarrow as pa
 
     identity: Any = file.schema_arrow.metadata[b"dynhull.identity"].decode()
-    revision, counts, belongs, place = _heads(file.read(columns=["revision", "row"]))
+    heads = _heads(file)
+    belongs = heads.belongs
     count, at = len(belongs), 0
     same = _same([file.metadata.row_group(group) for group in range(file.num_row_groups)]) if count else {}
-    arrays: dict[str, npt.NDArray[Any]] = {"place": place, **_of_revisions(file, same, revision, counts)}
+    arrays: dict[str, npt.NDArray[Any]] = {"place": heads.place, **_of_revisions(file, same, heads)}
     for name, words_of in CONSTANT.items():
         if name in same:
             arrays[name] = np.broadcast_to(_code(same[name], name, words_of), count)
@@ -371,7 +373,7 @@ def _all(file: pq.ParquetFile) -> SegmentColumns:
     detail: list[str | None] = [None] * count
     codes, words, number = np.full(count, NONE, np.int32), list[pa.Array](), 0
     for group in range(file.num_row_groups):
-        table = file.read_row_group(group, columns=columns)
+        table = file.read_row_group(group, columns=columns, use_threads=False)
         rows = belongs[at : at + len(table)]
         at += len(table)
         for name, values in _arrays(table).items():
@@ -404,49 +406,71 @@ def _items(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return values if values.ndim == 1 else np.ascontiguousarray(values).view(np.complex128)[:, 0]
 
 
-def _of_revisions(
-    file: pq.ParquetFile, same: dict[str, str | None], revision: Integers, counts: Integers
-) -> dict[str, Integers]:
+def _of_revisions(file: pq.ParquetFile, same: dict[str, str | None], heads: _Heads) -> dict[str, Integers]:
     """What all rows of a revision have in common, and the revision itself: no more is read than each of them once."""
-    numbers = np.arange(len(counts)) + (revision.min() if len(revision) else 0)
+    counts = heads.counts
+    numbers = np.arange(len(counts))
+    since = np.repeat(numbers.astype(np.int32), counts)
     found = {name: np.full(len(counts), NO_TIME, np.int64) for name in OF_REVISION if name not in same}
     seen, group, at = np.zeros(len(counts), np.bool_), 0, 0
     while found and group < file.num_row_groups and not seen.all():
         table = file.read_row_group(group, columns=list(found))
-        which = revision[at : at + len(table)] - numbers[0]
+        which = since[heads.belongs[at : at + len(table)]]
         for name, values in found.items():
             values[which] = _integers(table, name, NO_TIME)
         seen[which] = True
         group, at = group + 1, at + len(table)
-    arrays = {name: np.repeat(values, counts) for name, values in {"revision": numbers, **found}.items()}
-    return {name: _constant(NO_TIME, len(revision)) for name in OF_REVISION} | arrays
+    arrays = {name: np.repeat(values, counts) for name, values in {"revision": heads.first + numbers, **found}.items()}
+    return {name: _constant(NO_TIME, len(heads.place)) for name in OF_REVISION} | arrays
 
 
-def _heads(table: pa.Table) -> tuple[Integers, Integers, Rows, Integers]:
+class _Heads(NamedTuple):
     """Where rows belong, which say that themselves.
 
-    Returns the revision of each row, the number of rows of each revision, and the place of each row among all; and of
-    the rows in this order the place in their revision. ValueError if a row is missing.
+    Attributes:
+        first: the first revision.
+        counts: the number of rows of each revision from that on.
+        belongs: the place of each row among all.
+        place: of the rows in this order the place in their revision.
     """
-    count = len(table)
-    revision, place = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
-    if not count:
-        return revision, revision, place, place
-    first, last = int(revision.min()), int(revision.max())
-    if last - first >= count or int(place.min()) < 0:
+
+    first: int
+    counts: Integers
+    belongs: npt.NDArray[np.int32]
+    place: Integers
+
+
+def _heads(file: pq.ParquetFile) -> _Heads:
+    """Where the rows of a file belong. ValueError if one is missing."""
+    count, sizes = file.metadata.num_rows, [0]
+    belongs, rows = np.empty(count, np.int32), np.empty(count, np.int32)
+    first = 0
+    for group in range(file.num_row_groups if count else 0):
+        table = file.read_row_group(group, columns=["revision", "row"], use_threads=False)
+        revision, row = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
+        start, end = sizes[-1], sizes[-1] + len(table)
+        first = first if start else int(revision[0])
+        since = revision - first
+        if np.abs(since).max() >= count or row.min() < 0 or row.max() >= count:
+            raise ValueError("a row is missing")
+        belongs[start:end], rows[start:end] = since, row
+        sizes.append(end)
+    least = int(belongs.min(initial=0))
+    belongs -= least
+    parts = [slice(*ends) for ends in pairwise(sizes)]
+    counts = np.zeros(int(belongs.max(initial=-1)) + 1, np.int64)
+    for part in parts:
+        counts += np.bincount(belongs[part], minlength=len(counts))
+    starts, place = np.cumsum(counts) - counts, np.full(count, NONE, np.int64)
+    for part in parts:
+        there = starts[belongs[part]]
+        there += rows[part]
+        if there.max() >= count:
+            raise ValueError("a row is missing")
+        belongs[part], place[there] = there, rows[part]
+    if not (place != NONE).all():
         raise ValueError("a row is missing")
-    since = revision - first
-    counts = np.bincount(since)
-    starts = np.cumsum(counts) - counts
-    belongs = starts[since]
-    belongs += place
-    there = np.zeros(count, np.bool_)
-    if int(belongs.max()) >= count:
-        raise ValueError("a row is missing")
-    there[belongs] = True
-    if not there.all():
-        raise ValueError("a row is missing")
-    return revision, counts, belongs, np.arange(count) - np.repeat(starts, counts)
+    return _Heads(first + least, counts, belongs, place)
 
 
 def _rows_of(table: pa.Table, values: list[Any]) -> pa.Table:
