@@ -6,8 +6,9 @@ way every time. `play` takes a plan through its lives on one storage (`store`), 
 
 There are five layers. `core_life` drives the core alone, and is several times faster than `shell_life`, which runs the
 real engine on a simulated `machine`, either over a storage in memory or over SQLite (`sqlite_store`). `cluster_life`
-has several servers, each with a core, that own the hulls of a simulated database one after the other. `link_life` has
-the engine behind the link of a gateway, on a simulated `network`.
+has several servers, each with a core, that own the hulls of a simulated database one after the other, perhaps with the
+past of these in a store that they share (`cluster_past`). `link_life` has the engine behind the link of a gateway, on a
+simulated `network`.
 
 What is found is made small by `shrink`, kept in findings/, and replayed by every `make test`. `mutate` tests the test.
 """

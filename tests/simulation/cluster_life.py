@@ -30,11 +30,14 @@ from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NotCommittedError, Progress, StorageError, StoredContents, TakenOverError
 
 from .clients import Client, probe, probe_fence
+from .cluster_past import Filer, SharedPast, SharedRows, read_past
 from .cluster_plan import Operation, Plan
 from .core_life import EPOCH, MOMENT, ClientActor, Condition, CoreServer, StoppedClock, Wait, compare
 from .hidden import Entry, Place, Proc, System
 from .machine import SimulatedThreads
 from .model import Model
+from .past_archive import simulated_reading
+from .past_plan import small_segments
 from .postgres import Postgres, Session
 from .schedule import Schedule
 from .store import FaultyStorage
@@ -51,10 +54,19 @@ NUMBERS = range(10, 100)
 class Site:
     """A database, what is on it, and the gateway and the servers that know its address."""
 
-    def __init__(self, name: str, database: Postgres, store: FaultyStorage, model: Model, commits: int = 0) -> None:
+    def __init__(
+        self,
+        name: str,
+        database: Postgres,
+        store: FaultyStorage,
+        model: Model,
+        commits: int = 0,
+        past: SharedPast | None = None,
+    ) -> None:
         self.name = name
         self.database = database
         self.store = store
+        self.past = past
         self.model = model
         self.commits = commits
         self.addresses = Addresses(SECRET, None, 1.0)
@@ -77,7 +89,8 @@ class Site:
         model = copy.deepcopy(self.model)
         model.new_life()
         model.faulty = True
-        return Site(name, self.database.copied(), _store(other, model), model, self.commits)
+        past = None if self.past is None else self.past.copied()
+        return Site(name, self.database.copied(), _store(other, model), model, self.commits, past)
 
     def look(self) -> None:
         """The gateway follows the owners."""
@@ -97,17 +110,24 @@ class OwnedStorage:
 
     def __init__(self, process: "Process") -> None:
         self._process, self._site = process, process.site
+        self._store = self._site.store
+        self._rows: SharedRows | None = None
+        if self._site.past is not None:
+            self._store = self._site.past.of_owner(process, self._site.model)
+            rows = self._store._inner
+            assert isinstance(rows, SharedRows)
+            self._rows = rows
         self._session: Session | None = None
         self._commits = 0
         self.epoch = process.ownership.epoch
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._site.store, name)
+        return getattr(self._store, name)
 
     def open(self, progress: Progress) -> StoredContents:
         """Take up everything."""
         self._commits = self._site.commits
-        return self._site.store.open(progress)
+        return self._store.open(progress)
 
     def commit(self, changes: Sequence[Any], now: int = 0) -> CommitStamp:
         """Keep the changes, unless another server owns them, or the connection is lost before."""
@@ -120,11 +140,13 @@ class OwnedStorage:
         self._process.give_way()
         if session.open:
             self._site.begins(self._process)
-            commit = self._site.store.commit(changes, now)
+            commit = self._store.commit(changes, now)
             self._site.commits += 1
             self._site.database.carry_out(session, "COMMIT", [])
         self._process.give_way()
         if not session.open:
+            if self._rows is not None:
+                self._rows.doubt()
             raise StorageError("the connection is lost while a commit is under way, as planned")
         self._commits += 1
         return commit
@@ -133,6 +155,8 @@ class OwnedStorage:
         """Decide what was left undecided: connect again, and look."""
         session = self._begun(own=None)
         self._commits = self._site.commits
+        if self._rows is not None:
+            self._rows.settle()
         session.execute("COMMIT")
 
     def _begun(self, own: int | None = -1) -> Session:
@@ -158,18 +182,23 @@ class Process:
     Attributes:
         alive: whether it has not ended.
         stopped: whether it stands still, as after SIGSTOP.
+        dark: whether it cannot reach the database.
         leaves: whether it has begun to end as planned.
         core: its hulls, once it serves them.
+        storage: where they are kept.
+        reads: its threads that read the past.
         port: where it listens.
     """
 
     def __init__(self, world: "World", site: Site, worker: str, entry: Entry) -> None:
         self.world, self.site, self.worker, self.entry = world, site, worker, entry
-        self.alive, self.stopped, self.leaves = True, False, False
+        self.alive, self.stopped, self.leaves, self.dark = True, False, False, False
         self.core: CoreServer | None = None
+        self.storage: Any = None
         self.port = 0
         self._doomed = False
         self._threads = SimulatedThreads(site.model, self)  # type: ignore[arg-type]  # it is the schedule, too
+        self.reads: Any = self._threads.pool("reads", 2) if site.past is not None else None
         self.proof = proof_of(PARTITION, worker, SECRET)
         world.current = self
         database: Any = SimpleNamespace(connect=self.connect, end_silent=lambda _: None)
@@ -215,7 +244,17 @@ class Process:
         self._threads.wait(lambda: condition() or self.world.now >= until)
         return bool(condition())
 
+    def waits(self, condition: Callable[[], object]) -> None:
+        """Wait until a condition holds."""
+        self._threads.wait(condition)
+
+    def require_light(self) -> None:
+        """Raise StorageError where the database cannot be reached."""
+        if self.dark:
+            raise StorageError("the database cannot be reached, as planned")
+
     def connect(self, name: str) -> Session:
+        self.require_light()
         return self.site.database.connect(self.wait, name, self)
 
     # Its life
@@ -228,12 +267,14 @@ class Process:
                 break
             except StorageError:  # as long as another server renews its lease, too
                 self.wait(lambda: False, LOOK)
-        storage: Any = OwnedStorage(self)
+        self.storage = storage = OwnedStorage(self)
         clock = WorldClock(self.world, self.random.uniform(0, 10))
         self.core = CoreServer(self.world.limits, storage, self.site.model, self, self._threads, clock)  # type: ignore[arg-type]
         if self.world.alarmed:
             self.core.look()
             self.actor("clock", self.core.is_behind, self.core.look)
+        if self.site.past is not None:
+            self.spawn("history", Filer(self, storage).run)
         self.port = self.world.listen(self)
         while True:
             try:
@@ -312,8 +353,13 @@ class Gateway:
         return process.core.fence(name)
 
     async def special(self, _: Client, op: Operation) -> None:
-        """Time passes, for everybody."""
-        self._world.now += op["seconds"]
+        """Time passes, for everybody; or the past of a hull is read."""
+        if op["do"] != "past":
+            self._world.now += op["seconds"]
+            return
+        process = self._owner()
+        if process is not None and process.runs and process.core is not None and process.ownership.holds():
+            await read_past(process, self._site.model, op["name"])
 
     def __getattr__(self, name: str) -> Any:
         async def call(*arguments: Any, **named: Any) -> Any:
@@ -394,7 +440,8 @@ class World:
         schedule.actor("fates", lambda: self._fates and not self.calm, self._fate)
         model.new_life()
         model.faulty = True
-        self._add(Site("north", Postgres(), _store(MemoryStorage(), model), model), plan["clients"])
+        past = SharedPast(plan["faults"]) if "faults" in plan else None
+        self._add(Site("north", Postgres(), _store(MemoryStorage(), model), model, past=past), plan["clients"])
 
     def _add(self, site: Site, clients: list[list[Operation]]) -> None:
         """A site with its gateway and its clients."""
@@ -453,6 +500,11 @@ class World:
                     process.stopped = True
                 case "go on":
                     process.stopped = False
+                case "dark":
+                    process.dark = True
+                    process.site.database.end_all_of(process)
+                case "light":
+                    process.dark = False
                 case "cut":
                     process.site.database.end_all_of(process)
                 case "leave" if process.runs:
@@ -480,6 +532,9 @@ class World:
             finally:
                 for process in self.processes:
                     process.end()
+                for site in self.sites:
+                    if site.past is not None:
+                        site.past.remove()
 
     def _live(self) -> None:
         for _ in range(2):
@@ -491,7 +546,10 @@ class World:
         """Once nothing fails any more, all are answered, and each site has one owner, which has what is kept."""
         self.calm = True
         for process in self.processes:
-            process.stopped = False
+            process.stopped = process.dark = False
+        for site in self.sites:
+            if site.past is not None:
+                site.past.calm = True
         for number in range(len(self.sites)):
             self._start(number)
         for actor in self._clients:
@@ -505,6 +563,8 @@ class World:
                 self._probe_fence(site, name)
             if self.alarmed:
                 self._pass_alarms(site)
+            if site.past is not None:
+                self._look_at_past(site, site.past)
             compare(self._settled(site).core.core, site.model)
 
     def _pass_alarms(self, site: Site) -> None:
@@ -514,6 +574,13 @@ class World:
         self._until(lambda: not core.is_behind(), "the clock")
         if late := site.model.fences.overdue(self._settled(site).core.time() - TICK):
             raise site.model.finds(f"{late} should have been raised by time")
+
+    def _look_at_past(self, site: Site, past: SharedPast) -> None:
+        """All of the past is there, and the store has nothing else."""
+        rows = self._settled(site).storage._rows
+        self._until(lambda: past.needs_all(rows), "what is to be filed")
+        for name in sorted(site.model.alive):
+            self._finish(read_past(self._settled(site), site.model, name))
 
     def _settled(self, site: Site) -> Process:
         """Who serves a site, and has nothing left to do, once those that leave have ended."""
@@ -575,6 +642,8 @@ class World:
         def proc() -> Any:
             return Proc(self._acting.entry)
 
+        stack.enter_context(small_segments(self._plan.get("segment_rows")))
+        stack.enter_context(simulated_reading(lambda: self._acting._threads))
         clock = SimpleNamespace(
             CLOCK_BOOTTIME=0,
             clock_gettime=lambda _: self.now,

@@ -4,8 +4,8 @@
      "copied": [[operation, ...], ...], "fates": [{"do": "stop", "who": 3, "site": 0, "after": 40}, ...]}
 
 `clients` are those of the first database, `copied` those of its copy, if a fate makes one. Each fate befalls one of the
-processes, or begins one more for a site; `after` so many of its turns comes the next one. `haste` says how often time
-passes while others could act.
+processes, or begins one more for a site; `after` so many of its turns comes the next one. Between "dark" and "light" a
+process cannot reach its database. `haste` says how often time passes while others could act.
 """
 
 import random

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 # What a model knows of the storage. The rest is about requests and answers, which a restore takes back from nobody.
-LED_BACK = ("alive", "fences", "numbers", "latest", "_hulls", "_uids", "_places", "_numbered")
+LED_BACK = ("alive", "fences", "consumers", "numbers", "latest", "_hulls", "_uids", "_places", "_numbered")
 
 
 class Backup:

@@ -27,6 +27,7 @@ from support.sides import Rings, hull
 
 from dynhull_server.state.batch import Applied
 from dynhull_server.state.errors import RestoredError
+from dynhull_server.state.feed_consumers import DropFeedConsumer, PutFeedConsumer
 from dynhull_server.state.fences.model.records import Cause, EventType
 from dynhull_server.state.hull_state import Counts
 from dynhull_server.state.limits import Limits
@@ -47,7 +48,7 @@ from dynhull_server.storage.rows.group import EraseKeys, SetHistory
 from .entities import Effect, Entities, Entity, Key
 from .fence_model import FENCE_CHANGES, PREFIX, UNIT, FenceModel
 from .globe import FAR, GLOBE, mean, points
-from .past_model import PastTruth, past_of
+from .past_model import ConsumerTruths, PastTruth, past_of
 from .quarantine_model import BrokenRuleError, Carried, Verdict
 
 Content = tuple[float, ...]
@@ -174,6 +175,7 @@ class Model:
         numbers: the numbers of all hulls and fences.
         commits: how many there have been.
         latest: the time of the last one.
+        consumers: those of feeds.
         wall: what the clock on the wall has when a life begins.
         clock: the server's clock, once it has begun.
         uids_ever: the uids that there were before a restore.
@@ -186,6 +188,7 @@ class Model:
         self.clock: Callable[[], float] = lambda: inf
         self.fences = FenceModel(self)
         self.numbers: set[int] = set()
+        self.consumers = ConsumerTruths()
         self.uids_ever: set[str] = set()
         self.commits = self.latest = self._now = 0
         self.wall = 1e9
@@ -266,6 +269,8 @@ class Model:
                     self._keep_past(self._hulls[change.number], change)
                 case EraseKeys() if not self._hulls[change.number].deleted:
                     self._hulls[change.number].past.erased = change.stored.erasure.last
+                case PutFeedConsumer() | DropFeedConsumer():
+                    self.consumers.landed(change)
                 case Delete():
                     truth = self._hulls[change.number]
                     truth.deleted = True

@@ -4,8 +4,10 @@
 * The revision as of a time is the last one committed at or before it, by a clock that does not go back.
 * Of a hull that is created with a history for ever nothing is ever lost.
 * A key that was erased is nowhere in it, and all else is as it was.
+* A consumer of a feed is where it was last committed to be, over kills, too: so it gets each batch once.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynhull.keys import PackedKeys
+from dynhull_server.state.feed_consumers import ConsumerId, DropFeedConsumer, FedBy, FeedConsumer, PutFeedConsumer
 from dynhull_server.state.records import FOREVER, HullRow, HullSettings, KeyRows, Record
 from dynhull_server.storage.past import created
 
@@ -62,6 +65,34 @@ class PastTruth:
     def batch(self, revision: int) -> object:
         """The batch of a revision as it must be read, as `plain`."""
         return plain(self.records[revision - 1], erased=revision <= self.erased)
+
+
+class ConsumerTruths:
+    """What was committed of the consumers of feeds, one after the other; None is a consumer that there is not."""
+
+    def __init__(self) -> None:
+        self._states: dict[ConsumerId, list[FeedConsumer | None]] = defaultdict(lambda: [None])
+
+    def landed(self, change: PutFeedConsumer | DropFeedConsumer) -> None:
+        """The storage has kept a change."""
+        match change:
+            case PutFeedConsumer(consumer):
+                self._states[consumer.id].append(consumer)
+            case DropFeedConsumer(ident):
+                self._states[ident].append(None)
+
+    def ask(self, ident: ConsumerId) -> int:
+        """From which of its states on an answer to what is asked now may have one."""
+        return len(self._states[ident]) - 1
+
+    def since(self, ident: ConsumerId, asked: int) -> list[FeedConsumer | None]:
+        """The states that an answer may have."""
+        return self._states[ident][asked:]
+
+
+def consumer_of(name: str, number: int) -> ConsumerId:
+    """A consumer of the feed of a hull."""
+    return ConsumerId(FedBy(name), f"reader {number}")
 
 
 def past_of(row: HullRow) -> PastTruth:

@@ -15,7 +15,7 @@ from .past_archive import DAMAGE, FILE_PLACES, LATE, STORE_PLACES
 from .past_model import ERASED
 
 # What clients ask of the past.
-OF_PAST = ("as_of", "feed", "replay", "track", "keep_past", "erase")
+OF_PAST = ("as_of", "feed", "replay", "track", "keep_past", "erase", "consume", "unconsume")
 READS = ("as_of", "as_of", "as_of", "feed", "replay", "track")
 
 # How much is kept: for ever, for some seconds, or some bytes: about one segment, or some.
@@ -36,8 +36,14 @@ JUMPS = (-3600.0, -2.0, 2.0, 3600.0)
 BEYOND_ITS_AGE = 0.1
 AGE = 3_000_000
 
+# The share of the plans in which feeds have consumers.
+WITH_CONSUMERS = 0.4
+
 # The share of the plans without backups in which the past is in an object store.
 IN_STORE = 0.3
+
+# The share of the cluster's plans with a past in which an owner cannot reach the database for a while.
+IN_THE_DARK = 0.5
 
 # How the files of the past fail, where they are read too; how calls of a store do; and commits of steps of filing.
 FILE_FAULTS = ("os", "disk full", "memory", "kill", "kill", "kill")
@@ -66,11 +72,62 @@ def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
             for _ in range(draw.randint(0, 3)):
                 client.insert(draw.randint(0, len(client)), _of_past(draw, draw.choice(names), files=files))
         life["clients"].append(_written_until_filed(draw, draw.choice(names), files=files))
+    fed = random.Random(f"fed {plan['seed']}")
+    if fed.random() < WITH_CONSUMERS:
+        for life in plan["lives"]:
+            _add_consumers(fed, life, fed.choice(names))
+        if files and fed.random() < 0.5:
+            fault = {"at": "consumer", "nth": fed.randint(1, 6), "kind": fed.choice(STEP_FAULTS), "calls": 1}
+            plan["faults"].append(fault)
     aged = random.Random(f"aged {plan['seed']}")  # the other plans stay as they were
     if files and plan["segment_rows"] is None and aged.random() < BEYOND_ITS_AGE:
         aged.choice(plan["lives"])["clients"].append(_written_beyond_its_age(aged.choice(names)))
     if files and draw.random() < 0.6:
         plan["faults"] += [_fault(draw, in_store=plan["store"]) for _ in range(draw.choice((1, 1, 2, 3)))]
+
+
+def add_past_to_cluster(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
+    """Hulls keep their past for ever, in a store that all owners share; clients write to them, and read it."""
+    plan["segment_rows"] = draw.choice(SEGMENT_ROWS)
+    plan["faults"] = [_store_fault(draw) for _ in range(draw.choice((0, 0, 1, 2)))]
+    creates = [_creation(name) | {"history": FOREVER, "history_bytes": 0} for name in names]
+    for client in (*plan["clients"], *plan["copied"]):
+        client[:0] = draw.sample(creates, draw.choice((0, 1, 2)))
+        for _ in range(draw.randint(2, 8)):
+            write = _writes(draw.choice(names))[0]
+            client.insert(
+                draw.randint(0, len(client)), draw.choice((write, write, {"do": "past", "name": write["name"]}))
+            )
+    plan["clients"][0][:0] = creates
+    if draw.random() < IN_THE_DARK:
+        who, place = draw.randrange(2), draw.randint(0, len(plan["fates"]))
+        plan["fates"][place:place] = [_fate(draw, "dark", who), _fate(draw, "light", who)]
+        for client in plan["clients"]:
+            client += [_writes(draw.choice(names))[0] for _ in range(draw.randint(0, 6))]
+
+
+def _fate(draw: random.Random, do: str, who: int) -> dict[str, Any]:
+    return {"do": do, "who": who, "site": 0, "after": int(draw.expovariate(1 / 200))}
+
+
+def _store_fault(draw: random.Random) -> dict[str, Any]:
+    kinds = {"call": ("os", *LATE), "answer": ("os",)}
+    at = draw.choice(tuple(kinds))
+    nth, calls = 1 + int(draw.expovariate(1 / 4)), draw.choice((1, 1, 2, 5))
+    return {"at": at, "nth": nth, "kind": draw.choice(kinds[at]), "calls": calls}
+
+
+def _add_consumers(draw: random.Random, life: dict[str, Any], name: str) -> None:
+    """Consumers follow the feed of a hull, each from where it was in the life before."""
+    clients = [*life["clients"], []]
+    for _ in range(draw.choice((2, 4, 8))):
+        do = draw.choice(("consume",) * 9 + ("unconsume",))
+        op: Operation = {"do": do, "name": name, "consumer": draw.randrange(2), "most": draw.choice((1, 1, 3, 100))}
+        if draw.random() < 0.15:
+            op["leave"] = int(draw.expovariate(1 / 5))
+        client = draw.choice((*clients, clients[-2]))
+        client.insert(draw.randint(0, len(client)), op)
+    life["clients"] = [each for each in clients if each]
 
 
 def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list[Operation]:

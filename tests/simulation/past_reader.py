@@ -13,7 +13,9 @@ from dynhull_server.engine.replay import Pace, replay
 from dynhull_server.engine.tracks import tracks
 from dynhull_server.engine.views import Change, Progress, Snapshot, VerticesView
 from dynhull_server.state.errors import (
+    ConsumerNotFoundError,
     HullNotFoundError,
+    HullReplacedError,
     HullUnsuitableError,
     MomentForgottenError,
     RevisionForgottenError,
@@ -28,7 +30,7 @@ from .entities import Entity, Key, loaded
 from .globe import points
 from .model import Model, Truth
 from .operations import TIMED
-from .past_model import ERASED, plain
+from .past_model import ERASED, consumer_of, plain
 from .quarantine_model import waiting_of
 
 if TYPE_CHECKING:
@@ -67,6 +69,8 @@ class PastReader:
             reasons: list[type[Exception]] = [HullNotFoundError, RevisionForgottenError, MomentForgottenError]
             if op["do"] in ("track", "erase", "keep_past"):
                 reasons.append(HullUnsuitableError)
+            if op["do"] in ("consume", "unconsume"):
+                reasons += [HullReplacedError, ConsumerNotFoundError]
             client.refused(asked, error, tuple(reasons))
 
     async def _ask(self, live: LiveHull, truth: Truth, op: Operation) -> None:
@@ -79,6 +83,10 @@ class PastReader:
                 await self.as_of(live, truth, first)
             case "feed":
                 await self.feed(live, truth, first, op["most"])
+            case "consume":
+                await self._consume(live, truth, op["consumer"], op["most"])
+            case "unconsume":
+                await self._unconsume(live, op["consumer"])
             case "replay":
                 await self._replay(live, truth, first, last)
             case "track":
@@ -155,8 +163,8 @@ class PastReader:
 
     # From revision to revision
 
-    async def feed(self, live: LiveHull, truth: Truth, after: int, most: int) -> None:
-        """Follow the batches after a revision, as long as they come at once."""
+    async def feed(self, live: LiveHull, truth: Truth, after: int, most: int) -> int:
+        """Follow the batches after a revision, as long as they come at once. The revision that they lead to."""
         async with aclosing(self._engine.hulls.feeds.follow(live, after, progress_interval=0.1)) as parts:
             async for part in parts:
                 if part.lost is not None:
@@ -170,7 +178,45 @@ class PastReader:
                     raise self._model.finds(f"the feed of {live.name} has come to {part.revision}, and has {after}")
                 most -= 1
                 if not most or after >= truth.revision:
-                    return
+                    break
+        return after
+
+    async def _consume(self, live: LiveHull, truth: Truth, number: int, most: int) -> None:
+        """Go on where a consumer has stopped, and acknowledge what has come."""
+        ident = consumer_of(live.name, number)
+        consumers, truths = self._engine.hulls.feed_consumers, self._model.consumers
+        asked = truths.ask(ident)
+        try:
+            after = await consumers.revision(live, ident.name)
+            self._consumer(live, truths.since(ident, asked), after)
+            after = await self.feed(live, truth, after, most)
+            asked = truths.ask(ident)
+            state = await consumers.acknowledge(ident.name, live.name, live.uid, after)
+        except HullReplacedError as error:
+            if not truth.deleted and all(each is None or each.uid == live.uid for each in truths.since(ident, asked)):
+                raise self._model.finds(f"{ident} is of {live.uid}: {error!r}") from error
+            raise
+        if state.consumer not in truths.since(ident, asked) or state.consumer.acknowledged < after:
+            raise self._model.finds(f"{ident} has acknowledged {after}, and is {state}: {truths.since(ident, asked)}")
+
+    def _consumer(self, live: LiveHull, states: list[Any], after: int) -> None:
+        if not any(each is not None and (each.uid, each.acknowledged) == (live.uid, after) for each in states):
+            raise self._model.finds(f"a consumer of {live.name} goes on after {after}, and was {states}")
+        if after > live.counts.revision:
+            raise self._model.finds(f"a consumer of {live.name} goes on after {after} of {live.counts.revision}")
+
+    async def _unconsume(self, live: LiveHull, number: int) -> None:
+        """Delete a consumer."""
+        ident = consumer_of(live.name, number)
+        asked = self._model.consumers.ask(ident)
+        try:
+            await self._engine.hulls.feed_consumers.delete(ident)
+        except ConsumerNotFoundError as error:
+            if None not in self._model.consumers.since(ident, asked):
+                raise self._model.finds(f"{ident} was not deleted: {error!r}") from error
+            raise
+        if None not in self._model.consumers.since(ident, asked):
+            raise self._model.finds(f"{ident} is said to be deleted")
 
     def _fed(self, truth: Truth, revision: int, record: Any) -> None:
         time = truth.past.times[revision]

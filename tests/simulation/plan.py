@@ -31,7 +31,7 @@ from .operations import (
     random_rules,
     settings_of,
 )
-from .past_plan import add_past, may_keep
+from .past_plan import add_past, add_past_to_cluster, may_keep
 from .scenes import (
     WITH_SCENES,
     add_earlier_acks,
@@ -96,7 +96,7 @@ WITH_DELETED_FENCES = 0.3
 WITH_REFUSED_STREAMS = 0.3
 
 # The share of the engine's plans in which the past is read: on SQLite, where hulls keep it, and in memory.
-WITH_PAST = {"past": 1.0, "sqlite": 0.1, "shell": 0.15}
+WITH_PAST = {"past": 1.0, "sqlite": 0.1, "shell": 0.15, "cluster": 0.4}
 # A layer of plans that are like those of another one.
 LIKE = {"past": "sqlite"}
 
@@ -225,6 +225,10 @@ def random_plan(seed: int, layer: str) -> Plan:
 
 def _cluster_plan(seed: int) -> Plan:
     plan, alarms = random_cluster_plan(seed), random.Random(f"alarms {seed}")
+    past = random.Random(f"past {seed}")
+    if past.random() < WITH_PAST["cluster"]:
+        add_past_to_cluster(past, plan, NAMES_IN_CLUSTER)
+        return plan
     if alarms.random() < WITH_ALARMS_IN_CLUSTER:
         add_alarms_to_cluster(alarms, plan, (*NAMES_IN_CLUSTER, "k"))
     return plan

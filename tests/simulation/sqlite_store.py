@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
+from dynhull_server.state.feed_consumers import DropFeedConsumer, PutFeedConsumer
 from dynhull_server.state.fences.model.records import KeptFence
 from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.durability import Durability
@@ -34,8 +35,11 @@ from .past_retention import all_may_stay, may_go
 from .store import ERRORS, FaultyStorage
 
 FAILED = {"full": sqlite3.SQLITE_FULL, "lost": sqlite3.SQLITE_IOERR, "ghost": sqlite3.SQLITE_IOERR_FSYNC}
-# The steps of filing: the commits in which segments become part of the past, or leave it.
-FILING = (NameFile, CloseSegment, EraseKeys, RetireSegment, DropDeadSegment)
+# Commits that fail on their own: those in which segments become part of the past, or leave it, and those of consumers.
+OF_STEPS = {
+    "step": (NameFile, CloseSegment, EraseKeys, RetireSegment, DropDeadSegment),
+    "consumer": (PutFeedConsumer, DropFeedConsumer),
+}
 # Where the folders of the lives are: in memory, where there is such a place.
 SHARED_MEMORY = Path("/dev/shm")
 # More events than a fence has.
@@ -70,8 +74,10 @@ class SQLiteLives(FaultyStorage):
     def _fault_of_disk(self, place: str) -> str | None:
         """What fails at this call of a method of the disk."""
         kind = self._fault(place)
-        if place == "commit" and any(isinstance(each, FILING) for each in self._pending[0]):
-            kind = self._fault("step") or kind
+        if place == "commit":
+            for step, changes in OF_STEPS.items():
+                if any(isinstance(each, changes) for each in self._pending[0]):
+                    kind = self._fault(step) or kind
         return kind
 
     def _threads_of_life(self) -> SimulatedThreads:
