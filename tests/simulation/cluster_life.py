@@ -440,7 +440,7 @@ class World:
         schedule.actor("fates", lambda: self._fates and not self.calm, self._fate)
         model.new_life()
         model.faulty = True
-        past = SharedPast(plan["faults"]) if "faults" in plan else None
+        past = SharedPast(plan["faults"], lambda: 1e6 * self.now) if "faults" in plan else None
         self._add(Site("north", Postgres(), _store(MemoryStorage(), model), model, past=past), plan["clients"])
 
     def _add(self, site: Site, clients: list[list[Operation]]) -> None:

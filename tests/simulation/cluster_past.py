@@ -8,7 +8,7 @@ know yet, reads them, too, and calls the store.
 import copy
 import shutil
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
@@ -135,15 +135,20 @@ class _Reader(SQLiteReader):
 class SharedPast:
     """The rows and the store of a site.
 
-    Attributes:
+    Args:
         faults: how calls of the store fail, for each owner.
+        clock: the time in microseconds.
+
+    Attributes:
+        faults: the same.
         calm: whether nothing fails any more.
     """
 
-    def __init__(self, faults: Sequence[dict[str, Any]]) -> None:
+    def __init__(self, faults: Sequence[dict[str, Any]], clock: Callable[[], float]) -> None:
         self.faults, self.calm = faults, False
+        self._clock = clock
         self._home = TemporaryDirectory()
-        self._store = Store(Path(self._home.name) / "store")
+        self._store = Store(Path(self._home.name) / "store", clock)
         self._rows = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
         for sql in filter(None, SCHEMAS[FORMAT].values()):
             self._rows.execute(sql)
@@ -166,7 +171,7 @@ class SharedPast:
 
     def copied(self) -> "SharedPast":
         """The same as of the last commits, in a database and a store of its own."""
-        other = SharedPast(self.faults)
+        other = SharedPast(self.faults, self._clock)
         self._rows.backup(other._rows)
         if self._store.folder.is_dir():
             shutil.copytree(self._store.folder, other._store.folder)
@@ -174,13 +179,17 @@ class SharedPast:
         return other
 
     def needs_all(self, rows: SharedRows) -> bool:
-        """Whether each object is one of a segment, and nothing is to be filed or removed."""
+        """Whether each object of a hull is one of a segment, and nothing is to be filed or removed.
+
+        What a server sends that was replaced before the hull was deleted, nobody knows of.
+        """
         hulls = rows._ledger.hulls.values()
         if any(hull.row.settings.history and hull.due != hull.filed for hull in hulls) or rows._ledger.dead["segments"]:
             return False
-        archive = rows._archive
+        archive, uids = rows._archive, {hull.row.uid for hull in hulls}
         assert isinstance(archive, FaultyStore)
-        return archive.names() == {each.file for hull in hulls for each in hull.segments}
+        there = {name for name in archive.names() if name.partition("/")[0] in uids}
+        return there == {each.file for hull in hulls for each in hull.segments}
 
     def remove(self) -> None:
         """Nothing of it is needed any more."""

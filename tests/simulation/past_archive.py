@@ -34,11 +34,11 @@ DAMAGE = ("flip", "half", "gone", "other")
 # How a call of a store ends late: it is carried out when nobody waits for it any more, or never, or after a while.
 LATE = ("late", "hung", "slow")
 
-# Calls of the store after which one that was late is carried out, and turns of others while one is slow.
-LATER, SLOW = 7, 20
+# Microseconds after which a call that was late is carried out, and turns of others while one is slow.
+LATER, SLOW = 1_500_000, 20
 # Seconds, which are calls here, after which files in a store that belong to nobody are removed; microseconds from one
-# look for them to the next.
-OLD, LOOK = 5.0, 2_000_000
+# look for them to the next; and those after which nothing is carried out that was given up.
+OLD, LOOK, LATEST = 5.0, 2_000_000, 3_000_000
 
 At = Callable[[str], str | None]
 
@@ -115,21 +115,24 @@ class Store:
 
     Attributes:
         folder: has the objects as files.
+        clock: the time in microseconds.
         times: the number of calls that had come when each of them was written; a second is a call here.
-        late: calls that are carried out later: after how many calls, and what they do.
+        late: calls that are carried out later: when, and what they do.
         calls: how many there were.
     """
 
     folder: Path
+    clock: Callable[[], float]
     times: dict[str, int] = field(default_factory=dict)
-    late: list[tuple[int, Callable[[], Any]]] = field(default_factory=list)
+    late: list[tuple[float, Callable[[], Any]]] = field(default_factory=list)
     calls: int = 0
 
     def called(self) -> None:
         """One more call comes; what was late may be carried out now."""
         self.calls += 1
-        due = [call for after, call in self.late if after <= self.calls]
-        self.late = [each for each in self.late if each[0] > self.calls]
+        now = self.clock()
+        due = [call for when, call in self.late if when <= now]
+        self.late = [each for each in self.late if each[0] > now]
         for call in due:
             call()
 
@@ -155,7 +158,7 @@ class FaultyStore(objects.ObjectArchive):
         kind = self._at("call")
         self._kept.called()
         if kind == "late":
-            self._kept.late.append((self._kept.calls + LATER, lambda: _forgotten(function)))
+            self._kept.late.append((self._kept.clock() + LATER, lambda: _forgotten(function)))
         for _ in range(SLOW if kind in LATE else 0):
             self._give_way()
         if kind in ("late", "hung"):
@@ -254,5 +257,6 @@ def simulated_reading(threads: Callable[[], SimulatedThreads]) -> Iterator[None]
         patch.object(filed, "Future", future),
         patch.object(objects, "ORPHAN_SECONDS", OLD),
         patch.object(rows_storage, "LOOK", LOOK),
+        patch.object(rows_storage, "LATE", LATEST),
     ):
         yield

@@ -528,6 +528,52 @@ def test_an_owner_that_was_replaced_removes_no_file_of_the_next_one(postgres, tm
     fleet.storage.close()
 
 
+class LateArchive(Archive):
+    """Takes files that it did not answer for, later."""
+
+    takes_late, hangs = True, False
+
+    def __init__(self, path):
+        super().__init__(path)
+        self.pending = []
+
+    def write(self, file, content):
+        if not self.hangs:
+            return super().write(file, content)
+        self.pending.append((file, content))
+        raise OSError(errno.ETIMEDOUT, "the store does not answer", file)
+
+    def arrive(self):
+        for file, content in self.pending:
+            super().write(file, content)
+
+
+@pytest.mark.parametrize("again", [False, True], ids=["the server goes on", "the server starts again"])
+def test_what_a_store_takes_late_of_a_deleted_hull_is_removed(tmp_path, again):
+    fleet = Fleet(tmp_path, archive=LateArchive(tmp_path / "history")).fill(2)
+    fleet.put(4)
+    fleet.snapshot()
+    fleet.archive.hangs = True
+    for _ in range(2):
+        with pytest.raises(OSError, match="does not answer"):
+            fleet.file()
+    if again:
+        fleet.storage.close()
+        fleet.storage = fleet.make()
+        fleet.storage.open(no_progress)
+    fleet.storage.commit([Delete(1)], fleet.time)
+    fleet.file()
+    assert fleet.files == []
+    fleet.archive.arrive()
+    fleet.file()
+    assert fleet.files
+    fleet.time += storage.LATE
+    fleet.file()
+    assert fleet.files == []
+    assert not fleet.storage._ledger.dead["segments"]
+    fleet.storage.close()
+
+
 def test_a_file_is_removed_once_a_power_failure_cannot_bring_its_segment_back(tmp_path, monkeypatch):
     archive = Archive(tmp_path / "history")
     make = lambda: SQLiteStorage(tmp_path / "data", Durability.INTERVAL, archive=archive)  # noqa: E731

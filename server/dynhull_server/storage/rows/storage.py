@@ -3,7 +3,7 @@
 import logging
 from abc import ABC, abstractmethod
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from threading import Lock
@@ -68,6 +68,7 @@ log = logging.getLogger(__name__)
 
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
 LOOK = 3_600_000_000  # microseconds between looks for files that belong to nobody
+LATE = 86_400_000_000  # microseconds after which a store carries out nothing of what a server has given up
 
 Picked = TypeVar("Picked")
 Found = TypeVar("Found")
@@ -98,6 +99,7 @@ class RowStorage(ABC):
         self._unsettled = False
         self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
         self._filing: set[int] = set()  # rows of segments that are being written
+        self._late: dict[int, int] = {}  # of rows whose files may come yet: when they are removed once more, or 0
         self._looked = 0  # when it was looked for files that belong to nobody
 
     @property
@@ -127,6 +129,7 @@ class RowStorage(ABC):
 
     def _contents(self, notes: list[str]) -> StoredContents:
         """What was found, with messages about what was lost or repaired."""
+        self._late = dict.fromkeys(self._ledger.dead["segments"], 0)
         rows = sorted((hull.row for hull in self._ledger.hulls.values()), key=lambda row: row.name)
         fences = sorted((fence.row for fence in self._ledger.fences.values()), key=lambda row: row.name)
         totals = self._ledger.totals
@@ -425,7 +428,7 @@ class RowStorage(ABC):
         numbers = self._with_past()
         if numbers:
             load()  # before there are batches to wait for it
-        yield from self._remove_files(archive)
+        yield from self._remove_files(archive, now)
         damage: DamagedError | None = None
         for number in numbers:
             try:
@@ -441,7 +444,7 @@ class RowStorage(ABC):
                     extra={"hull": number, "first": segment.first, "last": segment.last, "bytes": segment.size},
                 )
                 yield RetireSegment(number, segment)
-        yield from self._remove_files(archive)
+        yield from self._remove_files(archive, now)
         if now - self._looked >= LOOK:
             self._looked = now
             self._remove_orphans(archive)
@@ -458,7 +461,7 @@ class RowStorage(ABC):
             yield DropErasure(number, stored)
 
     def _remove_orphans(self, archive: Archive) -> None:
-        """Remove the files that owners before this one have written after it became the owner."""
+        """Remove the files that owners before this one have written long after it became the owner."""
         for number in self._with_past():
             with self._visible:
                 hull = self._settled().hulls.get(number)
@@ -486,7 +489,7 @@ class RowStorage(ABC):
             found = self._settled().hulls.get(number)
         if found is not None:
             yield from self._erase(Erasing(found.copy(), keys, until, archive), now)
-        yield from self._remove_files(archive)
+        yield from self._remove_files(archive, now)
 
     def _erase(self, erasing: Erasing, now: int) -> Iterator[StorageStep]:
         """Write what takes the place of segments with the keys, then replace them all at once."""
@@ -504,7 +507,7 @@ class RowStorage(ABC):
                 stored = StoredErasure(next(self._ledger.segment_ids), erasing.done(now))
                 yield EraseKeys(number, tuple(replaced), stored)
         except BaseException:
-            self._ledger.dead["segments"].extend(places)  # if they are nobody's
+            self._abandon(places)
             raise
         finally:
             self._filing -= places
@@ -518,18 +521,32 @@ class RowStorage(ABC):
             yield NameFile(place, file)
             yield CloseSegment(number, due.write(archive, place, file))
         except BaseException:
-            self._ledger.dead["segments"].append(place)  # if it is nobody's
+            self._abandon([place])
             raise
         finally:
             self._filing.remove(place)
 
-    def _remove_files(self, archive: Archive) -> Iterator[StorageStep]:
-        """Remove the files that no segment has, and then the rows that name them."""
-        while ids := [each for each in self._ledger.dead["segments"] if each not in self._filing]:
+    def _abandon(self, places: Collection[int]) -> None:
+        """Rows of segments are nobody's, unless their commit was taken for a failure, and their files may come yet."""
+        self._ledger.dead["segments"].extend(places)
+        self._late.update(dict.fromkeys(places, 0))
+
+    def _remove_files(self, archive: Archive, now: int) -> Iterator[StorageStep]:
+        """Remove the files that no segment has, and then the rows that name them.
+
+        Of what a server gave up, or was writing when it ended, the row stays, so that what a store takes late is
+        removed, too, whatever has become of the hull.
+        """
+        while ids := [
+            each
+            for each in self._ledger.dead["segments"]
+            if each not in self._filing and self._late.get(each, 0) <= now
+        ]:
             with self._reading(lambda ledger: ledger.hulls.copy()) as (reader, hulls):
                 rows = list(reader.some("segments", "hull, file", array("q", ids[:1])))
             if any(number in hulls for number, _ in rows):  # its commit was taken for a failure, and was none
                 self._ledger.dead["segments"].remove(ids[0])
+                self._late.pop(ids[0], None)
                 continue
             self._confirm()
             for _, file in rows:
@@ -537,7 +554,11 @@ class RowStorage(ABC):
                     archive.remove(file)
                     if self._filed is not None:
                         self._filed.forget(file)
+            if rows and archive.takes_late and self._late.get(ids[0]) == 0:
+                self._late[ids[0]] = now + LATE
+                continue
             yield DropDeadSegment(ids[0])
+            self._late.pop(ids[0], None)
 
     def cut(self, number: int, last: int) -> StorageStep | None:
         """The step that drops the revisions after `last`."""

@@ -102,6 +102,7 @@ class Archive:
         path, most_bytes, most_age: the same.
     """
 
+    takes_late = False  # whether what was given up may be there later
     has_parts = True  # whether to read a part of a file takes less than to read all of it
 
     def __init__(self, path: Path, most_bytes: int = 0, most_age: int = 0) -> None:

@@ -54,6 +54,7 @@ class ObjectArchive(Archive):
         seconds: for a call.
     """
 
+    takes_late = True
     has_parts = False  # an object is asked for once
 
     def __init__(self, place: str, most_bytes: int = 0, most_age: int = 0, seconds: float = CALL_SECONDS) -> None:
@@ -64,7 +65,6 @@ class ObjectArchive(Archive):
         self._seconds = seconds
         self._places = BoundedSemaphore(CALLS)
         self._making = Lock()
-        self._given_up: set[str] = set()  # segments that the store may still take, though nobody waits for them
         self._made: FileSystem | None = None
 
     def write(self, file: str, content: bytes) -> Written:
@@ -79,11 +79,7 @@ class ObjectArchive(Archive):
             with self._store().open_output_stream(key) as stream:
                 stream.write(content)
 
-        try:
-            self._ask(file, put, len(content))
-        except OSError:
-            self._given_up.add(file.partition(".")[0])
-            raise
+        self._ask(file, put, len(content))
         if self.content(file, len(content)) != content:
             raise OSError(errno.EIO, "the object store does not keep what it is sent", file)
         return written(content)
@@ -120,7 +116,7 @@ class ObjectArchive(Archive):
             yield file + STATE
 
     def orphans(self, uid: str, epoch: int) -> list[str]:
-        """Segments older than a day that owners before an epoch have written, or that this archive has given up.
+        """Segments older than a day that owners before an epoch have written.
 
         A hull may have those of owners before.
 
@@ -141,7 +137,7 @@ class ObjectArchive(Archive):
             }
 
         found = sorted(f"{uid}/{name}" for name in self._ask(uid, look))
-        return [file for file in found if _epoch(file) < epoch or file in self._given_up]
+        return [file for file in found if _epoch(file) < epoch]
 
     def sync(self) -> None:
         """Nothing is left to do: a store that has taken an object keeps it."""
