@@ -361,3 +361,31 @@ live("a writer moves points, and puts keys under conditions", async (client, nam
   await assert.rejects(writer.put(["x"], [[0, 0]], { accuracies: [-1] }), { field: "accuracies", row: 0 })
   await writer.close()
 })
+
+live("refusals name what is at fault as calls do", async (client, name) => {
+  const [keyed, plain] = [name("refusals/keyed"), name("refusals/plain")]
+  await client.createHull(keyed, { keyed: "str" })
+  await client.createHull(plain)
+  const area = { center: [0, 0], radius: 1 }
+  /** @type {[() => Promise<unknown>, string, number | null, RegExp][]} */
+  const refused = [
+    [() => client.put(keyed, ["a", "b", "a"], [[0, 0], [1, 1], [2, 2]]), "keys", 2, /^\/keys\/2: a batch names a key once, and \/keys\/0 is the same/],
+    [() => client.put(keyed, ["a", "b"], [[0, 0]]), "points", null, /^\/points: must /],
+    [() => client.put(keyed, ["a", "b"], [[0, 0], [1, NaN]]), "points", 1, /^\/points\/1/],
+    [() => client.put(keyed, ["a", ""], [[0, 0], [1, 1]]), "keys", 1, /^\/keys\/1: /],
+    [() => client.put(keyed, ["a", "b"], [[0, 0], [1, 1]], { accuracies: [1, -1] }), "accuracies", 1, /^\/accuracies\/1: must /],
+    [() => client.put(keyed, ["a"], [[0, 0]], { ttl: -1 }), "ttl", null, /^\/ttl: must be /],
+    [() => client.remove(keyed, ["zz"], { missing: "raise" }), "remove", 0, /^\/remove\/0: no such key/],
+    [() => client.apply(plain, { delete: [[7, 7]] }), "delete", 0, /^\/delete\/0: no such point/],
+    [() => client.apply(plain, { move: { origins: [[7, 7]], destinations: [[8, 8]] } }), "move", 0, /^\/move\/origins\/0: no such point/],
+    [() => client.createHull(name("refusals/new"), { maxAge: -1 }), "max_age", null, /^\/max_age: must be /],
+    [() => client.createHull(name("refusals/new"), { keyed: "str", quarantine: { maxSpeed: -1 } }), "quarantine", null, /^\/quarantine\/max_speed: must be /],
+    [() => client.createFence(name("refusals/fence"), { area: { ...area, radius: -1 }, subjects: keyed }), "area", null, /^\/area\/radius: must be /],
+    [() => client.createFence(name("refusals/fence"), { area, subjects: keyed, margin: -1 }), "margin", null, /^\/margin: must be /],
+    [() => client.createAlarm(name("refusals/alarm"), { hull: keyed, when: "area >" }), "when", null, /^\/when: at position 7: /],
+    [() => client.support(keyed, [[1, 0], [0, 0]]), "directions", 1, /^\/directions\/1: has no direction/],
+    [() => client.layers(keyed, 0), "count", null, /^\/?count: must be /],
+  ]
+  for (const [call, field, row, message] of refused) await assert.rejects(call, { name: "DynhullError", field, row, message }, field)
+  assert.deepEqual([(await client.getHull(keyed)).info.revision, (await client.getHull(plain)).info.revision], [0n, 0n])
+})

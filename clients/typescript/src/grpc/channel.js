@@ -6,6 +6,7 @@ import { Client as Caller, Metadata, credentials, loadPackageDefinition, status 
 import { loadFileDescriptorSetFromBuffer } from "@grpc/proto-loader"
 
 import { DynhullError } from "../errors.js"
+import { named, retold } from "./names.js"
 
 const CONTRACT = readFileSync(new URL("contract.binpb", import.meta.url))
 const OPTIONS = { longs: String, enums: String, defaults: true, oneofs: true }
@@ -22,24 +23,6 @@ const CHANNEL = {
 }
 /** The statuses of HTTP that stand for those of gRPC. @type {Record<number, number>} */
 const HTTP = { 1: 503, 2: 502, 3: 400, 4: 504, 5: 404, 6: 409, 7: 403, 8: 429, 9: 409, 10: 409, 11: 400, 12: 501, 13: 500, 14: 503, 16: 401 }
-
-/** Fields of the contract that have other names in calls. @type {Record<string, string>} */
-const FIELDS = {
-  "batch.inserts": "insert",
-  "batch.insert_times": "times",
-  "batch.deletes": "delete",
-  "batch.moves.origins": "move/origins",
-  "batch.moves.destinations": "move/destinations",
-  "batch.puts.keys": "keys",
-  "batch.puts.points": "points",
-  "batch.puts.times": "times",
-  "batch.puts.ttl": "ttl",
-  "batch.puts.expire_times": "expire_times",
-  "batch.puts.accuracies": "accuracies",
-  "batch.removes": "remove",
-  "batch.releases": "release",
-  "batch.drops": "drop",
-}
 
 /** The three services of a server. */
 export class Channel {
@@ -162,15 +145,14 @@ export function notSent(error) {
 /** @param {any} error @param {string} url */
 function problemOf(error, url) {
   const { reason, metadata } = reasonOf(error.metadata?.get("grpc-status-details-bin")[0])
-  const detail = error.details || error.message
+  const detail = retold(error.details || error.message, metadata)
   if (!reason && (error.code === status.UNAVAILABLE || error.code === status.CANCELLED)) {
     return new DynhullError({ reason: "UNREACHABLE", detail: `no answer from ${url}: ${detail}` }, error)
   }
   if (!reason && error.code === status.DEADLINE_EXCEEDED) return new DynhullError({ reason: "DEADLINE", detail }, error)
   const numbers = { row: numberOf(metadata.row), expected: numberOf(metadata.expected), applied: numberOf(metadata.applied) }
-  const { field = null, value = null } = metadata
-  const named = FIELDS[field ?? ""] ?? field
-  const said = { reason: reason || "REFUSED", detail, status: HTTP[error.code] ?? 500, field: named, value, ...numbers }
+  const { field, value = null } = metadata
+  const said = { reason: reason || "REFUSED", detail, status: HTTP[error.code] ?? 500, field: field ? named(field).split("/")[0] : null, value, ...numbers }
   return new DynhullError(said, error)
 }
 

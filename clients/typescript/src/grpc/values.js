@@ -8,9 +8,15 @@ import { isoTime, micros } from "../json.js"
 const LARGEST = (1n << 64n) - 1n
 const HALF = 2 ** 32
 
+/** @param {string} field @param {unknown} rows */
+function requireList(field, rows) {
+  if (!Array.isArray(rows) && !ArrayBuffer.isView(rows)) throw invalid(field, null, rows, "must be an array")
+}
+
 /** @param {string} field @param {readonly (readonly number[])[] | null | undefined} rows */
 export function packPoints(field, rows) {
   if (rows == null) return null
+  requireList(field, rows)
   const packed = new DataView(new ArrayBuffer(16 * rows.length))
   rows.forEach((point, row) => {
     for (const axis of [0, 1]) {
@@ -24,6 +30,7 @@ export function packPoints(field, rows) {
 /** @param {string} field @param {readonly number[] | null | undefined} rows */
 export function packNumbers(field, rows) {
   if (rows == null) return null
+  requireList(field, rows)
   rows.forEach((each, row) => {
     if (!Number.isFinite(each)) throw invalid(field, row, each, "must be a finite number")
   })
@@ -33,6 +40,7 @@ export function packNumbers(field, rows) {
 /** @param {string} field @param {readonly (string | number | bigint)[] | null | undefined} keys */
 export function packKeys(field, keys) {
   if (keys == null) return null
+  requireList(field, keys)
   if (keys.every((key) => typeof key === "string")) return { strings: keys }
   const packed = new DataView(new ArrayBuffer(8 * keys.length))
   keys.forEach((key, row) => {
@@ -52,6 +60,7 @@ export function packKeys(field, keys) {
 /** @param {string} field @param {readonly (bigint | string)[] | null | undefined} times */
 export function packTimes(field, times) {
   if (times == null) return null
+  requireList(field, times)
   const packed = new DataView(new ArrayBuffer(8 * times.length))
   times.forEach((time, row) => packed.setBigInt64(8 * row, instant(field, row, time), true))
   return { packed: Buffer.from(packed.buffer) }
