@@ -2,7 +2,7 @@
 server may be killed."""
 
 import errno
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -13,6 +13,7 @@ from time import time
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
+from zlib import crc32
 
 from dynhull_server.storage.durable import TEMPORARY
 from dynhull_server.storage.rows import filed
@@ -89,7 +90,7 @@ class FaultyArchive(Archive):
             return
         path.rename(aside)
         try:
-            content = damaged(aside.read_bytes(), kind, self._damaged)
+            content = damaged(aside.read_bytes(), kind, self._damaged, others(self.path, path))
             self._damaged += 1
             if content is not None:
                 path.write_bytes(content)
@@ -166,7 +167,7 @@ class FaultyStore(objects.ObjectArchive):
         found = function()
         self._at("answer")
         if kind in DAMAGE and isinstance(found, bytes):
-            found = damaged(found, kind, self._damaged)
+            found = damaged(found, kind, self._damaged, others(self._kept.folder, self._kept.folder / what))
             self._damaged += 1
             if found is None:
                 raise FileNotFoundError(what)
@@ -223,18 +224,23 @@ def _forgotten(function: Callable[[], Any]) -> None:
         return
 
 
-def damaged(content: bytes, kind: str, nth: int) -> bytes | None:
-    """What has become of a file; None if it is away."""
+def others(folder: Path, file: Path) -> list[Path]:
+    """The files of other segments that are there, of the same kind."""
+    return [each for each in sorted(folder.glob(f"*/*.{file.name.partition('.')[2]}")) if each != file]
+
+
+def damaged(content: bytes, kind: str, nth: int, other: Sequence[Path]) -> bytes | None:
+    """What has become of a file, in whose place another one may be; None if it is away."""
     match kind:
         case "flip":
             changed = bytearray(content)
-            bit = nth * 7919 % (8 * len(content))
+            bit = crc32(content, nth) % (8 * len(content))
             changed[bit // 8] ^= 1 << bit % 8
             return bytes(changed)
         case "half":
             return content[: len(content) // 2]
         case "other":
-            return content[::-1]
+            return other[crc32(content, nth) % len(other)].read_bytes() if other else content[::-1]
         case _:
             return None
 
