@@ -20,6 +20,16 @@ class LastVertices:
     def points(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
         """The vertices."""
 
+    @property
+    def changes(self) -> int:
+        """The hull's number of changes when they were taken; -1 before that."""
+
+class VertexTaker:
+    """Takes the vertices of a hull where a sign of it is as it was."""
+
+    def take(self) -> bool:
+        """Take them, and say whether that was so. O(h log n), or O(h²) of few."""
+
 class HullTree:
     """
     A multiset of points and its convex hull: see dynhull's tree in Python.
@@ -58,9 +68,9 @@ class HullTree:
     def take_vertices(self, last: LastVertices) -> None:
         """Take the vertices. O(h log n)."""
 
-    def take_vertices_if(self, last: LastVertices, measure: str, bound: float, least: int, most: int) -> bool:
+    def vertex_taker(self, last: LastVertices, measure: str, bound: float, least: int, most: int) -> VertexTaker:
         """
-        Take the vertices if the sign of a measure less a bound is certain, as `sign_of_measure` has it, and at least `least` and at most `most`. O(h log n), or O(h²) of few.
+        What takes the vertices where the sign of a measure less a bound is certain, as `sign_of_measure` has it, and at least `least` and at most `most`.
         """
 
     def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:
@@ -168,9 +178,9 @@ class Entities:
     def take_vertices(self, last: LastVertices) -> None:
         """Take the vertices. O(h log n)."""
 
-    def take_vertices_if(self, last: LastVertices, measure: str, bound: float, least: int, most: int) -> bool:
+    def vertex_taker(self, last: LastVertices, measure: str, bound: float, least: int, most: int) -> VertexTaker:
         """
-        Take the vertices if the sign of a measure less a bound is certain, as `sign_of_measure` has it, and at least `least` and at most `most`. O(h log n), or O(h²) of few.
+        What takes the vertices where the sign of a measure less a bound is certain, as `sign_of_measure` has it, and at least `least` and at most `most`.
         """
 
     def chain(self, side: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 2))]:

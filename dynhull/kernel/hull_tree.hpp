@@ -162,8 +162,11 @@ class HullTree {
   // The vertices of one side, left to right. O(h log n).
   std::vector<Point> chain(Side side) const {
     std::vector<Point> points;
-    collect(nodes_, nodes_.root, side, LOWEST, HIGHEST, points);
+    add_chain(side, points);
     return points;
+  }
+  void add_chain(Side side, std::vector<Point>& points) const {
+    collect(nodes_, nodes_.root, side, LOWEST, HIGHEST, points);
   }
 
   std::size_t used_bytes() const { return nodes_.used_bytes(); }
@@ -331,6 +334,21 @@ inline std::vector<Point> ring_of(std::vector<Point> lower, const std::vector<Po
   return lower;
 }
 
-inline std::vector<Point> vertices_of(const HullTree& tree) { return ring_of(tree.chain(LOWER), tree.chain(UPPER)); }
+// Both chains of a tree likewise; with memory for about so many vertices, it is asked for once.
+inline std::vector<Point> vertices_of(const HullTree& tree, std::size_t expected = 0) {
+  std::vector<Point> ring;
+  ring.reserve(expected > 0 ? expected + 8 : 0);
+  tree.add_chain(LOWER, ring);
+  const std::size_t lower = ring.size();
+  tree.add_chain(UPPER, ring);
+  if (ring.size() <= lower + 2) {
+    ring.resize(lower);
+    return ring;
+  }
+  std::reverse(ring.begin() + lower, ring.end());
+  ring.pop_back();
+  ring.erase(ring.begin() + lower);
+  return ring;
+}
 
 }  // namespace dynhull

@@ -1,5 +1,6 @@
 """Whether a measure is greater or less than a number: exact."""
 
+from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
 from math import isfinite
@@ -42,39 +43,50 @@ class LastVertices:
     __slots__ = ("_last",)
 
     def __init__(self) -> None:
-        self._last: Any = np.empty((0, 2)) if kernel is None else kernel.LastVertices()
+        self._last: Any = (np.empty((0, 2)), -1) if kernel is None else kernel.LastVertices()
 
     def __len__(self) -> int:
         """Their number. O(1)."""
-        return len(self._last)
+        return len(self._last[0] if kernel is None else self._last)
+
+    @property
+    def changes(self) -> int:
+        """The hull's number of changes when they were taken; -1 if they never were. O(1)."""
+        changes: int = self._last[1] if kernel is None else self._last.changes
+        return changes
 
     def points(self) -> Points:
         """(h, 2) vertices, in the order of `DynamicHull.vertices`. O(h)."""
-        points: Points = self._last if kernel is None else self._last.points()
+        points: Points = self._last[0] if kernel is None else self._last.points()
         return points
 
     def take(self, hull: "Live") -> None:
         """Take the vertices of a hull. O(h log n)."""
         tree: Any = hull._tree
         if kernel is None:
-            self._last = tree.vertices()
+            self._last = tree.vertices(), tree.changes
         else:
             tree.take_vertices(self._last)
 
-    def take_if(self, hull: "Live", measure: Compared, bound: float, least: int, most: int) -> bool:
-        """Take them if what `compare` says of them is at least `least` and at most `most`, and say so.
+    def taker(self, hull: "Live", measure: Compared, bound: float, least: int, most: int) -> Callable[[], bool]:
+        """What takes them if what `compare` says of them is at least `least` and at most `most`, and says so.
 
-        Where rounding might decide, this says no: then `compare` knows. O(h log n), O(h²) of few.
+        Where rounding might decide, it says no: then `compare` knows. A call takes O(h log n), O(h²) of few; and what
+        is found out once, here, is not found out at each.
         """
         tree: Any = hull._tree
         if kernel is not None:
-            taken: bool = tree.take_vertices_if(self._last, measure, bound, least, most)
-            return taken
-        vertices = tree.vertices()
-        if not least <= compare(vertices, measure, bound) <= most:
-            return False
-        self._last = vertices
-        return True
+            take: Callable[[], bool] = tree.vertex_taker(self._last, measure, bound, least, most).take
+            return take
+
+        def take_if() -> bool:
+            vertices = tree.vertices()
+            if not least <= compare(vertices, measure, bound) <= most:
+                return False
+            self._last = vertices, tree.changes
+            return True
+
+        return take_if
 
 
 def _compare_area(vertices: Points, bound: float) -> int:

@@ -91,7 +91,7 @@ def test_vertices_are_taken_where_the_sign_is_one_of_those_that_are_named(shape:
                 sign = compare(vertices, measure, bound)
                 for least, most in ((-1, -1), (-1, 0), (0, 1), (1, 1)):
                     last.take(nothing)
-                    taken, named = last.take_if(hull, measure, bound, least, most), least <= sign <= most
+                    taken, named = last.taker(hull, measure, bound, least, most)(), least <= sign <= most
                     assert named or not taken, (measure, bound)
                     assert np.array_equal(last.points(), vertices if taken else nothing.vertices())
                     doubts += named and not taken
@@ -99,3 +99,18 @@ def test_vertices_are_taken_where_the_sign_is_one_of_those_that_are_named(shape:
         assert np.array_equal(last.points(), vertices)
         assert len(last) == len(vertices)
     assert doubts == 0 or dynhull.KERNEL == "cpp"
+
+
+@pytest.mark.parametrize("bound", [0.0, 5e-324, 1.0, 1e308])
+def test_points_and_segments_have_neither_area_nor_width(monkeypatch: pytest.MonkeyPatch, bound: float) -> None:
+    asked = []
+    if dynhull.KERNEL == "cpp":  # which decides it without fractions
+        monkeypatch.setattr(_comparison, "_sign", lambda *_: asked.append("exactly"))
+    for number in range(3):
+        vertices = np.array([[0.5, 0.25], [3.5, 4.25]])[:number]
+        for measure in ("area", "width", "diameter") if number < 2 else ("area", "width"):
+            assert compare(vertices, measure, bound) == (-1 if bound else 0), (number, measure)
+    assert asked == []
+    segment = np.array([[0.5, 0.25], [3.5, 4.25]])
+    assert [compare(segment, "diameter", each) for each in (4.9, 5.1)] == [1, -1]
+    assert asked == []

@@ -131,8 +131,8 @@ class FramedTree {
   }
 
   // Counter-clockwise from the least; of several points at one place the least.
-  std::vector<Point> vertices() const {
-    std::vector<Point> vertices = vertices_of(plane_);
+  std::vector<Point> vertices(std::size_t expected = 0) const {
+    std::vector<Point> vertices = vertices_of(plane_, expected);
     if (!frame_.on_globe()) return vertices;
     for (Point& p : vertices) p = given_at(p);
     std::rotate(vertices.begin(), std::min_element(vertices.begin(), vertices.end()), vertices.end());

@@ -35,9 +35,10 @@ inline Gnomonic gnomonic_of(const nb::object& parameters) {
 }
 inline nb::object globe_module(const char* name) { return nb::module_::import_("dynhull._globe").attr(name); }
 
-// The vertices that a hull had when they were last taken.
+// The vertices that a hull had when they were last taken, and the number of its changes then.
 struct LastVertices {
   std::vector<Point> points;
+  std::int64_t changes = -1;
 };
 
 class Hull {
@@ -113,12 +114,12 @@ class Hull {
   }
 
   PointArray vertices() { return array_of(vertex_list()); }
-  void take_vertices(LastVertices& last) { last.points = vertex_list(); }
-  bool take_vertices_if(LastVertices& last, std::string_view measure, double bound, int least, int most) {
+  void take_vertices(LastVertices& last) { take(last, vertex_list()); }
+  bool take_vertices_if(LastVertices& last, char measure, double bound, int least, int most) {
     std::vector<Point> found = vertex_list();
-    const std::optional<int> sign = certain_sign(found, measure.empty() ? ' ' : measure[0], bound);
+    const std::optional<int> sign = certain_sign(found, measure, bound);
     if (!sign || *sign < least || *sign > most) return false;
-    last.points = std::move(found);
+    take(last, std::move(found));
     return true;
   }
 
@@ -325,9 +326,14 @@ class Hull {
   }
 
   std::vector<Point> vertex_list() {
-    std::vector<Point> found = reading([&] { return tree_.vertices(); }, expected_vertices());
+    const std::size_t expected = expected_vertices();
+    std::vector<Point> found = reading([&] { return tree_.vertices(expected); }, expected);
     vertices_ = found.size();
     return found;
+  }
+  void take(LastVertices& last, std::vector<Point> found) {
+    last.points = std::move(found);
+    last.changes = static_cast<std::int64_t>(tree_.changes());
   }
 
   // Refreshes the index if that pays for the queries since the hull last changed.
@@ -393,6 +399,31 @@ class Hull {
 
   LocateIndex index_;
   std::uint64_t asked_version_ = 0, queries_ = 0;
+};
+
+// Takes the vertices of a hull if the sign of a measure less a bound is certain, and one of those that are named: of
+// someone who asks after each of its changes.
+class VertexTaker {
+ public:
+  VertexTaker(nb::object tree, Hull& hull, nb::object last, std::string_view measure, double bound, int least, int most)
+      : tree_(std::move(tree)),
+        last_(std::move(last)),
+        hull_(&hull),
+        vertices_(nb::inst_ptr<LastVertices>(last_)),
+        measure_(measure.empty() ? ' ' : measure[0]),
+        bound_(bound),
+        least_(least),
+        most_(most) {}
+
+  bool take() { return hull_->take_vertices_if(*vertices_, measure_, bound_, least_, most_); }
+
+ private:
+  nb::object tree_, last_;  // which have the two
+  Hull* hull_;
+  LastVertices* vertices_;
+  char measure_;
+  double bound_;
+  int least_, most_;
 };
 
 }  // namespace dynhull

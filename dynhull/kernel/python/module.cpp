@@ -96,9 +96,16 @@ nb::class_<Tree>& add_reads(nb::class_<Tree>& type) {
       .def("points", &Tree::points, "All points in lexicographic order, with multiplicity. O(n).")
       .def("vertices", &Tree::vertices, "The hull's vertices, counter-clockwise from the least. O(h log n).")
       .def("take_vertices", &Tree::take_vertices, "last"_a, "Take the vertices. O(h log n).")
-      .def("take_vertices_if", &Tree::take_vertices_if, "last"_a, "measure"_a, "bound"_a, "least"_a, "most"_a,
-           "Take the vertices if the sign of a measure less a bound is certain, as `sign_of_measure` has it, and "
-           "at least `least` and at most `most`. O(h log n), or O(h²) of few.")
+      .def(
+          "vertex_taker",
+          [](nb::handle_t<Tree> tree, nb::handle_t<LastVertices> last, std::string_view measure, double bound,
+             int least, int most) {
+            Hull& hull = *nb::inst_ptr<Tree>(tree);
+            return VertexTaker(nb::borrow(tree), hull, nb::borrow(last), measure, bound, least, most);
+          },
+          "last"_a, "measure"_a, "bound"_a, "least"_a, "most"_a,
+          "What takes the vertices where the sign of a measure less a bound is certain, as `sign_of_measure` has it, "
+          "and at least `least` and at most `most`.")
       .def("chain", &Tree::chain, "side"_a, "The upper (0) or lower (1) chain from left to right. O(h log n).")
       .def("locate", &Tree::locate, "xy"_a, "For each row +1 inside, 0 on the boundary, -1 outside. O(log n) a row.")
       .def("support", &Tree::support, "directions"_a,
@@ -126,7 +133,11 @@ void add_last_vertices(nb::module_& module) {
   nb::class_<LastVertices>(module, "LastVertices", "The vertices that a hull had when they were last taken.")
       .def(nb::init<>())
       .def("__len__", [](const LastVertices& last) { return last.points.size(); })
-      .def("points", [](const LastVertices& last) { return array_of(last.points); }, "The vertices.");
+      .def(
+          "points", [](const LastVertices& last) { return array_of(last.points); }, "The vertices.")
+      .def_ro("changes", &LastVertices::changes, "The hull's number of changes when they were taken; -1 before that.");
+  nb::class_<VertexTaker>(module, "VertexTaker", "Takes the vertices of a hull where a sign of it is as it was.")
+      .def("take", &VertexTaker::take, "Take them, and say whether that was so. O(h log n), or O(h²) of few.");
 }
 
 void add_hull_tree(nb::module_& module) {

@@ -15,7 +15,7 @@ struct Interval {
   double low, high;
 };
 
-// Between vertices, counter-clockwise; at least three.
+// Between vertices, counter-clockwise; at least three, for the diameter two.
 class Measured {
  public:
   explicit Measured(std::span<const Point> vertices) : vertices_(vertices) {
@@ -119,7 +119,8 @@ class Measured {
 // The sign, or nothing where rounding might decide: first by the box around the vertices, then by themselves, unless
 // that would take long. O(h), or O(h²) of few vertices. `measure` is the first letter of area, diameter or width.
 inline std::optional<int> certain_sign(std::span<const Point> vertices, char measure, double bound) {
-  if (vertices.size() < 3) return std::nullopt;
+  // Of a point or a segment nothing is rounded: it has neither area nor width, and a point no diameter.
+  if (vertices.size() < (measure == 'd' ? 2 : 3)) return bound > 0 ? -1 : 0;
   const Measured hull(vertices);
   if (!hull.safe()) return std::nullopt;
   const auto either = [&](Interval (Measured::*in_box)() const, Interval (Measured::*nearly)() const, bool possible,

@@ -51,13 +51,32 @@ class Quiet:
     Args:
         line: the alarms.
         part: makes the part of a trip that concerns them, once one may have something to say.
+
+    Attributes:
+        line, part: as given.
+        restless: whether a batch may mean something that leaves the outline as it is.
     """
 
-    __slots__ = ("line", "part")
+    __slots__ = ("_stills", "line", "part", "restless")
 
     def __init__(self, line: "Line", part: "Callable[[Line, Trip], FencePart]") -> None:
         self.line = line
         self.part = part
+        self.restless = line.restless > 0
+        self._stills: dict[str, list[Callable[[], bool]]] = {}
+
+    def still(self, hull: Hull) -> bool:
+        """Whether a change of a hull's outline means nothing for the alarms: as a rule so; if unsure, it says no."""
+        name = hull.row.name
+        stills = self._stills.get(name)
+        if stills is None:
+            stills = self._stills[name] = self.line.stills(name)
+        for still in stills:
+            if not still():
+                break
+        else:
+            return True
+        return False
 
     def look_again(self, names: Iterable[str]) -> None:
         """Look at hulls as the storage has them, after a commit that failed."""
@@ -228,8 +247,10 @@ class Trip:
             expired = partial(self._expired_before, hull, request.write.arrived)
         applied = write(request, hull, self._now, leg.records, expired)
         self.torn = hull.state.torn
-        fences = self.fences
-        if self.quiet is not None and (applied is None or applied.hull_changed or self.quiet.line.restless):
+        fences, quiet = self.fences, self.quiet
+        if quiet is not None and (
+            applied is None or quiet.restless or (applied.hull_changed and not quiet.still(hull))
+        ):
             fences = self._fences_at(hull, request.write.arrived)
         if fences is not None:
             fences.wrote(leg, hull, applied, request.write.arrived)

@@ -56,6 +56,23 @@ def counted(monkeypatch: pytest.MonkeyPatch, counts: "Counter[str]", where: Any,
     monkeypatch.setattr(where, name, count)
 
 
+def takes_counted(monkeypatch: pytest.MonkeyPatch, counts: "Counter[str]") -> None:
+    """Count what takes vertices where nothing has happened, and how often it is asked."""
+    taker = LastVertices.taker
+
+    def make(*args: Any) -> "Callable[[], bool]":
+        take = taker(*args)
+        counts["takers"] += 1
+
+        def taking() -> bool:
+            counts["takes"] += 1
+            return take()
+
+        return taking
+
+    monkeypatch.setattr(LastVertices, "taker", make)
+
+
 @pytest.mark.parametrize("prefix", [False, True])
 @pytest.mark.parametrize("measure", ["area", "diameter", "width", "perimeter", "vertices"])
 def test_a_batch_that_leaves_the_outline_costs_nothing(
@@ -68,8 +85,8 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     rule = AlarmRule(f"{measure} > 1000", f"{measure} <= 1000")
     for kind, subjects in [("prefix", "fleet/")] if prefix else [("other", hull) for hull in HULLS]:
         step(core, CreateFence(None, marked(subjects), 1, FenceConfig(rule, kind, subjects), CREATED))
-    looked = "take_if" if measure in EXACT else "holds"
-    counted(monkeypatch, counts, LastVertices if measure in EXACT else watched, looked)
+    takes_counted(monkeypatch, counts)
+    counted(monkeypatch, counts, watched, "holds")
     counted(monkeypatch, counts, watched, "compare")
     counted(monkeypatch, counts, watched.Watched, "touched")
     counted(monkeypatch, counts, _comparison, "_sign")
@@ -81,7 +98,8 @@ def test_a_batch_that_leaves_the_outline_costs_nothing(
     for number in range(BATCHES):
         step(core, moved(HULLS[0], {"c": (4, 4 + number)}))
     exactly = 0 if dynhull.KERNEL == "cpp" or measure not in ("diameter", "width") else BATCHES
-    assert counts == Counter({"touched": BATCHES, looked: BATCHES}) + Counter(_sign=exactly)
+    looks = Counter(takers=1, takes=BATCHES) if measure in EXACT else Counter(touched=BATCHES, holds=BATCHES)
+    assert counts == looks + Counter(_sign=exactly)
     step(core, moved(HULLS[0], {"e": (2, -1)}))
     line = core.line(HULLS[0])
     assert line is not None

@@ -1,6 +1,6 @@
 """An alarm at its hulls: for which it is raised, and when time decides something there."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING
 
@@ -50,6 +50,8 @@ class Watched:
         "_last",
         "_rule",
         "_seen",
+        "_still",
+        "_still_for",
         "fresh",
         "hull",
         "moved",
@@ -71,14 +73,17 @@ class Watched:
         exact = rule.raises.measure in EXACT and not self._geographic
         # Of a measure that is compared exactly, which has only vertices; what is seen for others is in `_seen`.
         self._last = LastVertices() if exact else None
-        self._seen = NOTHING
+        self._still: Callable[[], bool] | None = None
+        self._still_for: tuple[object, object] = (None, None)
+        self._seen, self._as_of = NOTHING, NEVER
         self._look()
 
     def _look(self) -> None:
-        self._as_of = self._changes()
         if self._last is not None:
             self._last.take(self.hull.state.hull)
-        elif not self._rule.silence:
+            return
+        self._as_of = self._changes()
+        if not self._rule.silence:
             self._seen = self._now()
 
     def _now(self) -> Seen:
@@ -121,16 +126,37 @@ class Watched:
 
     def changed(self) -> Seen | None:
         """What was seen of the hull before, if it has changed since this was last asked; else None."""
-        if self._as_of == self._changes():
+        if self._last is not None:
+            unchanged = self._last.changes == self.hull.state.hull.changes
+        else:
+            unchanged = self._as_of == self._changes()
+        if unchanged:
             return None
         before = self._noted()
         self._look()
         return before
 
+    @property
+    def still(self) -> Callable[[], bool] | None:
+        """What is asked after a change of the outline, of a measure that is compared exactly; None for others.
+
+        It takes note of the change and says yes where that certainly changes nothing for the alarm; no: perhaps. It is
+        the same until the alarm is raised or cleared for the hull, or waits, or the hull is read anew.
+        """
+        last = self._last
+        if last is None or self.fresh:
+            return None
+        hull, steady = self.hull.state.hull, self._rule.steady[2 if self.raised else self.waits]
+        as_of, of = self._still_for
+        if as_of is not hull or of is not steady:
+            self._still, self._still_for = last.taker(hull, *steady), (hull, steady)
+        return self._still
+
     def touched(self, now: int) -> bool:
         """Whether a new revision of the hull changes anything for the alarm; takes note of it if it does not."""
-        if self._last is not None and not self.fresh:
-            return self._crossed(self._last)
+        still = self.still
+        if still is not None:
+            return self._crossed(still)
         if self.fresh or self._as_of == self._changes():
             return self.fresh
         rule, before = self._rule, self._seen
@@ -145,19 +171,16 @@ class Watched:
             self._as_of, self._seen = NEVER, before
         return changes
 
-    def _crossed(self, last: LastVertices) -> bool:
-        """As `touched`, for a measure that is compared exactly: what is done after most changes of outlines."""
-        hull = self.hull.state.hull
-        changes = hull.changes
-        if changes == self._as_of[0]:
+    def _crossed(self, still: Callable[[], bool]) -> bool:
+        """As `touched`, for a measure that is compared exactly."""
+        hull, last = self.hull.state.hull, self._last
+        assert last is not None  # of such a measure
+        if last.changes == hull.changes or still():
             return False
         measure, bound, least, most = self._rule.steady[2 if self.raised else self.waits]
-        if not last.take_if(hull, measure, bound, least, most):
-            if not least <= compare(hull.vertices(), measure, bound) <= most:
-                self._as_of = NEVER  # `changed` says what was before
-                return True
-            last.take(hull)
-        self._as_of = changes, 0
+        if not least <= compare(hull.vertices(), measure, bound) <= most:
+            return True  # `changed` says what was before
+        last.take(hull)
         return False
 
     def doubt(self) -> None:

@@ -96,18 +96,17 @@ class FenceCore:
         line, hulls = queues[0].line, self._registry.hulls
         if line is None or len(queues) > 1 or not line.has_only_alarms:
             return None
+        names = [request.write.name for request in requests if type(request) is WriteBatch]
+        if len(names) < len(requests):
+            return None
         legs: dict[str, Leg] = {}
         weight = 0
-        for request in requests:
-            if type(request) is not WriteBatch:
+        for name in dict.fromkeys(names):
+            hull = hulls.get(name)
+            if hull is None:
                 return None
-            name = request.write.name
-            if name not in legs:
-                hull = hulls.get(name)
-                if hull is None:
-                    return None
-                weight += line.weight(name)
-                legs[name] = Leg(name, hull, keeps=self._keeps)
+            weight += line.weight(name)
+            legs[name] = Leg(name, hull, keeps=self._keeps)
         if weight > QUIET_WEIGHT:
             return None
         trip = Trip(legs, requests, now, pause, {})

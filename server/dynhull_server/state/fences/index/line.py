@@ -1,6 +1,6 @@
 """The fences of hulls that share a queue: what a change of one of these hulls means for them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from dynhull import Crossings
@@ -153,6 +153,16 @@ class Line:
                         found = True  # the others take note of the revision, too
         return found
 
+    def stills(self, name: str) -> list[Callable[[], bool]]:
+        """What is asked of the alarms at a hull after each change of its outline, as long as all say yes."""
+        found = []
+        for _, watched in self.watching((name,)):
+            still = watched.still
+            if still is None:
+                return [never]
+            found.append(still)
+        return found
+
     def watching(self, names: Iterable[str]) -> Iterator[tuple[Fence, Watched]]:
         """What alarms compare after a change of the hulls with these names; something may come several times."""
         for name in names:
@@ -269,6 +279,11 @@ class Line:
             crossings = subjects.take()
             if len(crossings):
                 yield subjects, crossings
+
+
+def never() -> bool:
+    """What is asked of alarms that must look at each change."""
+    return False
 
 
 def _is_restless(fence: Fence) -> bool:
