@@ -2,12 +2,14 @@
 
 import gzip
 import json
+import os
 import shutil
+import signal
 import subprocess
 import tarfile
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -260,6 +262,48 @@ def test_a_page_with_a_live_hull(gateway: Gateway, server: MortalServer, tmp_pat
         assert errors == []
         seen.close()
     assert sum(len(gzip.compress(each)) for each in loaded) <= ONE_SCRIPT
+
+
+def signalled(processes: list[int], what: signal.Signals) -> None:
+    for each in processes:
+        with suppress(ProcessLookupError):
+            os.kill(each, what)
+
+
+def test_a_page_that_slept_goes_on(server: MortalServer, tmp_path: Path) -> None:
+    """A page whose processes stood still, while both the server and the gateway were killed, shows what is now."""
+    name, port = "typescript/index.html", free_port()
+    with ExitStack() as stack:
+        gateway = stack.enter_context(
+            gateway_process(server.address, "--port", str(port), "--origin", "*", killed=True)
+        )
+        url = stack.enter_context(served(tmp_path, gateway, "index.html"))
+        client = stack.enter_context(HullClient(server.address))
+        browser = stack.enter_context(chromium())
+        client.create_hull(name, exist_ok=True)
+        revision = client.get_hull(name).revision
+        seen, errors = watched(browser)
+        seen.goto(url)
+        client.apply(name, insert=[(0, 0), (8, 0), (8, 3)])
+        seen.wait_for_function(f"document.title.startsWith('revision {revision + 1}:')")
+        about = browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
+        renderers = [each["id"] for each in about if each["type"] == "renderer"]
+        assert renderers
+        stack.callback(signalled, renderers, signal.SIGCONT)
+        signalled(renderers, signal.SIGSTOP)
+        assert gateway.process is not None
+        gateway.process.kill()
+        gateway.process.wait(PATIENCE)
+        server.kill()
+        server.start()
+        client.apply(name, insert=[(0, 30)])
+        stack.enter_context(gateway_process(server.address, "--port", str(port), "--origin", "*"))
+        signalled(renderers, signal.SIGCONT)
+        seen.wait_for_function(f"document.title.startsWith('revision {revision + 2}:')")
+        assert seen.locator("polygon").get_attribute("points") == "0,0 8,0 8,3 0,30"
+        assert errors == []
+        seen.close()
+        client.delete_hull(name)
 
 
 # The share of the pixels of the map that have about the colour.
