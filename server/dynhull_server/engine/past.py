@@ -25,7 +25,7 @@ from ..state.errors import (
 from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
-from ..state.records import CommitStamp, Keys, Record
+from ..state.records import CommitStamp, Kept, Keys, Record
 from ..state.root_state import state_of
 from ..state.tracks import Moves, Tracker
 from ..storage.past import Erasure, Hole, Moment, Past, created
@@ -44,6 +44,8 @@ Place = Callable[[], AbstractContextManager[None]]
 OUTLINED_ROWS, OUTLINED_BYTES = 2**15, 2**20
 # Rebuilt hulls that are kept for further reads, and the batches that are always applied to one rather than begin anew.
 MOST_KEPT, NEAR = 4, 1024
+# Reads of batches while a stored state is built: to build one of a million keys takes about as long.
+AHEAD = 4
 
 
 @dataclass(slots=True, eq=False)
@@ -298,8 +300,10 @@ class PastHulls:
         while rebuilt is None or rebuilt.state.counts.revision < revision:
             try:
                 if rebuilt is None:
-                    ahead = []
-                    rebuilt = await self._begin(hull, revision)
+                    rebuilt, read = await self._begin(hull, revision)
+                    if isinstance(read, NotStoredError):
+                        raise read
+                    ahead = read
                 else:
                     ahead = await self._step(rebuilt, ahead, revision)
             except _ErasedMeanwhileError:
@@ -313,33 +317,59 @@ class PastHulls:
                 rebuilt = None  # what followed it has been dropped meanwhile: a newer state leads there
         return rebuilt
 
-    async def _begin(self, hull: Hull, revision: int) -> _Rebuilt:
-        """The newest stored state at or before a revision."""
+    async def _begin(self, hull: Hull, revision: int) -> tuple[_Rebuilt, list[Record] | NotStoredError]:
+        """The newest stored state at or before a revision, and some batches after it, read while it is built.
+
+        Or why these cannot be read.
+        """
         number, round_ = hull.row.number, self._round
 
-        def begin() -> _Rebuilt:
+        def stored() -> tuple[tuple[Erasure, ...], Kept]:
             erasures = self._past.erasures(number)
             kept = self._past.state(number, revision)
-            rows = len(kept.contents)
-            self._require_room(rows)
+            self._require_room(len(kept.contents))
             if not kept.revision:
                 kept.committed = created(hull.row)
-            state = state_of(self._driver.limits, hull.row.settings, kept, self._driver.machine.clock.monotonic())
-            return _Rebuilt(hull, state, rows, erasures, round_)
+            return erasures, kept
 
-        rebuilt: _Rebuilt = await self.ask(hull.name, begin)
-        return rebuilt
+        erasures, kept = await self.ask(hull.name, stored)
+
+        def build() -> _Rebuilt:
+            state = state_of(self._driver.limits, hull.row.settings, kept, self._driver.machine.clock.monotonic())
+            return _Rebuilt(hull, state, len(kept.contents), erasures, round_)
+
+        def read() -> list[Record]:
+            found: list[Record] = []
+            after = kept.revision
+            for _ in range(AHEAD if after < revision else 0):
+                found += self._gathered(number, after, revision, erasures)
+                after = found[-1].revision
+                if after >= revision:
+                    break
+            return found
+
+        works = [self.ask(hull.name, build), self.ask(hull.name, read)]
+        built: Any
+        records: Any
+        built, records = await asyncio.gather(*works, return_exceptions=True)
+        for each in (built, records):
+            if isinstance(each, BaseException) and not (each is records and isinstance(each, NotStoredError)):
+                raise each
+        return built, records
+
+    def _gathered(self, number: int, after: int, until: int, erasures: tuple[Erasure, ...]) -> list[Record]:
+        """What the next batches come to, for a state that was read when these were the erasures."""
+        found = self._past.gathered(number, after, until)
+        if self._past.erasures(number) != erasures:
+            raise _ErasedMeanwhileError
+        return found
 
     async def _step(self, rebuilt: _Rebuilt, records: list[Record], revision: int) -> list[Record]:
         """Apply the next batches, those that have been read if there are some. Returns others, read meanwhile."""
         state, name = rebuilt.state, rebuilt.hull.name
 
         def read(after: int) -> list[Record]:
-            number = rebuilt.hull.row.number
-            found = self._past.gathered(number, after, revision)
-            if self._past.erasures(number) != rebuilt.erasures:
-                raise _ErasedMeanwhileError
-            return found
+            return self._gathered(rebuilt.hull.row.number, after, revision, rebuilt.erasures)
 
         if not records:
             records = await self.ask(name, partial(read, state.counts.revision))
