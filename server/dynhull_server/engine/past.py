@@ -130,24 +130,26 @@ class PastHulls:
             MomentForgottenError: that time is before the oldest that is kept, or later than now.
         """
         self._require_past(live)
-        found = await self._moment(live, revision, time, field)
-        erasures = await self.ask(live.name, partial(self._past.erasures, live.number))
+        found, erasures = await self._moment(live, revision, time, field)
         return replace(found, erased=any(each.concerns(found.revision) for each in erasures))
 
-    async def _moment(self, live: LiveHull, revision: int | None, time: int, field: str) -> Moment:
-        number, newest = live.number, live.counts.revision
+    async def _moment(
+        self, live: LiveHull, revision: int | None, time: int, field: str
+    ) -> tuple[Moment, tuple[Erasure, ...]]:
+        """The revision, and the erasures of the hull."""
+        number, newest, past = live.number, live.counts.revision, self._past
         if revision is None:
             await self._settled(time, field)
-            found: Moment | None = await self.ask(live.name, partial(self._past.moment, number, time))
+            found, erasures = await self.ask(live.name, lambda: (past.moment(number, time), past.erasures(number)))
             if found is None:
-                oldest = await self.ask(live.name, partial(self._past.oldest_moment, number, timed=True))
+                oldest = await self.ask(live.name, partial(past.oldest_moment, number, timed=True))
                 at = None if oldest.committed is None else oldest.committed.time
                 raise MomentForgottenError(time, oldest.revision, at, live.counts.revision, f"{field}time")
-            return found
-        oldest = await self.oldest(live)
+            return found, erasures
+        oldest, erasures = await self.ask(live.name, lambda: (past.oldest_moment(number), past.erasures(number)))
         if not oldest.revision <= revision <= newest:
             raise _forgotten(newest, revision, oldest, f"{field}revision")
-        return Moment(revision, None)
+        return Moment(revision, None), erasures
 
     async def oldest(self, live: LiveHull) -> Moment:
         """The oldest revision of a hull that can be read, or raise HullUnsuitableError if it has no past."""
