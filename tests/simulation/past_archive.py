@@ -26,8 +26,8 @@ from .machine import SimulatedThreads, reading_ahead
 # Where the disk may fail, or the server be killed: before a file is written, where a part of it is there, and where it
 # is there, and nobody knows; before a file is read; before the files of a segment are removed, and between them.
 FILE_PLACES = ("file", "part", "filed", "fetch", "unlink", "unlinked")
-# Where the store may: before it has a call, and where it has carried it out, and nobody knows.
-STORE_PLACES = ("call", "call", "answer")
+# Where the store may: before it has a call, or is sent a file, and where it has carried it out, and nobody knows.
+STORE_PLACES = ("call", "call", "send", "send", "answer")
 
 # What may have become of a file: a bit of it is another one, half of it is there, it is away, or another file is in its
 # place.
@@ -151,12 +151,19 @@ class FaultyStore(objects.ObjectArchive):
     def __init__(self, store: Store, most_bytes: int, at: At, give_way: Callable[[], None]) -> None:
         super().__init__("s3://bucket", most_bytes)
         self._kept, self._at, self._give_way = store, at, give_way
+        self._sends = False
         self._made = _FileSystem(store, self.path)  # type: ignore[assignment]
         self._damaged = 0
 
+    def write(self, file: str, content: bytes) -> Written:
+        """Write an object."""
+        self._sends = True
+        return super().write(file, content)
+
     def _ask(self, what: str, function: Callable[[], Any], size: int = 0) -> Any:
         del size
-        kind = self._at("call")
+        sends, self._sends = self._sends, False
+        kind = self._at("send" if sends else "call")
         self._kept.called()
         if kind == "late":
             self._kept.late.append((self._kept.clock() + LATER, lambda: _forgotten(function)))

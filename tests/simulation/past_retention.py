@@ -32,8 +32,10 @@ def may_go(hulls: Iterable[HullRows], hull: HullRows, segment: StoredSegment, no
 
 
 def all_may_stay(hulls: Iterable[HullRows], now: int, most_bytes: int) -> bool:
-    """Whether nothing has to go any more."""
+    """Whether nothing has to go any more, and everything can be read."""
     filed = [each for each in hulls if each.segments]
+    if not all(each.segments[0].begins for each in filed):
+        return False
     if most_bytes and sum(map(_bytes, (each.segments for each in filed))) > most_bytes:
         return False
     return not any(_must_go(hull, place, now) for hull in filed for place in range(len(hull.segments)))

@@ -148,7 +148,5 @@ def oldest_of_all(hulls: Mapping[int, HullRows], most_bytes: int) -> Iterator[tu
 
 def run_from_start(hull: HullRows, count: int) -> int:
     """The number of segments, at least so many, after which the others begin with a state, or there are none."""
-    if not count:
-        return 0
     rest = range(count, len(hull.segments))
     return next((place for place in rest if hull.segments[place].begins), len(hull.segments))
