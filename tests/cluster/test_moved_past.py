@@ -17,6 +17,8 @@ NAMES = [f"{first}/fleet" for first in "abcd"]
 KEYS = [f"vehicle {i}" for i in range(20)]
 QUIET = ("--scrub-cpu", "0", "--log-level", "error", "--snapshot-points", "100")
 SERVED = "SELECT count(*) FROM owners WHERE until > '-infinity' AND address <> '' GROUP BY worker"
+CLOSING = "SELECT count(*) FROM segments WHERE hull = 0"  # files that are named, and belong to no segment yet
+MOVES = 4
 EACH = 7  # batches between two looks
 
 
@@ -76,6 +78,41 @@ def test_owners_that_come_and_go_leave_the_past_whole(postgres: PostgreSQL, tmp_
             last = write(other, other.history(NAMES[0]).batches + 1)
             first.process.wait()
             check(other, last)
+
+
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_partition_that_moves_again_and_again_while_segments_close_keeps_the_past(
+    postgres: PostgreSQL, tmp_path: Path
+) -> None:
+    url = postgres.new_database()
+    options = "--cluster", "--partitions", "1", "--journal", url, "--history-dir", str(tmp_path), *QUIET
+    with (
+        server_process(*options) as first,
+        server_process(*options) as second,
+        HullClient(first.address, retries=1000) as client,
+        HullClient(second.address, retries=1000) as other,
+    ):
+        for name in NAMES:
+            client.create_hull(name, keyed="str", history=True)
+        wait_until(lambda: len(query(url, "SELECT worker FROM workers")) == 2)
+        last = 0
+
+        def closes() -> bool:
+            nonlocal last
+            last += 1
+            for name in NAMES:
+                client.put(name, KEYS, positions(last), producer="p", sequence=last)
+            return query(url, CLOSING)[0][0] > 0
+
+        for _ in range(MOVES):
+            wait_until(closes)
+            ((owner,),) = query(url, "SELECT worker FROM owners")
+            (target,) = {name for (name,) in query(url, "SELECT worker FROM workers")} - {owner}
+            assert dynhull("cluster", "move", "0", target, "--journal", url).exit_code == 0
+            wait_until(lambda target=target: query(url, "SELECT worker FROM owners") == [(target,)])
+        last = write(other, other.history(NAMES[0]).batches + 1)
+        check(client, last)
+        check(other, last)
 
 
 @with_all_cases
