@@ -52,6 +52,12 @@ def javascript() -> Path:
     return JAVASCRIPT
 
 
+def axe() -> str:
+    """The script of axe-core, which finds what people with other senses cannot use of a page."""
+    script = JAVASCRIPT / "node_modules" / "axe-core" / "axe.min.js"
+    return script.read_text("utf-8") if script.exists() else missing("axe-core", "run `make peers`")
+
+
 def typescript() -> Path:
     """The folder of the TypeScript package, with the npm packages that it needs."""
     if not (TYPESCRIPT / "node_modules" / "typescript").is_dir():

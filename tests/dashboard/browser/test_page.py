@@ -710,7 +710,7 @@ def test_axes_of_different_units_have_scales_of_their_own(
         dashboard_process(server[0].address, "--x-unit", "ms", "--y-unit", "USD") as url,
         opened(browser, url, name) as page,
     ):
-        expect(page.get_by_role("columnheader", name="Area (ms by USD)")).to_be_visible()
+        expect(page.locator("td[data-heading='Area (ms by USD)']")).to_be_visible()
         page.wait_for_function(f"() => ({heights})() > 300")
         page.get_by_label("Same scale for x and y").check()
         page.wait_for_function(f"() => ({heights})() < 10")
@@ -723,7 +723,7 @@ def test_series_of_the_server_have_no_hulls_colour(browser: Browser, url: str, h
         colours = page.evaluate(
             "time_lines.lines(['updates', 'mean', 'percentile'].slice(0, 2)).map(({colour}) => colour)"
         )
-        assert colours == ["#7d8590"] * 2
+        assert colours == ["#656C76"] * 2
 
 
 def test_a_server_that_is_killed_and_comes_back(browser: Browser, tmp_path: Path) -> None:

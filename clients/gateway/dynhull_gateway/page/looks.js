@@ -4,9 +4,7 @@ export { FENCE_LOOKS }
 // Colours come again with another line and another marker.
 const AGAIN = [[[2, 2], "diamond"], [[16, 3, 2, 3], "hex"], [[6, 2], "inverted_triangle"], [[3, 6], "square"]]
 export const LOOKS = [...HULL_LOOKS, ...AGAIN.map(([dash, marker], row) => ({colour: HULL_LOOKS[row].colour, dash, marker}))]
-// On the dark page those whose contrast with it is below 4.5:1 are lighter.
-export const ON_DARK = {"#0072B2": "#3D9BE0", "#D55E00": "#EE7A2E", "#009E73": "#1FB98A", "#9b5de5": "#BB8CFF", "#7d8590": "#9AA5B1"}
-// Series of the whole server belong to no hull. This grey has a contrast above 3:1 with the light and the dark page.
+// Series of the whole server belong to no hull.
 export const NEUTRAL = "#7d8590", MEAN = {colour: NEUTRAL, dash: []}, PERCENTILE = {colour: NEUTRAL, dash: [6, 3]}
 export const INSIDE = {colour: FENCE_LOOKS[0].colour, dash: [], marker: "star"}
 const MARKERS = {
@@ -20,10 +18,10 @@ const MARKERS = {
 }
 // The marker alone as SVG.
 export function symbol({colour, marker}) {
-  return `<svg width="16" height="16" viewBox="12 0 16 16" fill="${colour}" aria-hidden="true">${MARKERS[marker]}</svg>`
+  return `<svg viewBox="12 0 16 16" fill="${colour}" aria-hidden="true">${MARKERS[marker]}</svg>`
 }
 // The line and the marker of a hull as SVG, for a legend.
 export function key({colour, dash, marker}) {
-  return `<svg width="40" height="16" fill="${colour}" aria-hidden="true"><path d="M0 8h40" stroke="${colour}" `
+  return `<svg viewBox="0 0 40 16" fill="${colour}" aria-hidden="true"><path d="M0 8h40" stroke="${colour}" `
     + `stroke-width="2" stroke-dasharray="${dash.join(" ")}"/>${MARKERS[marker] ?? ""}</svg>`
 }

@@ -4,12 +4,17 @@ import { Hands, ZOOM_STEP } from "./dynhull/map/hands.js"
 import { Picture, read_extent } from "./dynhull/map/picture.js"
 import { Alarms } from "./alarms.js"
 import { find, put, settings } from "./dom.js"
+import { Drawers } from "./drawers.js"
 import { Events } from "./events.js"
 import { Finder, show_lines } from "./finder.js"
-import { FENCE_LOOKS, INSIDE, LOOKS, MEAN, NEUTRAL, ON_DARK, PERCENTILE, key, symbol } from "./looks.js"
+import { lit as lit_at, shades } from "./dynhull/map/looks.js"
+import { FENCE_LOOKS, INSIDE, LOOKS, MEAN, NEUTRAL, PERCENTILE, key, symbol } from "./looks.js"
+import { Kiosk } from "./kiosk.js"
+import { Night } from "./night.js"
 import { Picker, best_match } from "./picker.js"
 import { Recorder } from "./recorder.js"
 import { SAVES } from "./saving.js"
+import { Sound } from "./sound.js"
 import { ServerMetrics } from "./sources/server_metrics.js"
 import { Viewer } from "./sources/viewer.js"
 import { TimeBar } from "./time_bar.js"
@@ -20,10 +25,10 @@ const ASK_MILLISECONDS = 150
 const PATIENT = 3600, IMPATIENT = 5
 const SAID = ["description", "table", "many_table", "fence_table", "outliers"], PAGE = ""
 const query = new URLSearchParams(location.search)
-const state = {hulls: [], prefixes: [], fences: [], offered: [], offered_fences: [], kept: [], alarms: [], raised: 0, alarm_trouble: "", banner: "", sought: "", found: [], outliers: [],
+const state = {hulls: [], prefixes: [], fences: [], offered: [], offered_fences: [], kept: [], alarms: [], raised: 0, figures: {}, all_prefixes: [], alarm_trouble: "", banner: "", sought: "", found: [], outliers: [],
   places: []}
-const is_dark = matchMedia("(prefers-color-scheme: dark)")
-const lit = colour => is_dark.matches ? ON_DARK[colour] ?? colour : colour
+const night = new Night(find("[name=look]"), query.get("look"), change_look)
+const lit = colour => lit_at(colour, night.is_now)
 const picture = new Picture(find(".map"), {x_unit: settings.units.x, y_unit: settings.units.y, tiles: settings.tiles, coasts: `${settings.files}/vendor/`})
 const finder = new Finder(picture, query.get("key") ?? "", sought => {
   ask({sought})
@@ -31,6 +36,8 @@ const finder = new Finder(picture, query.get("key") ?? "", sought => {
 })
 const events = new Events(key => finder.seek(key))
 const alarms = new Alarms(find(".alarms"), ask)
+const sound = new Sound(find("[name=sound]"), query.has("sound"), find(".silenced"), wanted => keep_in_address("sound", wanted ? ["1"] : []))
+const kiosk = query.has("kiosk") ? new Kiosk(state, query, ask) : undefined
 let time_bar, asking, viewer, unreached = false
 const recorder = new Recorder(show_drawing, () => {
   picture.live = recorder.live
@@ -108,6 +115,8 @@ function update({kind: _, ...changes}) {
   Object.assign(state, changes)
   if (changes.alarms || changes.raised != undefined || changes.alarm_trouble != undefined)
     alarms.show(state.alarms, state.raised, state.alarm_trouble)
+  if (changes.raised != undefined) sound.take(state.raised)
+  kiosk?.show()
   if (changes.kept || changes.hulls)
     time_bar.keep(state.kept.map(each => ({...each, colour: lit(state.hulls.find(({name}) => name == each.hull)?.colour)})))
   if (changes.hulls || changes.fences || changes.prefixes) show_picked()
@@ -139,12 +148,16 @@ function show_looks() {
   time_lines.keep(hulls)
   time_lines.server_colour = lit(NEUTRAL)
 }
-is_dark.addEventListener("change", show_looks)
+function change_look() {
+  keep_in_address("look", night.chosen ? [night.chosen] : [])
+  show_looks()
+  picture.draw_all()
+}
 const pickers = [
   {form: ".hulls", noun: "hull", most: LOOKS.length, offered: "offered", picked: {hull: "hulls", prefix: "prefixes"}},
   {form: ".fences", noun: "fence", most: FENCE_LOOKS.length, offered: "offered_fences", picked: {fence: "fences"}},
 ].map(each => new Picker(each, state, ask, keep_in_address))
-find(".verify button").onclick = () => ask({verify: true})
+find("[name=verify]").onclick = () => ask({verify: true})
 find("[name=save]").onchange = ({target}) => {
   SAVES[target.value](picture, new Date(recorder.moment).toISOString())
   target.value = ""
@@ -186,10 +199,11 @@ find(".time").onsubmit = event => event.preventDefault()
 find(".attribution").textContent = settings.tiles.attribution
 const symbols = [symbol(INSIDE), key(MEAN), key(PERCENTILE)]
 document.querySelectorAll(".symbol").forEach((each, row) => each.innerHTML = symbols[row])
-const dark = new CSSStyleSheet(), lighter = Object.entries(ON_DARK).map(([colour, light]) => `[fill="${colour}"] { fill: ${light}; } [stroke="${colour}"] { stroke: ${light}; }`)
-dark.replaceSync(`@media (prefers-color-scheme: dark) { ${lighter.join(" ")} }`)
-document.adoptedStyleSheets.push(dark)
+const sheet = new CSSStyleSheet()
+sheet.replaceSync(shades().map(([colour, day, night]) => `[fill="${colour}"] { fill: light-dark(${day}, ${night}); } [stroke="${colour}"] { stroke: light-dark(${day}, ${night}); }`).join(" "))
+document.adoptedStyleSheets.push(sheet)
+new Drawers(find(".page"), query.get("drawers"), open => keep_in_address("drawers", open))
 picture.wanted = read_extent(query.get("view"))
 picture.moved_to = extent => keep_in_address("view", extent ? [extent.map(each => +each.toPrecision(12)).join()] : [])
-Object.assign(globalThis, {picture, recorder, time_bar, time_lines, events, best_match})  // for who looks in by the console
+Object.assign(globalThis, {sound, picture, recorder, time_bar, time_lines, events, best_match})  // for who looks in by the console
 begin(null)

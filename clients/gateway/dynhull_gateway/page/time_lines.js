@@ -1,6 +1,6 @@
 // The time lines: one small plot per quantity, all with the same time.
 import { FONT } from "./dynhull/map/boxes.js"
-import { MOST_RATIO, compact, ticks } from "./dynhull/map/picture.js"
+import { FONT_PIXELS, MOST_RATIO, compact, ticks } from "./dynhull/map/picture.js"
 const SHOWN_MILLISECONDS = 60 * 60_000, OPENING_MILLISECONDS = 10_000, LINE_LEFT = 46, LINE_TOP = 8, LINE_BOTTOM = 20, ROOM_ABOVE = 1.15
 const TIME_STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600].map(seconds => 1000 * seconds), WHOLE_SERVER = ""
 export class TimeLines {
@@ -15,7 +15,6 @@ export class TimeLines {
       new ResizeObserver(() => this.draw_soon()).observe(element)
       element.addEventListener("pointermove", event => element.title = this.at(element, event))
     }
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw_soon())
   }
   keep(looks) {
     this.looks = new Map(looks.map(look => [look.name, look]))
@@ -55,11 +54,13 @@ export class TimeLines {
     return [Math.min(end - OPENING_MILLISECONDS, ...times), end]
   }
   draw({element, columns}) {
-    const width = element.clientWidth, height = element.clientHeight, ratio = Math.min(MOST_RATIO, devicePixelRatio)
-    if (!width || !height) return
-    if (element.width != Math.round(width * ratio)) element.width = width * ratio
-    if (element.height != Math.round(height * ratio)) element.height = height * ratio
+    const {clientWidth, clientHeight} = element, pixels = Math.min(MOST_RATIO, devicePixelRatio)
+    if (!clientWidth || !clientHeight) return
+    if (element.width != Math.round(clientWidth * pixels)) element.width = clientWidth * pixels
+    if (element.height != Math.round(clientHeight * pixels)) element.height = clientHeight * pixels
     const canvas = element.getContext("2d"), style = getComputedStyle(element), lines = this.lines(columns)
+    const enlarged = parseFloat(style.fontSize) / FONT_PIXELS, ratio = pixels * enlarged
+    const [width, height] = [clientWidth, clientHeight].map(each => each / enlarged)
     canvas.setTransform(ratio, 0, 0, ratio, 0, 0)
     canvas.clearRect(0, 0, width, height)
     const [begin, end] = this.span()
@@ -105,7 +106,8 @@ export class TimeLines {
   // The figures at the pointer.
   at(element, {offsetX}) {
     const {columns} = this.plots.find(plot => plot.element == element), [begin, end] = this.span()
-    const time = begin + (offsetX - LINE_LEFT) / (element.clientWidth - LINE_LEFT - 4) * (end - begin)
+    const enlarged = parseFloat(getComputedStyle(element).fontSize) / FONT_PIXELS
+    const time = begin + (offsetX / enlarged - LINE_LEFT) / (element.clientWidth / enlarged - LINE_LEFT - 4) * (end - begin)
     return this.lines(columns).map(({name, times, values}) => {
       const row = times.findLastIndex(each => each <= time)
       return `${name}: ${shown_value(values[row])}`

@@ -4,7 +4,7 @@ import { place_words } from "./picture.js"
  * @typedef {import("./views.js").Point} Point
  * @typedef {{title: string, revision?: bigint | number}} Thing
  */
-export const PAN_STEP = 60, ZOOM_STEP = 1.4, NEAR = 12, WHEEL_PIXELS = 300, CLICK_PIXELS = 4
+export const PAN_STEP = 60, ZOOM_STEP = 1.4, NEAR = 12, WHEEL_PIXELS = 300, CLICK_PIXELS = 4, TIP_GAP = 14
 export class Hands {
   /** Where each pointer is. @type {Map<number, Point>} */
   pointers = new Map()
@@ -51,10 +51,10 @@ export class Hands {
     element.addEventListener("pointermove", event => this.pointers.has(event.pointerId) ? this.drag(event) : this.point(event))
     element.addEventListener("pointerleave", () => this.tip.hidden = true)
   }
-  /** @param {MouseEvent} event @returns {[number, number]} */
+  /** Where the pointer is in the picture, which is drawn larger where the text is. @param {MouseEvent} event @returns {[number, number]} */
   at(event) {
-    const {left, top} = this.picture.element.getBoundingClientRect()
-    return [event.clientX - left, event.clientY - top]
+    const {left, top} = this.picture.element.getBoundingClientRect(), {enlarged} = this.picture
+    return [(event.clientX - left) / enlarged, (event.clientY - top) / enlarged]
   }
   /** @param {number} factor */
   zoom(factor) {
@@ -86,9 +86,11 @@ export class Hands {
       element.textContent = line
       return element
     }))
-    const {width, height} = this.picture, {offsetWidth, offsetHeight} = this.tip
-    this.tip.style.left = `${Math.max(0, across + 14 + offsetWidth > width ? across - 14 - offsetWidth : across + 14)}px`
-    this.tip.style.top = `${Math.max(0, down + 14 + offsetHeight > height ? down - 14 - offsetHeight : down + 14)}px`
+    const {element: {clientWidth, clientHeight}, enlarged} = this.picture, {offsetWidth, offsetHeight} = this.tip
+    /** @param {number} at @param {number} size @param {number} room */
+    const beside = (at, size, room) => `${Math.max(0, at + TIP_GAP + size > room ? at - TIP_GAP - size : at + TIP_GAP)}px`
+    this.tip.style.left = beside(across * enlarged, offsetWidth, clientWidth)
+    this.tip.style.top = beside(down * enlarged, offsetHeight, clientHeight)
   }
   /** @param {number} across @param {number} down */
   nearest(across, down) {

@@ -30,6 +30,7 @@ import { EARTH_RADIUS, GlobeView, PlaneView, RADIAN } from "./views.js"
 export const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
   draw_accuracy, draw_rings]
 export const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
+export const FONT_PIXELS = 14  // of the text around a picture that is drawn at its own size
 export const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
 /** @param {CanvasRenderingContext2D} canvas @param {Picture} picture */
 export function draw_trails(canvas, picture) {
@@ -93,13 +94,15 @@ export class Picture {
     this.resize()
   }
   resize() {
-    const {clientWidth: width, clientHeight: height} = this.element
+    const {clientWidth, clientHeight} = this.element, pixels = Math.min(MOST_RATIO, devicePixelRatio)
+    this.enlarged = parseFloat(getComputedStyle(this.element).fontSize) / FONT_PIXELS
+    const [width, height] = [clientWidth, clientHeight].map(each => each / this.enlarged)
     this.width = width
     this.height = height
-    this.ratio = Math.min(MOST_RATIO, devicePixelRatio)
+    this.ratio = pixels * this.enlarged
     for (const canvas of this.canvases) {
-      canvas.width = width * this.ratio
-      canvas.height = height * this.ratio
+      canvas.width = clientWidth * pixels
+      canvas.height = clientHeight * pixels
     }
     const size = (/** @type {number} */ left, /** @type {number} */ bottom, /** @type {number} */ edge) => ({left, top: edge, width: Math.max(1, width - left - edge), height: Math.max(1, height - edge - bottom)})
     this.plane.resize(size(AXIS_LEFT, AXIS_BOTTOM, EDGE))

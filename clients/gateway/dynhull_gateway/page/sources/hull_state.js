@@ -15,7 +15,7 @@ export class HullState {
   // Nothing is known of it.
   reset() {
     this.followed = false  // whether an event has arrived since the hull was last missing
-    this.revision = this.points = this.vertices = 0
+    this.revision = this.points = this.vertices = this.moved = 0  // when, in milliseconds since 1970
     this.area = NaN  // of a geographic hull in square metres
     this.bounds = undefined
     this.center = null  // of a geographic hull
@@ -36,6 +36,8 @@ export class HullState {
   // An event that has its measures, and the copy that it has updated.
   take(event, copy) {
     this.followed = event.type != "deleted"
+    if (event.changed != null) this.moved = Number(event.changed) / 1000
+    else if (event.revision > this.revision) this.moved = Date.now()
     this.revision = Number(event.revision)
     this.points = event.points ?? 0
     if (event.type == "progress" || event.type == "deleted") return

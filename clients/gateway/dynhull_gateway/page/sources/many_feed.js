@@ -49,6 +49,8 @@ export class ManyFeed {
     this.failure = null
     if (type == "begin") this.#unseen = new Set(this.hulls.keys())
     for (const hull of hulls) {
+      // What comes later has moved just now, whatever the server's clock says.
+      hull.moved = this.complete ? Date.now() : Number(hull.changed ?? 0) / 1000
       this.hulls.delete(hull.hull)  // to the end
       this.hulls.set(hull.hull, hull)
       this.#unseen.delete(hull.hull)

@@ -14,6 +14,7 @@ import { is_present } from "./search.js"
 import { ServerList } from "./server_lists.js"
 // Text changes slower than the picture: nobody reads ten times a second.
 const TICK = 100, TICKS_OF_TEXT = 5, MOST_PREFIXES = 3, WHOLE_SERVER = ""
+const SILENT_SECONDS = 60
 const LINES = ["time", "points", "vertices", "area", "rate"], SERVER_LINES = ["time", "updates", "mean", "percentile"]
 export class Viewer {
   // `source` has the clients, the address and the prefix of the server, the units, and the settings of fences; `picked` is the query
@@ -41,6 +42,7 @@ export class Viewer {
     this.fences_untouched = !fences
     this.with_outliers = Boolean(picked.get("outliers"))
     this.sought = picked.get("key") ?? ""
+    this.silent_after = +picked.get("silent") > 0 ? +picked.get("silent") : SILENT_SECONDS
     this.pick_prefixes(prefixes)
     this.pick_fences(fences ?? [])
     this.pick_hulls(hulls ?? [])
@@ -197,6 +199,13 @@ export class Viewer {
     const looks = shown => [...shown].map(([name, {look}]) => ({name, key: key(look), ...look}))
     return {hulls: looks(this.hulls), fences: looks(this.fences), prefixes: looks(this.many)}
   }
+  // How many of the hulls shown move, and how many have not moved for long.
+  figures() {
+    const moved = new Map(this.feeds.map(({name, moved}) => [name, moved]))
+    for (const {feed} of this.many.values()) for (const {hull, moved: at} of feed.hulls.values()) moved.set(hull, at)
+    const since = Date.now() - 1000 * this.silent_after, moving = [...moved.values()].filter(at => at > since).length
+    return {moving, silent: moved.size - moving, silent_after: this.silent_after}
+  }
   // The words and the figures.
   text() {
     const {hull_list, fence_list, feeds, alarms, source: {address, units, fence_settings}} = this
@@ -209,6 +218,8 @@ export class Viewer {
       banner: hull_list.error ? about_server(address, hull_list.error) : about_metrics(this.metrics),
       alarms: alarms.rows,
       raised: alarms.raised,
+      figures: this.figures(),
+      all_prefixes: hull_list.prefixes(),
       alarm_trouble: this.alarm_trouble,
       kept: feeds.map(({kept}) => kept.message),
       note: about_picture(address, hull_list, feeds, fences, many),
