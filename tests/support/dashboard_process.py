@@ -23,6 +23,7 @@ PARTS = """async () => {
     const folder = document.querySelector("script[type=module]").src.replace(/[^/]*$/, "")
     const names = [
         ...["views", "picture", "hulls", "trails", "coasts"].map(name => `dynhull/map/${name}`), "recorder", "degrees",
+        "time_bar",
         ...["fence_area", "event_rows", "hull_state", "hull_feed", "server_metrics", "repeating"]
             .map(name => `sources/${name}`),
     ]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from dashboard_process import dashboard_process, opened, wait_for_vertices
+from dashboard_process import PARTS, dashboard_process, opened, wait_for_vertices
 from playwright.sync_api import Browser, Locator, Page, expect
 from server_process import Server, run, server_process
 
@@ -102,6 +102,37 @@ def test_the_slider_goes_over_all_that_is_kept(browser: Browser, url: str, clien
         wait_for_vertices(page, fleet, corners(5))
         expect(timer(page)).to_have_text("Live")
         expect(row(page, fleet)).not_to_contain_text("As it was")
+
+
+def test_the_link_keeps_the_moment(browser: Browser, url: str, client: HullClient, fleet: str) -> None:
+    with opened(browser, url, fleet) as page:
+        wait_for_vertices(page, fleet, corners(3))
+        # Each moment is that of its revision, to the microsecond.
+        for revision in (2, 3):
+            go(page, client, fleet, revision)
+            wait_for_vertices(page, fleet, corners(revision - 1))
+            page.wait_for_function(
+                "() => location.search.includes(`at=${encodeURIComponent(text_of(recorder.moment))}`)"
+            )
+            page.reload()
+            page.evaluate(PARTS)
+            wait_for_vertices(page, fleet, corners(revision - 1))
+            expect(page.get_by_role("button", name="Play", exact=True)).to_be_visible()
+        page.get_by_role("button", name="To now").click()
+        wait_for_vertices(page, fleet, corners(3))
+        page.wait_for_function("() => !location.search.includes('at=')")
+        # What is not kept is said, and the page shows what is now.
+        page.goto(f"{url}?hull={fleet}&at=2001-02-03T04:05:06.789012Z")
+        expect(page.locator(".why")).to_contain_text("The link is of Feb 3, 2001, 04:05:06 UTC, which is not kept.")
+        wait_for_vertices(page, fleet, corners(3))
+        page.evaluate(PARTS)
+        assert page.evaluate(
+            "[moment_of('2001-02-03T04:05:06.789012Z') % 1000, moment_of('soon'), moment_of(null)]"
+        ) == [
+            pytest.approx(789.012, abs=1e-3),
+            None,
+            None,
+        ]
 
 
 # In each frame, where the bar is: a button that moves between the press and the release of a pointer is not clicked.

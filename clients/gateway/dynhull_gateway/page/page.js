@@ -17,7 +17,7 @@ import { SAVES } from "./saving.js"
 import { Sound } from "./sound.js"
 import { ServerMetrics } from "./sources/server_metrics.js"
 import { Viewer } from "./sources/viewer.js"
-import { TimeBar } from "./time_bar.js"
+import { TimeBar, moment_of, text_of } from "./time_bar.js"
 import { TimeLines } from "./time_lines.js"
 // While the slider is dragged, the past is asked for now and then.
 const ASK_MILLISECONDS = 150
@@ -38,17 +38,19 @@ const events = new Events(key => finder.seek(key))
 const alarms = new Alarms(find(".alarms"), ask)
 const sound = new Sound(find("[name=sound]"), query.has("sound"), find(".silenced"), wanted => keep_in_address("sound", wanted ? ["1"] : []))
 const kiosk = query.has("kiosk") ? new Kiosk(state, query, ask) : undefined
-let time_bar, asking, viewer, unreached = false
+let time_bar, asking, keeping, viewer, unreached = false
 const recorder = new Recorder(show_drawing, () => {
   picture.live = recorder.live
   time_lines.mark(recorder.live ? undefined : recorder.moment)
   events.end_at(recorder.past ? recorder.moment : Infinity)
   time_bar?.update()
+  keep_moment()
   show_found()
   picture.draw_soon()
 }, ask_past)
 const time_lines = new TimeLines([...document.querySelectorAll("canvas.line")], lit(NEUTRAL), PERCENTILE.dash)
 time_bar = new TimeBar(recorder, find(".time"))
+time_bar.wanted = moment_of(query.get("at"))
 picture.now = () => recorder.moment
 // All that the page follows comes in one stream, that of one client.
 function begin(token) {
@@ -81,6 +83,14 @@ function keep_in_address(noun, values) {
   query.delete(noun)
   for (const value of values) query.append(noun, value)
   history.replaceState(null, "", `?${query}`)
+}
+// The moment at which the picture stands still; while the slider is dragged, now and then.
+function keep_moment() {
+  keeping ??= setTimeout(() => {
+    keeping = undefined
+    const {paused_at} = recorder, at = paused_at == undefined ? null : text_of(paused_at)
+    if (time_bar.wanted == undefined && at != new URLSearchParams(location.search).get("at")) keep_in_address("at", at == null ? [] : [at])
+  }, ASK_MILLISECONDS)
 }
 function take(message) {
   if (message.kind == "page") {

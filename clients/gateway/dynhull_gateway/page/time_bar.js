@@ -1,5 +1,6 @@
 // The bar below the picture: which moment is shown, how far one can go back, and what is missing there.
 import { put } from "./dom.js"
+import { isoTime } from "./dynhull/json.js"
 const LEAST_STEP = 0.1, MOST_STEPS = 1000, MOST_HOLES = 1000
 export const moment_format = new Intl.DateTimeFormat("en", {year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit",
   second: "2-digit", hourCycle: "h23", timeZoneName: "short"})
@@ -8,6 +9,8 @@ export class TimeBar {
     this.recorder = recorder
     this.hulls = []  // what is kept of each, with its colour
     this.holes = []  // moments at which something was missing
+    this.wanted = undefined  // the moment of the link, until it is known what the server has kept
+    this.missed = ""
     const at = name => form.querySelector(name)
     this.form = form
     this.button = at(".pause")
@@ -31,11 +34,22 @@ export class TimeBar {
     this.hulls = hulls
     this.recorder.kept = hulls.reduce((least, {first}) => first == null ? least : Math.min(least ?? Infinity, first), undefined)
     this.form.classList.toggle("kept", this.recorder.kept != undefined)
+    if (this.wanted != undefined && hulls.length && hulls.every(({known}) => known)) this.reach(this.wanted)
     this.update()
+  }
+  // Shows the moment of the link, if it is kept.
+  reach(moment) {
+    this.wanted = undefined
+    if (moment >= this.recorder.earliest) this.recorder.go(moment)
+    else this.missed = `The link is of ${moment_format.format(moment)}, which is not kept.`
   }
   update() {
     const {live, moment, earliest, paused_at, past} = this.recorder, now = Date.now()
     const seconds = Math.max(1, (now - earliest) / 1000), step = Math.max(LEAST_STEP, Math.floor(seconds / MOST_STEPS))
+    if (!live) {
+      this.wanted = undefined
+      this.missed = ""
+    }
     this.leftmost = +this.slider.min  // whoever went there may be told of it when the bar has grown
     this.slider.step = step
     this.slider.min = -Math.ceil(seconds / step) * step
@@ -51,7 +65,7 @@ export class TimeBar {
     put(this.output, text)
     this.slider.setAttribute("aria-valuetext", text)
     put(this.oldest, this.recorder.kept == undefined ? "" : `Kept since ${moment_format.format(this.recorder.kept)}`)
-    put(this.why, live ? "" : this.hulls.map(({words}) => words).filter(Boolean).join(" "))
+    put(this.why, live && !this.missed ? "" : [this.missed, ...this.hulls.map(({words}) => words)].filter(Boolean).join(" "))
     if (past?.holes.length && this.holes.at(-1) != moment) this.holes = [...this.holes.slice(1 - MOST_HOLES), moment]
     this.draw(earliest, now)
   }
@@ -77,6 +91,15 @@ export class TimeBar {
     canvas.fillStyle = getComputedStyle(strip).getPropertyValue("--alarm")
     for (const hole of this.holes) canvas.fillRect(across(hole) - 1, 0, 2, height)
   }
+}
+// A moment as it is in a link: to the microsecond, as revisions have it.
+export function text_of(moment) {
+  return isoTime(BigInt(Math.round(1000 * moment)))
+}
+// And back, in milliseconds since 1970; undefined for what is no moment.
+export function moment_of(text) {
+  const whole = Date.parse(text ?? ""), [, parts = ""] = /\.\d{3}(\d+)/.exec(text) ?? []
+  return isNaN(whole) ? undefined : whole + +`.${parts}0`
 }
 // As a field for a local date and time has it.
 function local_text(moment) {

@@ -30,7 +30,7 @@ export class Kept {
     return `${this.name} keeps no past. Keep it: dynhull history set ${this.name} 30d --address ${this.address}`
   }
   get message() {
-    return {hull: this.name, first: this.first ?? null, erased: this.spans, words: this.words}
+    return {hull: this.name, known: Boolean(this.history ?? this.trouble), first: this.first ?? null, erased: this.spans, words: this.words}
   }
   async ask(signal) {
     try {
