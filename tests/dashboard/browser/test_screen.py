@@ -53,6 +53,20 @@ FINDINGS = """async () => {
     return violations.map(({id, nodes}) => [id, ...nodes.map(({target, failureSummary}) => [target, failureSummary])])
 }"""
 
+# Ten thousand rings in a plane, as a prefix brings them.
+CROWD = """() => {
+    picture.keep([], [], [{name: "crowd/", colour: "#0072B2", dash: []}])
+    globalThis.ring_of = (hull, moved = 0) => {
+        const middle = [10 * (hull % 100), 10 * Math.floor(hull / 100)], steps = [...Array(24).keys()]
+        const at = (turn, axis) => middle[axis] + moved + 4 * [Math.cos, Math.sin][axis](turn * Math.PI / 12)
+        picture.take({kind: "outline", within: "crowd/", hull: `crowd/${hull}`, revision: 1 + moved, keys: null,
+            rings: null, x: steps.map(step => at(step, 0)), y: steps.map(step => at(step, 1))})
+    }
+    for (let hull = 0; hull < 10_000; hull++) ring_of(hull)
+    picture.draw()
+    return picture.many.crowd.job != undefined && picture.many.crowd.front == undefined
+}"""
+
 
 @pytest.fixture(scope="module")
 def fleet(client: HullClient) -> Iterator[None]:
@@ -235,3 +249,42 @@ def test_a_kiosk_turns_and_shows_alarms(browser: Browser, url: str, client: Hull
             expect(shown).to_have_text(prefix)
         assert page.url.endswith("sound=1"), "the link stays as it was given"
         page.set_viewport_size({"width": 1440, "height": 900})
+
+
+def test_a_crowd_is_painted_in_pieces_and_thinned(browser: Browser, url: str) -> None:
+    with opened(browser, url, "none") as page:
+        assert page.evaluate(CROWD), "it was painted at once, while whoever pointed at something waited"
+        painted = "() => picture.many.crowd.front && !picture.many.crowd.job"
+        page.evaluate("""() => {
+            const draw = CanvasRenderingContext2D.prototype.lineTo
+            globalThis.lines = 0
+            CanvasRenderingContext2D.prototype.lineTo = function (...place) { lines++; draw.apply(this, place) }
+        }""")
+        page.wait_for_function(painted)
+        crowd = page.evaluate("picture.many.hulls.length")
+        far = page.evaluate("lines")
+        assert crowd == 10_000
+        assert far < 6 * crowd, "outlines of some pixels have few corners"
+        pointed = """hull => {
+            picture.draw()
+            const {x, y} = picture.element.getBoundingClientRect(), {corners} = picture.many.hulls[hull]
+            const [across, down] = picture.view.place(...corners[0])
+            return [x + across, y + down]
+        }"""
+        tip = page.get_by_role("tooltip")
+        for hull in (0, 5_050, 9_999):
+            page.mouse.move(*page.evaluate(pointed, hull))
+            expect(tip).to_contain_text(f"a vertex of crowd/{hull}")
+        # What has moved is painted again, and found where it is.
+        page.evaluate("() => ring_of(5_050, 1)")
+        page.wait_for_function("() => !picture.many.crowd.dirty && !picture.many.crowd.job")
+        page.mouse.move(*page.evaluate(pointed, 5_050))
+        expect(tip).to_contain_text("revision 2")
+        # From near all corners of the few that are to be seen.
+        page.evaluate("() => { picture.move(view => view.zoom(30, 400, 300)); lines = 0 }")
+        page.wait_for_function("() => !picture.moving && picture.many.crowd.front && !picture.many.crowd.job")
+        seen = page.evaluate(
+            "new Set([...picture.many.crowd.front.cells.values(), picture.many.crowd.front.large].flat()).size"
+        )
+        assert 0 < seen < 100
+        assert page.evaluate("lines") >= 23 * seen

@@ -98,11 +98,11 @@ export class Hands {
     /** @type {(Thing & {place: Point}) | undefined} */
     let best
     let least = NEAR
-    /** @param {Point} place @param {Thing} thing @param {number} advantage */
-    const look = (place, thing, advantage) => {
+    /** @param {Point} place @param {() => Thing} about @param {number} advantage */
+    const look = (place, about, advantage) => {
       const [right, low] = view.place(...place), away = Math.hypot(right - across, low - down) - advantage
       if (away >= least || isNaN(away)) return
-      best = {...thing, place}
+      best = {...about(), place}
       least = away
     }
     for (const {name, points, vertices} of hulls.values())
@@ -110,11 +110,11 @@ export class Hands {
         {...points, words: `a point of ${name}`, advantage: 0}, {...vertices, words: `a vertex of ${name}`, advantage: 4},
       ])
         for (let row = 0; row < x.length; row++)
-          look([x[row], y[row]], {title: keys ? `${keys[row]}: ${words}` : words, revision}, advantage)
-    for (const {name, corners, vertices: {revision}} of many.hulls)
-      for (const place of corners) look(place, {title: `a vertex of ${name}`, revision}, 0)
+          look([x[row], y[row]], () => ({title: keys ? `${keys[row]}: ${words}` : words, revision}), advantage)
+    for (const {name, corners, vertices: {revision}} of many.near(this.picture, across, down, NEAR))
+      for (const place of corners) look(place, () => ({title: `a vertex of ${name}`, revision}), 0)
     for (const fence of fences.values())
-      for (const {key, place} of fence.marks(hulls)) look(place, {title: `${key}: inside ${fence.name}`}, 5)
+      for (const {key, place} of fence.marks(hulls)) look(place, () => ({title: `${key}: inside ${fence.name}`}), 5)
     return best
   }
 }

@@ -5,9 +5,10 @@
  * @typedef {import("./looks.js").Look & {name: string}} NamedLook
  * @typedef {Drawing & {kind?: string, hull: string, within: string, gone?: boolean}} OutlineMessage
  */
+import { Crowd, LEAST_PIXELS } from "./crowd.js"
 import { Hull } from "./hulls.js"
 import { box_around } from "./views.js"
-export const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, LEAST_PIXELS = 3, MOST_FILLED = 2_000, CROWD_ALPHA = 0.5
+export const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, MOST_FILLED = 1_000
 // What is drawn of one of many hulls, with the extreme corners alone for the extent of the picture.
 export class Outline extends Hull {
   /** @type {import("./views.js").Extremes} */
@@ -43,6 +44,20 @@ export class Outline extends Hull {
 export class Many {
   /** The look of each, and its hulls by name. @type {Map<string, {look: NamedLook, hulls: Map<string, Outline>}>} */
   prefixes = new Map()
+  /** @param {() => void} changed called when there is more to be seen */
+  constructor(changed) {
+    this.crowd = new Crowd(changed)
+  }
+  get crowded() {
+    return [...this.prefixes.values()].reduce((sum, {hulls}) => sum + hulls.size, 0) > MOST_FILLED
+  }
+  /**
+   * The hulls that may be within some pixels of a place in the picture.
+   * @param {import("./picture.js").Picture} picture @param {number} across @param {number} down @param {number} pixels
+   */
+  near(picture, across, down, pixels) {
+    return this.crowded ? this.crowd.near(picture, across, down, pixels) : this.hulls
+  }
   /** @param {NamedLook[]} looks */
   keep(looks) {
     for (const prefix of this.prefixes.keys()) if (!looks.some(({name}) => name == prefix)) this.prefixes.delete(prefix)
@@ -52,11 +67,13 @@ export class Many {
       for (const hull of known.hulls.values()) hull.look = look
       this.prefixes.set(look.name, known)
     }
+    this.crowd.forget()
   }
   /** @param {OutlineMessage} message */
   take({within, gone, ...message}) {
     const known = this.prefixes.get(within)
     if (!known) return
+    this.crowd.dirty = true
     if (gone || !message.x.length) return void known.hulls.delete(message.hull)
     const outline = known.hulls.get(message.hull) ?? new Outline(message.hull, known.look)
     known.hulls.set(message.hull, outline)
@@ -67,36 +84,23 @@ export class Many {
   }
 }
 /**
- * Each by itself: one path of thousands takes seconds. Of a crowd the lines are enough, through which others can be seen.
+ * Each by itself: one path of thousands takes seconds.
  * @param {CanvasRenderingContext2D} canvas
  * @param {import("./picture.js").Picture} picture
  */
-export function draw_many(canvas, {view, many}) {
+export function draw_many(canvas, picture) {
+  const {view, many} = picture
+  if (many.crowded) return many.crowd.draw(canvas, picture)
   canvas.lineWidth = 1
   for (const {look, hulls} of many.prefixes.values()) {
-    const crowded = hulls.size > MOST_FILLED, line_alpha = crowded ? CROWD_ALPHA : 1
     canvas.fillStyle = canvas.strokeStyle = look.colour
     for (const hull of hulls.values()) {
       canvas.beginPath()
       hull.trace(canvas, view)
-      if (!crowded) {
-        canvas.globalAlpha = MANY_ALPHA
-        canvas.fill()
-      }
-      canvas.globalAlpha = line_alpha
+      canvas.globalAlpha = MANY_ALPHA
+      canvas.fill()
+      canvas.globalAlpha = 1
       canvas.stroke()
     }
   }
-  canvas.globalAlpha = 1
-}
-/**
- * What a message about many hulls says of each, as messages that are kept one by one; `known` are those there were.
- * @param {{prefix: string, whole: boolean, hulls: (Drawing & {hull: string})[]}} message
- * @param {Iterable<string>} known
- * @returns {Generator<OutlineMessage>}
- */
-export function* told_apart({prefix, whole, hulls}, known) {
-  const names = new Set(hulls.map(({hull}) => hull))
-  for (const hull of whole ? known : []) if (!names.has(hull)) yield {kind: "outline", within: prefix, hull, revision: 0, x: [], y: [], rings: null, gone: true}
-  for (const each of hulls) yield {kind: "outline", within: prefix, ...each}
 }

@@ -31,7 +31,7 @@ export const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_
   draw_accuracy, draw_rings]
 export const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
 export const FONT_PIXELS = 14  // of the text around a picture that is drawn at its own size
-export const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200
+export const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200, FIT_MILLISECONDS = 1000
 /** @param {CanvasRenderingContext2D} canvas @param {Picture} picture */
 export function draw_trails(canvas, picture) {
   picture.trails.draw(canvas, picture)
@@ -71,7 +71,7 @@ export class Picture {
     this.view = this.plane
     /** @type {Map<string, Hull>} */
     this.hulls = new Map()
-    this.many = new Many()
+    this.many = new Many(() => this.draw_soon())
     /** @type {Map<string, Fence>} */
     this.fences = new Map()
     this.labels = new Labels()
@@ -190,7 +190,8 @@ export class Picture {
       this.following = false
       this.ground_drawn = false
     }
-    if (!this.following) return
+    if (!this.following || this.many.crowded && view.settled && performance.now() < this.fitted + FIT_MILLISECONDS) return
+    this.fitted = performance.now()
     const points = hulls.flatMap(hull => hull instanceof Outline ? hull.extremes : view.globe ? hull.corners : hull.polygons(view).flat(2))
     for (const fence of this.fences.values())
       points.push(...(fence.area.globe || !view.globe ? fence.area.polygons.flat(2) : []), ...fence.margins(view, this.hulls).flat(2))

@@ -90,6 +90,10 @@ export class PlaneView {
   refit() {
     this.frame = undefined
   }
+  /** Whether it has been fitted, and nobody wants it anew. */
+  get settled() {
+    return this.frame != undefined
+  }
   /** @param {number} x @param {number} y @returns {[number, number]} */
   place(x, y) {
     const {left, top, width, height} = this.rect
@@ -219,6 +223,9 @@ export class GlobeView {
   }
   refit() {
     this.fitted = false
+  }
+  get settled() {
+    return Boolean(this.fitted)
   }
   /** @param {number} across @param {number} down */
   pan(across, down) {
