@@ -1,6 +1,6 @@
 """Make the screenshots of the dashboard with days of the demo's flights: `python docs/screenshots.py`.
 
-Chromium must be on the PATH.
+Chromium, or its shell without a window, must be on the PATH.
 """
 
 import shutil
@@ -24,6 +24,7 @@ DAYS = [date(2013, 3, 8), date(2013, 7, 11)]  # snow, and a summer's day
 MORNING, EVENING, PACE = 8 * 60, 17 * 60, 0.1
 IMAGES = Path(__file__).with_name("images")
 DESK = {"viewport": {"width": 1440, "height": 900}}
+WALL = {"viewport": {"width": 1920, "height": 1080}, "color_scheme": "dark"}
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
 # Fences are around a hull of their own, so that the other pictures are without them.
 FENCED = "airborne"
@@ -34,6 +35,9 @@ PICTURES = {
     "dashboard-phone.png": (PHONE | LIGHT, False),
     "dashboard-fences.png": (DESK | LIGHT, True),
 }
+
+# Taken last: an alarm is raised, which the other pictures are without.
+ALARM = {"prefix": "flights/", "when": "area > 1000 km2"}
 
 
 @contextmanager
@@ -66,8 +70,9 @@ def main():
             client.create_hull(name, keyed="str", geographic=True, center=scenes[0].center)
         for name, circle in scenes[-1].circles.items():
             client.create_fence(name, Circle(*circle), FENCED)
+        chromium = shutil.which("chromium") or shutil.which("chromium-headless-shell")
         flights = [threading.Thread(target=fly, args=(client, scene, name)) for scene, name in flown]
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         plain = [("hull", scene.hull_name) for scene in scenes]
         fenced = [("fence", name) for name in scenes[-1].circles]
         pages = {name: browser.new_context(**look).new_page() for name, (look, _) in PICTURES.items()}
@@ -77,7 +82,14 @@ def main():
             flight.start()
         time.sleep((EVENING - MORNING) * PACE - 4)
         for name, page in pages.items():
-            page.screenshot(path=IMAGES / name, full_page=True)
+            page.screenshot(path=IMAGES / name)
+        client.create_alarm("spread", **ALARM)
+        wall = browser.new_context(**WALL).new_page()
+        wall.goto(f"{url}/?kiosk&prefix=flights/")
+        wall.get_by_text("Acknowledge").first.wait_for()
+        wall.wait_for_function("() => picture.many.hulls.length == 2 && picture.coasts.known.size")
+        time.sleep(2)
+        wall.screenshot(path=IMAGES / "dashboard-wall.png")
         for flight in flights:
             flight.join()
         browser.close()

@@ -24,7 +24,7 @@ PARTS = """async () => {
     const names = [
         ...["views", "picture", "hulls", "trails", "coasts"].map(name => `dynhull/map/${name}`), "recorder", "degrees",
         "time_bar",
-        ...["fence_area", "event_rows", "hull_state", "hull_feed", "server_metrics", "repeating"]
+        ...["fence_area", "event_rows", "hull_state", "hull_feed", "server_lists", "server_metrics", "repeating"]
             .map(name => `sources/${name}`),
     ]
     const parts = await Promise.all(names.map(name => import(`${folder}${name}.js`)))

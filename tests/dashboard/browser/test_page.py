@@ -520,6 +520,28 @@ def test_enter_takes_the_match(browser: Browser, url: str, client: HullClient, n
         assert page.evaluate("best_match('a', ['a/b', 'a'])") == "a"
 
 
+def test_of_too_many_names_those_that_are_typed_are_offered(browser: Browser, url: str) -> None:
+    """The list has the first 300, and as many of those that begin with what is typed."""
+    with opened(browser, url, "none") as page:
+        offered = page.evaluate("""async () => {
+            const names = [...Array(1000).keys()].map(row => `van/${row}`).sort()
+            const asked = [], ask = async function* (prefix) {
+                asked.push(prefix)
+                yield* names.filter(name => name.startsWith(prefix)).map(name => ({name}))
+            }
+            let told
+            const answered = () => new Promise(resolve => told = resolve)
+            const first = answered(), list = new ServerList("", ask, () => told?.())
+            await first
+            const before = list.names.includes("van/999"), next = answered()
+            list.typed = "van/99"
+            await next
+            list.close()
+            return [before, list.names.length, best_match("van/999", list.names), asked]
+        }""")
+        assert offered == [False, 311, "van/999", ["", "", "van/99"]]
+
+
 def test_the_link_keeps_where_the_picture_is(browser: Browser, url: str, client: HullClient, name: str) -> None:
     client.create_hull(f"{name}-globe", geographic=True)
     client.apply(f"{name}-globe", insert=[[10, 50], [11, 50], [11, 51]])

@@ -235,6 +235,15 @@ def test_a_kiosk_turns_and_shows_alarms(browser: Browser, url: str, client: Hull
         raised = page.locator(".alarms tbody tr.raised")
         size = page.locator(".alarms h2").evaluate("each => parseFloat(getComputedStyle(each).fontSize)")
         assert size >= 60
+        # On the map, too: a thick line in the colour of alarms, through the middle of an edge.
+        page.wait_for_function("""() => picture.alarmed.length == 2 && picture.alarmed.every(name => {
+            const [one, two] = picture.many.find(name).corners.map(corner => picture.view.place(...corner))
+            const pixel = [0, 1].map(axis => Math.round((one[axis] + two[axis]) / 2 * picture.ratio))
+            const copy = new OffscreenCanvas(1, 1).getContext("2d", {willReadFrequently: true})
+            copy.drawImage(picture.canvases[1], -pixel[0], -pixel[1])
+            const shade = copy.getImageData(0, 0, 1, 1).data.slice(0, 3)
+            return picture.colours.alarm == `rgb(${shade.join(", ")})`
+        })""")
         expect(raised.first.locator(".since")).to_have_text(re.compile(r"20\d\d, \d\d:\d\d:\d\d \S+"))
         page.mouse.click(10, 10)  # browsers let nothing sound before
         page.wait_for_function("() => sound.rung > 1")

@@ -125,6 +125,10 @@ function update({kind: _, ...changes}) {
   Object.assign(state, changes)
   if (changes.alarms || changes.raised != undefined || changes.alarm_trouble != undefined)
     alarms.show(state.alarms, state.raised, state.alarm_trouble)
+  if (changes.alarms) {
+    picture.alarmed = [...new Set(state.alarms.filter(({state}) => state == "raised").map(({hull}) => hull))]
+    picture.draw_soon()
+  }
   if (changes.raised != undefined) sound.take(state.raised)
   kiosk?.show()
   if (changes.kept || changes.hulls)

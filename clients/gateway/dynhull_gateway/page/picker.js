@@ -16,6 +16,7 @@ export class Picker {
     Object.assign(this, {form: find(form), noun, most, offered, picked: Object.entries(picked), state, ask, keep})
     this.field = find(`${form} [list]`)
     this.field.addEventListener("change", () => state[offered].includes(this.field.value) && this.add())
+    this.field.addEventListener("input", () => ask({typed: [noun, this.field.value]}))
     this.form.addEventListener("submit", event => { event.preventDefault(); this.add() })
     this.show()
   }

@@ -8,7 +8,7 @@
 import { Crowd, LEAST_PIXELS } from "./crowd.js"
 import { Hull } from "./hulls.js"
 import { box_around } from "./views.js"
-export const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, MOST_FILLED = 1_000
+export const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, MOST_FILLED = 1_000, FEW = 100
 // What is drawn of one of many hulls, with the extreme corners alone for the extent of the picture.
 export class Outline extends Hull {
   /** @type {import("./views.js").Extremes} */
@@ -51,6 +51,10 @@ export class Many {
   get crowded() {
     return [...this.prefixes.values()].reduce((sum, {hulls}) => sum + hulls.size, 0) > MOST_FILLED
   }
+  /** @param {string} name */
+  find(name) {
+    return [...this.prefixes.values()].map(({hulls}) => hulls.get(name)).find(hull => hull)
+  }
   /**
    * The hulls that may be within some pixels of a place in the picture.
    * @param {import("./picture.js").Picture} picture @param {number} across @param {number} down @param {number} pixels
@@ -91,8 +95,8 @@ export class Many {
 export function draw_many(canvas, picture) {
   const {view, many} = picture
   if (many.crowded) return many.crowd.draw(canvas, picture)
-  canvas.lineWidth = 1
   for (const {look, hulls} of many.prefixes.values()) {
+    canvas.lineWidth = hulls.size > FEW ? 1 : 2
     canvas.fillStyle = canvas.strokeStyle = look.colour
     for (const hull of hulls.values()) {
       canvas.beginPath()

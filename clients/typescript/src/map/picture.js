@@ -1,6 +1,7 @@
 // The picture: two canvases, one for the ground (coasts or axes), one for what moves, and the order in which things are
 // drawn. A new layer is a function of the canvas and the picture, in its place in LAYERS.
 import * as d3 from "d3-geo"
+import { draw_alarmed } from "./alarmed.js"
 import { Boxes, FONT, context_of, square_box } from "./boxes.js"
 import { Coasts } from "./coasts.js"
 import { Fence, MARK_RADIUS, draw_fence_names, draw_fences, draw_marks } from "./fences.js"
@@ -27,7 +28,7 @@ import { EARTH_RADIUS, GlobeView, PlaneView, RADIAN } from "./views.js"
  * @property {string | null} [coasts] the folder of the coasts
  */
 /** @type {((canvas: CanvasRenderingContext2D, picture: Picture) => void)[]} */
-export const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_fence_names, draw_names,
+export const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_alarmed, draw_fence_names, draw_names,
   draw_accuracy, draw_rings]
 export const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
 export const FONT_PIXELS = 14  // of the text around a picture that is drawn at its own size
@@ -87,6 +88,8 @@ export class Picture {
     this.live = true  // or as it was before
     this.outliers = false
     this.sought = ""
+    /** Hulls for which an alarm is raised. @type {string[]} */
+    this.alarmed = []
     this.now = Date.now
     this.frames = 0
     new ResizeObserver(() => this.resize()).observe(element)
@@ -239,7 +242,7 @@ export class Picture {
   read_colours() {
     const style = getComputedStyle(this.element)
     const colour = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim()
-    this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea", "veil"].map(name => [name, colour(name)]))
+    this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea", "veil", "alarm", "alarm-ink"].map(name => [name, colour(name)]))
   }
   /** @param {CanvasRenderingContext2D} canvas @param {GlobeView} view */
   draw_globe(canvas, view, tiles = this.tiles.url) {

@@ -64,6 +64,7 @@ export class Viewer {
       fences: names => this.pick_fences(names),
       prefixes: names => this.pick_prefixes(names),
       sought: key => this.sought = key,
+      typed: ([noun, letters]) => (noun == "hull" ? this.hull_list : this.fence_list).typed = letters,
       outliers: chosen => this.choose_outliers(chosen),
       verify: () => this.feeds.forEach(feed => feed.verify_now()),
       past: moment => this.go_back(moment),
