@@ -1,15 +1,15 @@
-// @ts-nocheck
 // Hulls for which an alarm is raised: a thick line around each, in a frame that is seen from far however small it is, with its name.
 import { FONT, is_inside, text_width } from "./boxes.js"
 import { box_around } from "./views.js"
 export const ALARM_FONT = `bold 16px ${FONT}`, ALARM_HEIGHT = 24, ALARM_GAP = 6, FRAME_PIXELS = 14
+/** @param {CanvasRenderingContext2D} canvas @param {import("./picture.js").Picture} picture */
 export function draw_alarmed(canvas, {view, hulls, many, alarmed, colours, taken}) {
   canvas.font = ALARM_FONT
   canvas.lineWidth = 4
   for (const name of alarmed) {
     const hull = hulls.get(name) ?? many.find(name)
     const places = (hull?.corners ?? []).map(([x, y]) => view.place(x, y)).filter(([across]) => !isNaN(across))
-    if (!places.length) continue
+    if (!hull || !places.length) continue
     canvas.strokeStyle = canvas.fillStyle = colours.alarm
     canvas.beginPath()
     for (const rings of hull.polygons(view)) view.polygon(canvas, rings)

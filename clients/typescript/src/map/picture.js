@@ -60,6 +60,10 @@ export class Picture {
   width = 0
   height = 0
   ratio = 1
+  /** By how much it is drawn larger, as the text around it is. */
+  enlarged = 1
+  /** When the view was fitted last. */
+  fitted = -Infinity
   ground_drawn = false
   /** @param {HTMLElement} element @param {PictureOptions} options */
   constructor(element, {x_unit, y_unit, tiles, coasts}) {
