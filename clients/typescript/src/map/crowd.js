@@ -1,38 +1,35 @@
 // Thousands of outlines: painted in pieces into a picture of their own, which is shown until the next one is ready. So nobody waits
 // who points at something, and a hull that moves costs no more than its share.
 import { context_of, square_box } from "./boxes.js"
-import { GlobeView } from "./views.js"
+/**
+ * @typedef {import("./boxes.js").Box} Box
+ * @typedef {import("./many.js").Outline} Outline
+ * @typedef {import("./picture.js").Picture} Picture
+ * @typedef {import("./views.js").View} View
+ *
+ * @typedef {object} Painting of all hulls of a crowd
+ * @property {string} where the view that it is of
+ * @property {HTMLCanvasElement} canvas
+ * @property {Map<number, Outline[]>} cells where each hull is
+ * @property {Outline[]} large those that are in too many cells
+ * @property {boolean} globe
+ * @property {[number, number]} middle
+ * @property {[number, number]} at_middle where that is in the picture
+ * @property {number[]} unit
+ * @property {number} at when it was done
+ */
 export const SLICE_MILLISECONDS = 12, FRESH_MILLISECONDS = 1000, CROWD_ALPHA = 0.6, LEAST_PIXELS = 3
 // An outline of that many pixels has one corner more; one that is larger is drawn along great circles.
 export const PIXELS_A_CORNER = 4, FEWEST_CORNERS = 4, LARGE_PIXELS = 200
 export const CELL_PIXELS = 48, MOST_CELLS = 100
-/**
- * @typedef {import("./views.js").Point} Point
- * @typedef {import("./views.js").View} View
- * @typedef {import("./picture.js").Picture} Picture
- * @typedef {import("./many.js").Outline} Outline
- * @typedef {{left: number, top: number, right: number, bottom: number}} Box
- *
- * @typedef {object} Job a picture that is painted, or has been
- * @property {string} where what the viewer saw when it was begun
- * @property {HTMLCanvasElement} canvas
- * @property {Map<number, Outline[]>} cells the hulls in each cell of the picture
- * @property {Outline[]} large those in too many cells
- * @property {boolean} globe
- * @property {Point} middle
- * @property {Point} at_middle
- * @property {Point} unit
- * @property {number} at when it was ready
- */
 export class Crowd {
-  /** What is shown. @type {Job | undefined} */
+  /** What is shown. @type {Painting | undefined} */
   front = undefined
-  /** What is painted. @type {Job | undefined} */
+  /** What is being painted. @type {Painting | undefined} */
   job = undefined
-  /** Whether there is more to be seen than `front` has. */
-  dirty = true
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   later = undefined
+  dirty = true
   /** @param {() => void} changed called when another picture is ready */
   constructor(changed) {
     this.changed = changed
@@ -55,23 +52,22 @@ export class Crowd {
     }, Math.max(rest, FRESH_MILLISECONDS / 10))
     const {front} = this, {view, width, height} = picture
     if (!front || front.globe != view.globe) return
-    const [across, down] = view.place(...front.middle), unit = unit_of(view)
-    const wide = unit[0] / front.unit[0], high = unit[1] / front.unit[1]
+    const [across, down] = view.place(...front.middle)
+    const [wide, high] = unit_of(view).map((each, axis) => each / front.unit[axis])
     if (isNaN(across)) return
     canvas.drawImage(front.canvas, across - wide * front.at_middle[0], down - high * front.at_middle[1], wide * width, high * height)
   }
   /** @param {Picture} picture @param {string} where */
   begin(picture, where) {
     const {view, canvases: [{width, height}]} = picture, canvas = Object.assign(document.createElement("canvas"), {width, height})
-    /** @type {Job} */
-    const job = {
-      where, canvas, cells: new Map(), large: [], globe: view.globe, middle: view.middle, at_middle: view.place(...view.middle),
-      unit: unit_of(view), at: NaN}
+    const [x, y] = view.middle
+    /** @type {Painting} */
+    const job = {where, canvas, cells: new Map(), large: [], globe: view.globe, middle: [x, y], at_middle: view.place(x, y), unit: unit_of(view), at: 0}
     this.dirty = false
     this.job = job
     this.go_on(job, paint(job, picture))
   }
-  /** @param {Job} job @param {Iterator<void>} painting */
+  /** @param {Painting} job @param {Generator<void>} painting */
   go_on(job, painting) {
     if (this.job != job) return
     const until = performance.now() + SLICE_MILLISECONDS
@@ -86,24 +82,24 @@ export class Crowd {
   /** The hulls that may be within some pixels of a place. @param {Picture} picture @param {number} across @param {number} down @param {number} pixels */
   near(picture, across, down, pixels) {
     const {front} = this
-    if (front?.where != place_of(picture)) return []
+    if (!front || front.where != place_of(picture)) return []
     return [...new Set([...cells_of(square_box(across, down, pixels))].flatMap(cell => front.cells.get(cell) ?? []).concat(front.large))]
   }
 }
-/** @param {Picture} picture */
+/** Pixels in a unit of each axis. @param {View} view @returns {number[]} */
+function unit_of(view) {
+  return "unit" in view ? [...view.unit] : [view.scale, view.scale]
+}
+/** Another text for each view. @param {Picture} picture */
 function place_of({view, width, height, ratio}) {
   return String([view.globe, view.middle, unit_of(view), width, height, ratio])
 }
-/** Pixels of a unit to the right and up. @param {View} view @returns {Point} */
-function unit_of(view) {
-  return view instanceof GlobeView ? [view.scale, view.scale] : [view.unit[0], view.unit[1]]
-}
-/** @param {Box} box */
+/** @param {Box} box @returns {Generator<number>} */
 function* cells_of({left, top, right, bottom}) {
   for (let column = Math.floor(left / CELL_PIXELS); column * CELL_PIXELS <= right; column++)
     for (let row = Math.floor(top / CELL_PIXELS); row * CELL_PIXELS <= bottom; row++) yield column * 100_000 + row
 }
-/** Paints hull by hull, and notes where each is. @param {Job} job @param {Picture} picture @returns {Generator<void>} */
+/** Paints hull by hull, and notes where each is. @param {Painting} job @param {Picture} picture @returns {Generator<void>} */
 function* paint(job, picture) {
   const {view, many, ratio} = picture, canvas = context_of(job.canvas)
   canvas.setTransform(ratio, 0, 0, ratio, 0, 0)
@@ -153,7 +149,7 @@ function paint_hull(canvas, hull, view, {left, top, right, bottom}) {
   }
   canvas.stroke()
 }
-/** @param {Job} job @param {Outline} hull @param {Box} box */
+/** @param {Painting} job @param {Outline} hull @param {Box} box */
 function note(job, hull, box) {
   const cells = (2 + (box.right - box.left) / CELL_PIXELS) * (2 + (box.bottom - box.top) / CELL_PIXELS)
   if (cells > MOST_CELLS) return job.large.push(hull)

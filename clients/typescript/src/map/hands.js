@@ -87,8 +87,7 @@ export class Hands {
       return element
     }))
     const {element: {clientWidth, clientHeight}, enlarged} = this.picture, {offsetWidth, offsetHeight} = this.tip
-    /** @param {number} at @param {number} size @param {number} room */
-    const beside = (at, size, room) => `${Math.max(0, at + TIP_GAP + size > room ? at - TIP_GAP - size : at + TIP_GAP)}px`
+    const beside = (/** @type {number} */ at, /** @type {number} */ size, /** @type {number} */ room) => `${Math.max(0, at + TIP_GAP + size > room ? at - TIP_GAP - size : at + TIP_GAP)}px`
     this.tip.style.left = beside(across * enlarged, offsetWidth, clientWidth)
     this.tip.style.top = beside(down * enlarged, offsetHeight, clientHeight)
   }

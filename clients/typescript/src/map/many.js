@@ -1,11 +1,11 @@
 // All hulls of some prefixes: outlines alone, each prefix in one colour.
+import { Crowd, LEAST_PIXELS } from "./crowd.js"
 /**
  * @typedef {import("./views.js").Point} Point
  * @typedef {import("./hulls.js").Drawing} Drawing
  * @typedef {import("./looks.js").Look & {name: string}} NamedLook
  * @typedef {Drawing & {kind?: string, hull: string, within: string, gone?: boolean}} OutlineMessage
  */
-import { Crowd, LEAST_PIXELS } from "./crowd.js"
 import { Hull } from "./hulls.js"
 import { box_around } from "./views.js"
 export const MANY_ALPHA = 0.08, STRAIGHT_DEGREES = 1, MOST_FILLED = 1_000, FEW = 100

@@ -48,6 +48,12 @@ export class Picture {
   moved_to = () => {}
   /** Where the key is that the viewer looks for: x, y, a colour, and where it may really be. @type {[number, number, string, (Point[] | null)?][]} */
   places = []
+  /** Hulls for which an alarm is raised. @type {string[]} */
+  alarmed = []
+  /** How much larger it is drawn than beside text of FONT_PIXELS. */
+  enlarged = 1
+  /** When the view was last fitted to what is shown. */
+  fitted = 0
   /** Of the page. @type {Record<string, string>} */
   colours = {}
   /** @type {import("./labels.js").PlacedRing[]} */
@@ -60,10 +66,6 @@ export class Picture {
   width = 0
   height = 0
   ratio = 1
-  /** By how much it is drawn larger, as the text around it is. */
-  enlarged = 1
-  /** When the view was fitted last. */
-  fitted = -Infinity
   ground_drawn = false
   /** @param {HTMLElement} element @param {PictureOptions} options */
   constructor(element, {x_unit, y_unit, tiles, coasts}) {
@@ -92,8 +94,6 @@ export class Picture {
     this.live = true  // or as it was before
     this.outliers = false
     this.sought = ""
-    /** Hulls for which an alarm is raised. @type {string[]} */
-    this.alarmed = []
     this.now = Date.now
     this.frames = 0
     new ResizeObserver(() => this.resize()).observe(element)

@@ -90,7 +90,7 @@ export class PlaneView {
   refit() {
     this.frame = undefined
   }
-  /** Whether it has been fitted, and nobody wants it anew. */
+  // Whether it has been fitted, and nobody wants it anew.
   get settled() {
     return this.frame != undefined
   }
