@@ -252,6 +252,8 @@ class FenceModel:
         times = [event.time for event in (*fence.events[-1:], *events)]
         if times != sorted(times):
             raise self._model.finds(f"the times of events of {fence.row.name} go back: {times}")
+        if early := [event for event in events if event.first_time > event.time]:
+            raise self._model.finds(f"events of {fence.row.name} are before what they are about: {early}")
         before, others, inside = fence.config, _without_expected(events), {key for _, key in fence.inside}
         if isinstance(first, AddFence):
             self._began(fence, changes, others)

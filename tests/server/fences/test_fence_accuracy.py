@@ -26,6 +26,7 @@ from dynhull_server.state.fences.model.config import CircleArea, FenceConfig, Hu
 from dynhull_server.state.fences.model.records import EventType
 from dynhull_server.state.records import HullSettings
 from dynhull_server.storage.memory import MemoryStorage
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 HULLS = "fleet/a", "fleet/b"
 KEYS = [f"k{number}" for number in range(9)]
@@ -40,10 +41,10 @@ AREAS = {
 
 
 @asynccontextmanager
-async def served():
+async def served(storage=None):
     machine = Machine()
     supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
-    engine = Engine(LIMITS, MemoryStorage(), supervisor, machine)
+    engine = Engine(LIMITS, storage or MemoryStorage(), supervisor, machine)
     await engine.start(lambda *_: None)
     for name in (*HULLS, "zone"):
         await engine.hulls.create(name, HullSettings("str"))
@@ -238,6 +239,25 @@ def test_who_leaves_the_pack_by_more_than_the_error(margin, seed):
     found, expected = asyncio.run(life())
     assert [(e.type.name, e.key, e.distance) for e in found] == expected
     assert len(expected) > 30
+
+
+def test_an_event_is_never_before_what_it_confirms(tmp_path):
+    """Two reports that are committed together, of which the second had arrived earlier."""
+
+    async def life():
+        async with served(SQLiteStorage(tmp_path)) as engine:
+            config = FenceConfig(CircleArea(0, 0, 5), "hull", "fleet/a", confirmations=2, initial="none")
+            await engine.fences.create("fence", config)
+            await apply(engine, "fleet/a", {"k": (9, 9)})
+            now, other = engine.driver.time(), batch({"other": (9, 9)})
+            writes = [Write("fleet/a", other, now)]  # while it is stored, the others wait
+            writes += [Write("fleet/a", batch({"k": (1, x)}), now + later) for x, later in ((1, 10**6), (2, 0))]
+            await asyncio.gather(*(engine.hulls.apply(each, create=False) for each in writes))
+            return await engine.fences.get("fence").events(0, 10)
+
+    (event,) = asyncio.run(life())
+    assert (event.type, event.position, event.subject_revision) == (EventType.ENTER, (1, 2), 4)
+    assert event.time == event.first_time
 
 
 # From outside

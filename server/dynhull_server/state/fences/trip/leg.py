@@ -83,7 +83,8 @@ class FenceLeg:
         self.inside = Inside()
         self.delays: dict[Subject, Delay | None] = {}
         self.followed = 0
-        self._last, self._time = (fence.last, fence.time) if told is None else told
+        self._last, self._told = (fence.last, fence.time) if told is None else told
+        self._time = self._told
 
     @property
     def last(self) -> int:
@@ -216,6 +217,8 @@ class FenceLeg:
         """Put the delay of a subject in the place of the one before."""
         assert self.fence.delays is not None  # only such fences have subjects with delays
         self.fence.delays.set(subject, delay)
+        if delay is not None:  # what confirms it may have arrived earlier
+            self._time = max(self._time, delay.since)
         self.delays[subject] = delay
         self.fence.subjects[subject[0]].note_delays(self.fence)
 
@@ -302,7 +305,7 @@ class FenceLeg:
             fence.delays = None
         # What began and ended in the trip is not stored: the next event must not wait for it.
         stored = (each.since for each in self.delays.values() if each is not None)
-        fence.time = max(fence.time, self._time, *stored)
+        fence.time = max(fence.time, self._told, *stored)
         if not self.deleted:
             fence.count_inside()
             if begins:
