@@ -140,10 +140,11 @@ export class Joined {
     if (!this.#running) this.#run()
   }
 
-  /** @param {Subscription} own */
+  /** Without anybody who follows something, there is no stream. @param {Subscription} own */
   #forget(own) {
     this.#followed.delete(own.name)
     own.name = ""
+    if (!this.#followed.size) this.#controller.abort()
   }
 
   /** @param {Subscription} own */
@@ -151,9 +152,7 @@ export class Joined {
     const { name } = own
     if (name === "") return
     this.#forget(own)
-    if (!this.#followed.size) {
-      this.#controller.abort()
-    } else if (own.sent && this.#stream) {
+    if (this.#followed.size && own.sent && this.#stream) {
       const call = { method: "DELETE", signal: this.#controller.signal }
       this.#connection.ask(path`/streams/${this.#stream}/subscriptions/${name}`, call).catch(() => {})
     }

@@ -142,3 +142,24 @@ test("what waits for a slow reader has a bound, and he misses nothing", async (t
   assert.deepEqual(seen, Array.from({ length: 12 }, (_, i) => i + 1))
   assert.ok(opened > 1)
 })
+
+test("a stream in which nothing is followed any more is closed, also if its last subscription ends by itself", async (t) => {
+  const closed = /** @type {Promise<void>[]} */ ([])
+  const streams = await joined(t, {
+    open(response, given) {
+      const [name] = lastOf(given)
+      closed.push(new Promise((resolve) => response.on("close", () => resolve())))
+      const refused = given[String(name)].path === "/refused"
+      begin(response, refused ? `event: problem\nid: ${name}\ndata: {"reason":"UNAUTHENTICATED","detail":"no"}\n\n` : `event: over\nid: ${name}\ndata: {}\n\n`)
+      // What is said meanwhile keeps the stream from falling silent.
+      const saying = setInterval(() => response.write(":\n\n"), 50)
+      response.on("close", () => clearInterval(saying))
+    },
+  })
+  assert.deepEqual(await streams.follow("/ended", {}, {}).next(), { done: true, value: undefined })
+  await closed[0]
+  await assert.rejects(streams.follow("/refused", {}, {}).next(), { reason: "UNAUTHENTICATED" })
+  await closed[1]
+  assert.deepEqual(await streams.follow("/ended", {}, {}).next(), { done: true, value: undefined })
+  await closed[2]
+})
