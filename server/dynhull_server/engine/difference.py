@@ -21,6 +21,8 @@ KEPT, KEPT_BYTES = 8, 32 * 2**20
 # The approximate size of a key.
 KEY_BYTES = 80
 
+NO_ROWS = np.empty(0, np.intp)
+
 _Lists = tuple[Points, Points, VertexKeys | None, VertexKeys | None]
 
 
@@ -105,16 +107,16 @@ def difference(
     kept, there = np.isin(before, after, assume_unique=True), np.isin(after, before, assume_unique=True)
     common = before[kept]
     rotation = int(np.argmax(common == after[there][0])) if len(common) else 0
-    renamed = _renamed(np.roll(np.flatnonzero(kept), -rotation), np.flatnonzero(there), old_keys, new_keys)
+    renamed = NO_ROWS  # as a rule: to turn the rows takes longer than all else
+    if new_keys is not None and old_keys is not new_keys:
+        renamed = _renamed(np.roll(np.flatnonzero(kept), -rotation), np.flatnonzero(there), old_keys, new_keys)
     return Difference(np.flatnonzero(~kept), np.flatnonzero(~there), rotation, renamed)
 
 
 def _renamed(
-    kept: npt.NDArray[np.intp], there: npt.NDArray[np.intp], old_keys: VertexKeys | None, new_keys: VertexKeys | None
+    kept: npt.NDArray[np.intp], there: npt.NDArray[np.intp], old_keys: VertexKeys | None, new_keys: VertexKeys
 ) -> npt.NDArray[np.intp]:
     """The positions `there` whose new key is not the old one at the same row of `kept`."""
-    if new_keys is None or old_keys is new_keys:
-        return there[:0]
     if old_keys is None:
         return there
     renamed: npt.NDArray[np.intp] = there[old_keys[kept] != new_keys[there]]
