@@ -152,7 +152,7 @@ class FaultyStore(objects.ObjectArchive):
         super().__init__("s3://bucket", most_bytes)
         self._kept, self._at, self._give_way = store, at, give_way
         self._sends = False
-        self._made = _FileSystem(store, self.path)  # type: ignore[assignment]
+        self._made: Any = _FileSystem(store, self.path)
         self._damaged = 0
 
     def write(self, file: str, content: bytes) -> Written:
@@ -171,6 +171,7 @@ class FaultyStore(objects.ObjectArchive):
             self._give_way()
         if kind in ("late", "hung"):
             raise OSError(errno.ETIMEDOUT, "the store does not answer, as planned", what)
+        self._made.torn = kind == "torn"
         found = function()
         self._at("answer")
         if kind in DAMAGE and isinstance(found, bytes):
@@ -186,10 +187,11 @@ class FaultyStore(objects.ObjectArchive):
 
 
 class _FileSystem:
-    """What an `ObjectArchive` needs of pyarrow's file systems."""
+    """What an `ObjectArchive` needs of pyarrow's file systems; `torn` is whether it keeps half of what it is sent."""
 
     def __init__(self, store: Store, root: Path) -> None:
         self._store, self._root = store, root
+        self.torn = False
 
     def _file(self, key: str) -> Path:
         return self._store.folder / Path(key).relative_to(self._root)
@@ -200,7 +202,8 @@ class _FileSystem:
         yield content
         path = self._file(key)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content.getvalue())
+        sent = content.getvalue()
+        path.write_bytes(sent[: len(sent) // 2] if self.torn else sent)
         self._store.times[path.name] = self._store.calls
 
     def open_input_file(self, key: str) -> BytesIO:

@@ -49,7 +49,7 @@ IN_THE_DARK = 0.5
 FILE_FAULTS = ("os", "disk full", "memory", "kill", "kill", "kill")
 READ_FAULTS = ("os", "memory", "kill", *DAMAGE)
 CALL_FAULTS = ("os", "os", "kill", "kill", *LATE, *LATE, *DAMAGE)
-SEND_FAULTS = ("os", "kill", *LATE, *LATE)
+SEND_FAULTS = ("os", "kill", "torn", "torn", *LATE, *LATE)
 STEP_FAULTS = ("kill", "kill", "ghost kill", "ghost kill", "full", "lost", "ghost", "memory", "ghost memory")
 
 
@@ -112,7 +112,7 @@ def _fate(draw: random.Random, do: str, who: int) -> dict[str, Any]:
 
 
 def _store_fault(draw: random.Random) -> dict[str, Any]:
-    kinds = {"call": ("os", *LATE), "send": ("os", *LATE), "answer": ("os",)}
+    kinds = {"call": ("os", *LATE), "send": ("os", "torn", *LATE), "answer": ("os",)}
     at = draw.choice(tuple(kinds))
     nth, calls = 1 + int(draw.expovariate(1 / 4)), draw.choice((1, 1, 2, 5))
     return {"at": at, "nth": nth, "kind": draw.choice(kinds[at]), "calls": calls}
