@@ -15,8 +15,9 @@ import { Joined } from "../src/joined.js"
  * @param {import("node:test").TestContext} t
  * @param {{open: (response: Response, given: Subscriptions, count: number) => void,
  *   change?: (response: Response, method: string, name: string) => void}} answers
+ * @param {number} silence the seconds without a word after which it connects anew: longer than any pause of a busy machine
  */
-async function joined(t, { open, change = (response) => response.writeHead(204).end() }) {
+async function joined(t, { open, change = (response) => response.writeHead(204).end() }, silence = 120) {
   let count = 0
   const server = createServer(async (request, response) => {
     let body = ""
@@ -30,7 +31,7 @@ async function joined(t, { open, change = (response) => response.writeHead(204).
   })
   await new Promise((resolve) => server.listen(0, "127.0.0.1", () => resolve(null)))
   const { port } = /** @type {import("node:net").AddressInfo} */ (server.address())
-  return new Joined(new Connection(`http://127.0.0.1:${port}`, {}), 0.5)
+  return new Joined(new Connection(`http://127.0.0.1:${port}`, {}), silence)
 }
 
 const begin = (/** @type {Response} */ response, /** @type {string} */ text) =>
@@ -55,7 +56,7 @@ test("a stream that is cut, refused for now, or silent goes on after its last id
         begin(response, `event: e\nid: ${name}\ndata: 3\n\n`)
       }
     },
-  })
+  }, 0.5)
   const states = /** @type {boolean[]} */ ([])
   const seen = []
   for await (const event of streams.follow("/x", {}, { onLost: (lost) => states.push(lost) })) {
