@@ -194,7 +194,7 @@ def _kept(draw: random.Random) -> Operation:
 
 
 def _fault(draw: random.Random, *, in_store: bool) -> dict[str, Any]:
-    at = draw.choice((*(STORE_PLACES if in_store else FILE_PLACES), "step", "step", "history", "past"))
+    at = draw.choice((*(STORE_PLACES if in_store else FILE_PLACES), "step", "step", "settings", "history", "past"))
     match at:
         case "fetch":
             kinds: tuple[str, ...] = READ_FAULTS
@@ -202,7 +202,7 @@ def _fault(draw: random.Random, *, in_store: bool) -> dict[str, Any]:
             kinds = CALL_FAULTS
         case "send":
             kinds = SEND_FAULTS
-        case "step":
+        case "step" | "settings":
             kinds = STEP_FAULTS
         case "past":
             kinds = ("os", "memory")
@@ -211,7 +211,7 @@ def _fault(draw: random.Random, *, in_store: bool) -> dict[str, Any]:
         case _:
             kinds = FILE_FAULTS
     more = {
-        "nth": 1 + int(draw.expovariate(1 / 4)),
+        "nth": 1 + int(draw.expovariate(1 / (1 if at == "settings" else 4))),
         "kind": draw.choice(kinds),
         "calls": draw.choice((1, 1, 1, 2, 5, 20)),
     }

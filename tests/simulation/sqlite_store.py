@@ -20,7 +20,14 @@ from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import Progress, StoredContents
-from dynhull_server.storage.rows.group import CloseSegment, DropDeadSegment, EraseKeys, NameFile, RetireSegment
+from dynhull_server.storage.rows.group import (
+    CloseSegment,
+    DropDeadSegment,
+    EraseKeys,
+    NameFile,
+    RetireSegment,
+    SetHistory,
+)
 from dynhull_server.storage.rows.ledger import HullRows
 from dynhull_server.storage.segments.archive import HISTORY
 from dynhull_server.storage.sqlite import copies
@@ -35,9 +42,11 @@ from .past_retention import all_may_stay, may_go
 from .store import ERRORS, FaultyStorage
 
 FAILED = {"full": sqlite3.SQLITE_FULL, "lost": sqlite3.SQLITE_IOERR, "ghost": sqlite3.SQLITE_IOERR_FSYNC}
-# Commits that fail on their own: those in which segments become part of the past, or leave it, and those of consumers.
+# Commits that fail on their own: those in which segments become part of the past, or leave it, those of what is to be
+# kept, and those of consumers.
 OF_STEPS = {
     "step": (NameFile, CloseSegment, EraseKeys, RetireSegment, DropDeadSegment),
+    "settings": (SetHistory,),
     "consumer": (PutFeedConsumer, DropFeedConsumer),
 }
 # Where the folders of the lives are: in memory, where there is such a place.
