@@ -179,7 +179,7 @@ def test_a_hull_across_180_degrees_is_drawn_in_one_piece(
         assert (hull["points"]["x"], hull["points"]["y"]) == ([179.25], [-17])
         row = page.locator(".of_hulls").get_by_role("row").filter(has_text=name)
         expect(row.locator("td").nth(3)).to_contain_text("km²")
-        expect(page.locator("td[data-heading=Area]")).to_be_visible()
+        expect(page.locator(".of_hulls td[data-heading=Area]")).to_be_visible()
         expect(page.get_by_role("group", name="Picture of the hulls")).to_have_accessible_description(
             re.compile("longitude from 177.5 to 180.25, latitude from -18 to -16.25")
         )

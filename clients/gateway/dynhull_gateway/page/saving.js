@@ -7,8 +7,8 @@ function save_picture(picture, moment) {
   picture.clear(context)
   context.fillStyle = picture.colours.paper
   context.fillRect(0, 0, width, height)
-  if (picture.view.globe) picture.draw_globe(context, "")
-  else picture.draw_axes(context)
+  if (picture.view.globe) picture.draw_globe(context, picture.view, "")
+  else picture.draw_axes(context, picture.view)
   context.resetTransform()
   context.drawImage(picture.canvases[1], 0, 0)
   canvas.toBlob(content => download(content, `dynhull ${moment}.png`))
