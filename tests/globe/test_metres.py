@@ -151,7 +151,5 @@ def test_what_has_no_meaning_on_the_globe_is_refused():
     with pytest.raises(ValueError, match="without_self is for the plane"):
         fences.set_hull(1, [], margin=1, without_self=True)
     fences.set_hull(1, [[0, 0], [1e-3, 0], [0, 1e-3]])
-    with pytest.raises(ValueError, match="clear is for the plane"):
-        fences.clear(1, [[0, 0]], [1])
     with pytest.raises(ValueError, match=r"margin is 250001\.0: at most 250000 metres on the globe"):
         fences.set_hull(1, [], margin=250_001)

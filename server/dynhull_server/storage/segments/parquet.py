@@ -406,7 +406,7 @@ def _items(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return values if values.ndim == 1 else np.ascontiguousarray(values).view(np.complex128)[:, 0]
 
 
-def _of_revisions(file: pq.ParquetFile, same: dict[str, str | None], heads: _Heads) -> dict[str, Integers]:
+def _of_revisions(file: pq.ParquetFile, same: dict[str, str | None], heads: _RowPlaces) -> dict[str, Integers]:
     """What all rows of a revision have in common, and the revision itself: no more is read than each of them once."""
     counts = heads.counts
     numbers = np.arange(len(counts))
@@ -424,7 +424,7 @@ def _of_revisions(file: pq.ParquetFile, same: dict[str, str | None], heads: _Hea
     return {name: _constant(NO_TIME, len(heads.place)) for name in OF_REVISION} | arrays
 
 
-class _Heads(NamedTuple):
+class _RowPlaces(NamedTuple):
     """Where rows belong, which say that themselves.
 
     Attributes:
@@ -440,7 +440,7 @@ class _Heads(NamedTuple):
     place: Integers
 
 
-def _heads(file: pq.ParquetFile) -> _Heads:
+def _heads(file: pq.ParquetFile) -> _RowPlaces:
     """Where the rows of a file belong. ValueError if one is missing."""
     count, sizes = file.metadata.num_rows, [0]
     belongs, rows = np.empty(count, np.int32), np.empty(count, np.int32)
@@ -470,7 +470,7 @@ def _heads(file: pq.ParquetFile) -> _Heads:
         belongs[part], place[there] = there, rows[part]
     if not (place != NONE).all():
         raise ValueError("a row is missing")
-    return _Heads(first + least, counts, belongs, place)
+    return _RowPlaces(first + least, counts, belongs, place)
 
 
 def _rows_of(table: pa.Table, values: list[Any]) -> pa.Table:
