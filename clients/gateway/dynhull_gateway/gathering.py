@@ -181,9 +181,10 @@ def _joined(batches: Sequence[Batch]) -> Batch:
 
 async def _locate(client: AsyncHullClient, name: str, together: Sequence[_Waiting]) -> list[bytes]:
     located = await client.locate(name, [point for each in together for point in each.content])
+    revision, sides = located.revision, located.sides.tolist()
     answers, first = [], 0
     for each in together:
-        own = Located.model_validate(replace(located, sides=located.sides[first : first + each.rows]))
+        own = Located.model_construct(revision=revision, sides=sides[first : first + each.rows], keys_revision=None)
         answers.append(own.model_dump_json().encode() + b"\n")
         first += each.rows
     return answers
