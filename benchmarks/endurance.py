@@ -10,13 +10,12 @@ hold a tenth more than the third and the fourth; of the page, whose heap comes a
 import argparse
 import os
 import shutil
-import subprocess
 import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
+from workers import serving
 
 from dynhull_client import HullClient
 
@@ -24,15 +23,6 @@ SERVER = ["-m", "dynhull_server", "--port", "0", "--in-memory", "--log-level", "
 DASHBOARD = ["-m", "dynhull_cli", "dashboard", "--port", "0", "--address"]
 VEHICLES, YARD = 1000, [[0, 0], [10, 0], [10, 10], [0, 10]]
 LINES = 10
-
-
-@contextmanager
-def running(*command):
-    with subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[-1], process.pid
-        finally:
-            process.terminate()
 
 
 def resident(pid):
@@ -74,8 +64,8 @@ def main():
     parser.add_argument("--events", type=int, default=1_000_000)
     arguments = parser.parse_args()
     with (
-        running(*SERVER) as (address, _),
-        running(*DASHBOARD, address) as (url, dashboard),
+        serving(SERVER) as (address, _),
+        serving([*DASHBOARD, address]) as (url, dashboard),
         HullClient(address) as client,
         sync_playwright() as playwright,
     ):

@@ -6,14 +6,13 @@ have grown by meanwhile, divided by their number.
 
 import argparse
 import asyncio
-import subprocess
-import sys
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import AsyncExitStack, contextmanager
+from collections.abc import Awaitable, Callable
+from contextlib import AsyncExitStack
 from pathlib import Path
 from statistics import median
 
 import numpy as np
+from workers import serving
 
 from dynhull_client import AsyncHullClient
 
@@ -33,7 +32,7 @@ KINDS: dict[str, tuple[int, Hold]] = {}
 
 
 def kind(name: str, count: int) -> Callable[[Hold], Hold]:
-    """Names what is held, and how many of it tell enough."""
+    """Names what is held, and how many of it are enough to measure one."""
 
     def add(hold: Hold) -> Hold:
         KINDS[name] = count, hold
@@ -146,16 +145,6 @@ async def _many(client: AsyncHullClient, stack: AsyncExitStack, first: int, end:
         await anext(await stack.enter_async_context(client.watch_many("none/", reconnect=False)))
 
 
-@contextmanager
-def serving() -> Iterator[tuple[str, int]]:
-    """A server's address and the number of its process."""
-    with subprocess.Popen([sys.executable, *OPTIONS, *LIMITS], stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[-1], process.pid
-        finally:
-            process.terminate()
-
-
 def own_bytes(pid: int) -> int:
     lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     return sum(int(line.split()[1]) for line in lines if line.startswith("Private_")) * 1024
@@ -163,7 +152,7 @@ def own_bytes(pid: int) -> int:
 
 async def measure(hold: Hold, count: int) -> float:
     """Bytes for each of `count` more, after as many, which fill up what a server has freed since it started."""
-    with serving() as (address, pid):
+    with serving([*OPTIONS, *LIMITS]) as (address, pid):
         async with AsyncHullClient(address) as client, AsyncExitStack() as stack:
             await hold(client, stack, 0, count)
             before = own_bytes(pid)

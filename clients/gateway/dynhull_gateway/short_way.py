@@ -57,10 +57,11 @@ class ShortWay:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a small request, or pass it on as it came."""
-        name, work = self._found(scope)
-        if work is None:
+        found = self._found(scope)
+        if found is None:
             await self._app(scope, receive, send)
             return
+        name, work = found
         try:
             message = await receive()
             content = _content(message, work)
@@ -79,17 +80,17 @@ class ShortWay:
             response = of_value_error(error, read_json(message["body"]))
         await response(scope, receive, send)
 
-    def _found(self, scope: Scope) -> tuple[str, _Work | None]:
-        """The hull, and what is asked of it if the request can be a small one."""
+    def _found(self, scope: Scope) -> tuple[str, _Work] | None:
+        """The hull, and what is asked of it; None if the request cannot be a small one."""
         if scope["type"] != "http" or scope["method"] != "POST" or scope["query_string"]:
-            return "", None
+            return None
         found = PATH.fullmatch(scope["path"].removeprefix(self._root))
         if found is None:
-            return "", None
+            return None
         headers = dict(scope["headers"])
         small = LENGTH.fullmatch(headers.get(b"content-length", b"")) and int(headers[b"content-length"]) <= MOST_BYTES
         if not small or headers.get(b"content-type") != JSON.encode() or NUMBER in headers:
-            return "", None
+            return None
         return unquoted(found[1]), WORKS[found[2]]
 
 

@@ -187,8 +187,7 @@ class _Sifting:
         self, part: KeyWays, standing: Points, names: list[Key], lengths: Rows, loud: Rows, *, goes_on: bool
     ) -> _SiftedPart:
         """The rows of some keys that may mean something."""
-        some, lengths_of_all = [names[each] for each in loud.tolist()], lengths
-        lengths = lengths_of_all[loud]
+        some, lengths = [names[each] for each in loud.tolist()], lengths[loud]
         count = len(some)
         own = np.repeat(np.arange(count), lengths + 1)  # whose row it is
         heads = np.cumsum(lengths + 1) - lengths - 1
