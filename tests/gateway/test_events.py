@@ -52,8 +52,7 @@ def test_a_browser_misses_nothing_over_restarts(browser: Browser, tmp_path: Path
     """The server is restarted, then the gateway, while points and keys come: every event once, and the exact hull."""
     served = ["--data", str(tmp_path), "--port", str(free_port())]
     own = ["--port", str(free_port())]
-    # After 0: one that begins with the next event may begin after the first move, which a browser cannot see.
-    hull, fence = "/hulls/a%2Fb/events?rate=100", "/fences/yard/events?after=0"
+    hull, fence = "/hulls/a%2Fb/events?rate=100", "/fences/yard/events"
     moves = 0
 
     def move(client: HullClient) -> None:
@@ -259,6 +258,22 @@ def test_a_fence_from_any_place(gateway: Gateway, name: str) -> None:
     assert rest.next()[0] == "closed"
     for each in (everything, rest, consumer, later, strange, *replaced):
         each.close()
+
+
+def test_who_sees_a_stream_open_misses_no_event(gateway: Gateway, address: str, name: str) -> None:
+    """The place of "the next event" is known before the head of the answer is sent, and not looked for after it."""
+    with HullClient(address) as client:
+        client.create_hull(name, keyed="str")
+        client.create_fence(name, area=SQUARE, subjects=name, initial="none")
+        client.create_alarm(name, hull=name, when="count > 0")
+        for turn in range(1, 26):
+            streams = [Events(gateway, f"/{kind}/{quote(name, '')}/events") for kind in ("fences", "alarms")]
+            client.put(name, ["van"], [(1, 1)])  # at once: the answers have begun, and nothing else of them is read
+            client.remove(name, ["van"])
+            for each, kind in zip(streams, ("enter", "raised"), strict=True):
+                (_, nothing), (_, first) = each.next(), each.next()
+                assert (nothing, first["type"], first["sequence"]) == (None, kind, 2 * turn - 1)
+                each.close()
 
 
 def test_keys_and_distances_that_are_zero_are_in_events(gateway: Gateway, name: str) -> None:

@@ -1,6 +1,7 @@
 """A read that waits for a revision ends with its caller, at the server, too."""
 
 import json
+import signal
 import socket
 from contextlib import ExitStack, closing
 from urllib.parse import urlsplit
@@ -24,11 +25,16 @@ READS = [
 ]
 
 
-def ask(gateway: Gateway, method: str, path: str, body: object) -> socket.socket:
+# A read by parameters that are written otherwise, and a write of keys that are named as they are.
+QUOTED = f"/hulls/names?min%5Frevision={LATER}"
+NAMED = {"keys": ["min_revision", "keys_min_revision"], "points": [[1, 1], [2, 2]]}
+
+
+def ask(gateway: Gateway, method: str, path: str, body: object, headers: str = "") -> socket.socket:
     place = urlsplit(gateway.url)
     assert place.hostname is not None
     sent = b"" if body is None else json.dumps(body).encode()
-    head = f"{method} {path} HTTP/1.1\r\nHost: {place.netloc}\r\nContent-Type: application/json\r\n"
+    head = f"{method} {path} HTTP/1.1\r\nHost: {place.netloc}\r\nContent-Type: application/json\r\n{headers}"
     connection = socket.create_connection((place.hostname, place.port), PATIENCE)
     connection.sendall(f"{head}Content-Length: {len(sent)}\r\n\r\n".encode() + sent)
     return connection
@@ -65,6 +71,36 @@ def test_reads_end_with_their_callers() -> None:
             if name.startswith("dynhull_gateway_requests_total") and 'status="0"' in name
         ]
         assert sum(unanswered) == len(READS)
+
+
+def test_a_write_is_made_whatever_its_keys_are_called() -> None:
+    """Writes go on without their callers; those with such keys ended as reads do, and some of them were lost."""
+    port = free_port()
+    with (
+        measured() as (server, _),
+        gateway_process(server.address, "--metrics-port", str(port)) as gateway,
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("names", keyed="str")
+        assert gateway.get("/hulls/names").status == 200
+
+        def answered(status: int) -> float:
+            found = scrape(f"127.0.0.1:{port}").items()
+            return sum(each for name, each in found if "requests_total" in name and f'status="{status}"' in name)
+
+        before = answered(200)
+        server.process.send_signal(signal.SIGSTOP)
+        try:
+            written = ask(gateway, "POST", "/hulls/names/points", NAMED, "Idempotency-Key: writer:1\r\n")
+            asked = ask(gateway, "GET", QUOTED, None)
+            written.close()
+            asked.close()
+            wait_until(lambda: answered(0) == 1)  # the read, whose caller went last
+        finally:
+            server.process.send_signal(signal.SIGCONT)
+        wait_until(lambda: answered(200) == before + 1)
+        assert client.get_hull("names").vertices.tolist() == NAMED["points"]
+        assert answered(0) == 1
 
 
 def test_callers_that_stay_are_answered(address: str) -> None:

@@ -89,7 +89,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
     app.router.routes.extend(described)
     app.state.routes = [*pages, *described, *(route for router in routers for route in router.routes)]
     handlers.install(app)
-    app.add_middleware(WaitsForCallers)
+    app.add_middleware(WaitsForCallers, routes=app.state.routes, root_path=settings.root_path)
     app.add_middleware(ShortWay, root_path=settings.root_path)
     app.add_middleware(LimitedBodies, settings=settings)
     if settings.origins:

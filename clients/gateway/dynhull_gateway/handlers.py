@@ -19,9 +19,9 @@ from .heads import GET, HEAD
 from .invalid import of_validation
 from .problems import ProblemError, cut, problem
 from .refusals import of_refusal, of_value_error
+from .waits import REVISIONS
 
 NEAR = 3
-REVISIONS = "min_revision", "other_min_revision", "keys_min_revision"
 
 
 def install(app: FastAPI) -> None:

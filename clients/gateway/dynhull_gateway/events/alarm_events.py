@@ -7,8 +7,8 @@ from functools import partial
 from dynhull_cli.alarms.shown import event_members
 from dynhull_client import AlarmReplacedError, AsyncHullClient
 
-from .messages import COMMENT, message, place
-from .shared import over_restarts
+from .messages import COMMENT, message
+from .shared import over_restarts, told
 
 
 @dataclass(slots=True)
@@ -20,12 +20,14 @@ class AlarmReading:
         consumer: a durable consumer that knows its place; None for `uid` and `after`.
         uid: the uid of the alarm; empty if it is not known yet.
         after: the sequence of the last event that the reader has; None for new events only.
+        told: whether the reader has an id that says where it is.
     """
 
     name: str
     consumer: str | None
     uid: str
     after: int | None
+    told: bool = False
 
 
 def alarm_events(client: AsyncHullClient, reading: AlarmReading, keepalive: float) -> AsyncIterator[bytes]:
@@ -35,11 +37,8 @@ def alarm_events(client: AsyncHullClient, reading: AlarmReading, keepalive: floa
 
 async def _read(client: AsyncHullClient, reading: AlarmReading, keepalive: float) -> AsyncIterator[bytes]:
     """One watch, which continues over lost connections itself once it has begun."""
-    if reading.consumer is None and not (reading.uid and reading.after is not None):
-        alarm = await client.get_alarm(reading.name)
-        reading.uid = alarm.uid
-        reading.after = alarm.last_sequence if reading.after is None else reading.after
-        yield place(f"{reading.uid}:{reading.after}")  # a reader that is cut off before the first event misses none
+    if reading.consumer is None and not (reading.uid and reading.told):
+        yield await told(reading, client.get_alarm)
     after = None if reading.consumer else reading.after
     async with client.watch_alarm(
         reading.name, reading.consumer, after, uid=reading.uid, progress_interval=keepalive

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from dynhull_cli.fences.shown import event_members
 from dynhull_client import AsyncHullClient, FenceEvent, FenceReplacedError
 
-from .messages import COMMENT, message, place
-from .shared import over_restarts
+from .messages import COMMENT, message
+from .shared import over_restarts, told
 
 
 @dataclass(slots=True)
@@ -22,6 +22,7 @@ class Reading:
         after: the sequence of the last event that the reader has; None for new events only.
         conflate: whether to leave out events that cancel each other.
         exact: the sequence up to which none is left out again: the reader has a part of what was sent together.
+        told: whether the reader has an id that says where it is.
         ended: whether the fence was deleted.
     """
 
@@ -31,6 +32,7 @@ class Reading:
     after: int | None
     conflate: bool
     exact: int = 0
+    told: bool = False
     ended: bool = False
 
 
@@ -51,11 +53,8 @@ async def _watched(client: AsyncHullClient, reading: Reading, keepalive: float) 
     Who has a part of what was sent together is not where any sequence leads. The ids of such events say so, from which
     sequence to which, and a reader with such an id is sent all events of that part.
     """
-    if reading.consumer is None and not (reading.uid and reading.after is not None):
-        fence = await client.get_fence(reading.name)
-        reading.uid = fence.uid
-        reading.after = fence.last_sequence if reading.after is None else reading.after
-        yield place(f"{reading.uid}:{reading.after}")  # a reader that is cut off before the first event misses none
+    if reading.consumer is None and not (reading.uid and reading.told):
+        yield await told(reading, client.get_fence)
     exact = reading.conflate and (reading.after or 0) < reading.exact
     watch = client.watch_fence(
         reading.name,

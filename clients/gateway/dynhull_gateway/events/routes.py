@@ -27,6 +27,7 @@ from .fence_events import events as fence_events
 from .many import ManyFeed, ManyView
 from .messages import parted, position_of, resumed
 from .past_fence import PastEvents
+from .shared import begin_at
 from .stream import EventStream
 from .texts import Form, View
 
@@ -227,7 +228,7 @@ async def follow_fence(
     ident, exact = parted(last_event_id)
     resume = _resumed(ident, consumer, after)
     uid, place = resume or ("", after)
-    reading = Reading(name, consumer, uid, place, conflate, exact)
+    reading = Reading(name, consumer, uid, place, conflate, exact, told=resume is not None)
     await _require_events(client.get_fence, reading, "after" if resume is None else "Last-Event-ID")
     state = request.app.state
     texts = fence_events(client, reading, state.settings.keepalive_seconds)
@@ -255,7 +256,7 @@ async def follow_alarm(
     resume = _resumed(last_event_id, consumer, after)
     admit(request)
     uid, place = resume or ("", after)
-    reading = AlarmReading(name, consumer, uid, place)
+    reading = AlarmReading(name, consumer, uid, place, told=resume is not None)
     await _require_events(client.get_alarm, reading, "after" if resume is None else "Last-Event-ID")
     state = request.app.state
     texts = alarm_events(client, reading, state.settings.keepalive_seconds)
@@ -359,7 +360,10 @@ async def _require_keys(client: AsyncHullClient, name: str) -> None:
 async def _require_events(
     get: Callable[[str], Awaitable[Fence | Alarm]], reading: Reading | AlarmReading, field: str
 ) -> None:
-    """Refuse what is not there, or has no such event yet. While the server is away the stream waits for it."""
+    """Learn where the stream begins, and refuse what is not there, or has no such event yet.
+
+    While the server is away the stream waits for it.
+    """
     with suppress(UnavailableError):
         there = await get(reading.name)
         if reading.uid not in ("", there.uid):
@@ -367,6 +371,8 @@ async def _require_events(
         elif reading.after is not None and reading.after > there.last_sequence:
             detail = f"{field}: {reading.after} is after the last event, {there.last_sequence}"
             raise ProblemError(409, detail, "SEQUENCE_AHEAD", field=field, value=str(reading.after))
+        elif reading.consumer is None:
+            begin_at(reading, there)
 
 
 def admit(request: Request) -> None:

@@ -3,15 +3,16 @@
 import asyncio
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Hashable
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Hashable
 from contextlib import AbstractAsyncContextManager, aclosing, suppress
 from typing import Any, Generic, Protocol, TypeVar
 
 import grpc
 
-from dynhull_client import DynhullError
+from dynhull_client import Alarm, DynhullError, Fence
 
 from .messages import COMMENT, message, problem
+from .messages import place as text_of_place
 
 log = logging.getLogger(__name__)
 
@@ -121,6 +122,32 @@ class Place(Protocol):
     name: Any
     uid: str
     after: Any
+
+
+class NumberedPlace(Place, Protocol):
+    """How far a reader of numbered events is, and whether it has been sent where that is."""
+
+    told: bool
+
+
+def begin_at(place: NumberedPlace, there: Fence | Alarm) -> None:
+    """Begin after the last event, unless the reader says where."""
+    place.uid = there.uid
+    place.after = there.last_sequence if place.after is None else place.after
+
+
+async def told(place: NumberedPlace, get: Callable[[str], Awaitable[Fence | Alarm]]) -> bytes:
+    """The id of where a reader begins, which misses nothing if it is cut off before the first event.
+
+    Args:
+        place: where that is. It is looked for here only if it is not known: a reader sees its stream open before, and
+            what happens from then on is to come.
+        get: asks for what is read.
+    """
+    if not place.uid:
+        begin_at(place, await get(place.name))
+    place.told = True
+    return text_of_place(f"{place.uid}:{place.after}")
 
 
 async def over_restarts(
