@@ -77,12 +77,28 @@ function lengthOf(value) {
  * @returns {-1 | 0 | 1}
  */
 export function turn(a, b, c) {
-  if (plain(a) && plain(b) && plain(c)) {
+  return turnOf(a[0], a[1], b[0], b[1], c[0], c[1])
+}
+
+/**
+ * The same, of coordinates.
+ * @param {number} ax
+ * @param {number} ay
+ * @param {number} bx
+ * @param {number} by
+ * @param {number} cx
+ * @param {number} cy
+ * @returns {-1 | 0 | 1}
+ */
+export function turnOf(ax, ay, bx, by, cx, cy) {
+  const certain = certainSign((bx - ax) * (cy - ay), (ay - by) * (cx - ax))
+  if (certain) return certain
+  if (usual(ax) && usual(ay) && usual(bx) && usual(by) && usual(cx) && usual(cy)) {
     // The library's y axis points down: its sign is the other one.
-    return /** @type {-1 | 0 | 1} */ (-Math.sign(orient2d(a[0], a[1], b[0], b[1], c[0], c[1])) || 0)
+    return /** @type {-1 | 0 | 1} */ (-Math.sign(orient2d(ax, ay, bx, by, cx, cy)) || 0)
   }
-  const [ax, ay] = [scaled(a[0]), scaled(a[1])]
-  return signOf((scaled(b[0]) - ax) * (scaled(c[1]) - ay) - (scaled(b[1]) - ay) * (scaled(c[0]) - ax))
+  const [left, low] = [scaled(ax), scaled(ay)]
+  return signOf((scaled(bx) - left) * (scaled(cy) - low) - (scaled(by) - low) * (scaled(cx) - left))
 }
 
 /**
@@ -129,13 +145,9 @@ export function area(corners) {
   return rounded(twice, 1n, -2 * LOWEST - 1)
 }
 
-/** @param {Point} point */
-function plain([x, y]) {
-  return usual(Math.abs(x)) && usual(Math.abs(y))
-}
-
-/** @param {number} size */
-function usual(size) {
+/** @param {number} value */
+function usual(value) {
+  const size = Math.abs(value)
   return size === 0 || (size > SMALL && size < LARGE)
 }
 

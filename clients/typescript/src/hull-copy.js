@@ -1,3 +1,4 @@
+import { Chains } from "./chains.js"
 import { ahead, area, ascent, gap, gapToLine, turn } from "./exact.js"
 import { DynhullError } from "./errors.js"
 import { Ring } from "./ring.js"
@@ -7,6 +8,9 @@ import { Ring } from "./ring.js"
  * @typedef {import("./watch.js").HullEvent} HullEvent
  * @typedef {string | bigint} Key
  */
+
+/** Making the chains takes as long as about one question without them for so many vertices. */
+const CHAINED = 32
 
 /**
  * A page's own copy of a hull that is watched: it answers without a call, and exactly, at the revision of the last event.
@@ -26,6 +30,10 @@ export class HullCopy {
   #keys = null
   /** The row of the greatest vertex, once it was looked for. @type {number | null} */
   #greatest = null
+  /** For many questions after an event. @type {Chains | null} */
+  #chains = null
+  /** How many sides were asked since the last event: as many as these pay for the chains. */
+  #asked = 0
   #updated = -Infinity
 
   /**
@@ -72,13 +80,15 @@ export class HullCopy {
     this.revision = event.revision
     this.points = event.points
     this.#updated = performance.now()
-    this.#greatest = null
+    this.#greatest = this.#chains = null
+    this.#asked = 0
   }
 
   /** Hold no hull, as after its deletion. */
   clear() {
     this.#vertices = new Ring([])
-    this.#keys = this.center = this.#greatest = null
+    this.#keys = this.center = this.#greatest = this.#chains = null
+    this.#asked = 0
     this.revision = 0n
     this.points = 0
     this.#known = false
@@ -106,7 +116,9 @@ export class HullCopy {
    */
   locate(points) {
     this.#require(points)
-    return Int8Array.from(points, (point) => this.#side(point))
+    const sides = new Int8Array(points.length)
+    for (let row = 0; row < sides.length; row++) sides[row] = this.#side(points[row])
+    return sides
   }
 
   /**
@@ -189,6 +201,8 @@ export class HullCopy {
     const greatest = this.#last()
     if (compared(point, vertices.at(0)) < 0 || compared(point, vertices.at(greatest)) > 0) return -1
     if (count === 1) return 0
+    if (this.#chains === null && ++this.#asked * CHAINED > count) this.#chains = new Chains(this.vertices, greatest)
+    if (this.#chains !== null) return this.#chains.side(point[0], point[1])
     // The edges below and above the point: the last of each chain that does not begin after it.
     const low = this.#edge(0, greatest, 1, point)
     const high = this.#edge(greatest, count, -1, point)

@@ -2,6 +2,7 @@ import assert from "node:assert/strict"
 import { readFile } from "node:fs/promises"
 import { test } from "node:test"
 
+import { scaled } from "../src/exact.js"
 import { HullCopy } from "../src/index.js"
 import { fromJson } from "../src/json.js"
 import { Ring } from "../src/ring.js"
@@ -27,6 +28,32 @@ test("copies answer as the library does, for every finite double", async () => {
     assert.deepEqual(copy.tangents(known.points), known.tangents, asked("tangents"))
     if (known.vertices.length) assert.deepEqual(copy.support(known.directions), known.support, asked("support"))
     assert.equal(finite(copy.area), known.area, asked("area"))
+  }
+})
+
+/** What integers say of a point. @param {number[][]} vertices @param {number[]} point */
+function sideOf(vertices, [x, y]) {
+  const turns = vertices.map(([ax, ay], row) => {
+    const [bx, by] = vertices[(row + 1) % vertices.length]
+    return (scaled(bx) - scaled(ax)) * (scaled(y) - scaled(ay)) - (scaled(by) - scaled(ay)) * (scaled(x) - scaled(ax))
+  })
+  return turns.some((turn) => turn < 0n) ? -1 : turns.includes(0n) ? 0 : 1
+}
+
+test("the first questions after an event and many answer alike: vertices close together, upright edges, extreme doubles", () => {
+  const even = Array.from({ length: 81 }, (_, row) => row - 40)
+  const crowded = [...Array.from({ length: 25 }, (_, row) => -(2 ** (24 - row))), ...Array.from({ length: 25 }, (_, row) => 2 ** row)]
+  for (const scale of [1, 2 ** -1070, 2 ** -600, 2 ** 960]) {
+    for (const xs of [even, crowded]) {
+      const top = xs[0] ** 2 + 16
+      const vertices = [...xs.map((x) => [x, x * x]), [-xs[0], top], [xs[0], top]].map(([x, y]) => [x * scale, y * scale])
+      const middles = vertices.map(([x, y], row) => [x, y].map((each, axis) => each / 2 + vertices.at(row - 1)[axis] / 2))
+      const near = [...vertices, ...middles].flatMap(([x, y]) => [0, -scale, scale].flatMap((step) => [[x + step, y], [x, y + step]]))
+      const sides = near.map((point) => sideOf(vertices, point))
+      assert.deepEqual(new Set(sides), new Set([-1, 0, 1]))
+      assert.deepEqual([...copyOf(vertices).locate(near)], sides)
+      assert.deepEqual(near.map((point) => copyOf(vertices).side(point)), sides)
+    }
   }
 })
 
