@@ -158,6 +158,11 @@ REASONS: Mapping[str, Reason] = {
         "The server's disk failed during the batch, which may have been applied; a writer resolves this itself.",
         Repeat.IDEMPOTENT,
     ),
+    "PAST_DAMAGED": Reason(
+        Code.DATA_LOSS,
+        "PastDamagedError",
+        "A part of the past is missing or damaged; the message names its revisions.",
+    ),
     "PERMISSION_DENIED": Reason(Code.PERMISSION_DENIED, "PermissionDeniedError", "The token does not allow the call."),
     "POINT_MISSING": Reason(
         Code.FAILED_PRECONDITION, "PointMissingError", "A batch deletes a point that the hull does not have."

@@ -104,6 +104,7 @@ EXPORTED = [
     "Points",
     "Polygon",
     "Past",
+    "PastDamagedError",
     "Positions",
     "Prefix",
     "ProducerInUseError",

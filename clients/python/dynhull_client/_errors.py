@@ -36,6 +36,7 @@ __all__ = [
     "LimitExceededError",
     "MethodUnknownError",
     "OutcomeUnknownError",
+    "PastDamagedError",
     "PermissionDeniedError",
     "PointMissingError",
     "ProducerInUseError",
@@ -138,6 +139,10 @@ class SequenceGapError(DynhullError):
 
 class ProducerInUseError(DynhullError):
     """A writer's batch had been applied before it was sent: another writer uses the same producer name."""
+
+
+class PastDamagedError(DynhullError):
+    """A part of the past of a hull is missing or damaged on the server. The message names its revisions."""
 
 
 class RestoredError(DynhullError):

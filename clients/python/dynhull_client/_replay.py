@@ -124,7 +124,7 @@ class ReplayPlace(HullPlace):
     def end(self, error: DynhullError) -> Sequence[Event]:
         """Prepare the next connection after one has ended; raises the error if there is none."""
         self.lost = error
-        if error.reason == "STORAGE_FAILED":  # a segment is missing or damaged: the next connection would not find it
+        if error.reason == "STORAGE_FAILED":  # keys were erased meanwhile, or an object store is away: it begins anew
             raise error from None
         self._continue_later(error)
         if self._origin is not None and self.request.speed:

@@ -15,7 +15,6 @@ from ..state.errors import (
     HullUnsuitableError,
     NotStoredError,
     RevisionForgottenError,
-    words_for_callers,
 )
 from ..state.records import CommitStamp, Record
 from ..storage.past import Moment, Past
@@ -23,7 +22,7 @@ from ..storage.port import DamagedError
 from .divided_hull import DividedHull
 from .driver import Driver
 from .live_hull import LiveHull
-from .recalls import UNREADABLE
+from .recalls import UNREADABLE, past_refusal
 
 
 @dataclass(slots=True)
@@ -151,7 +150,7 @@ class HullFeeds:
         except KeyError:
             raise HullNotFoundError(hull.name) from None
         except UNREADABLE as error:
-            raise NotStoredError(words_for_callers(error)) from error
+            raise past_refusal(error) from error
 
 
 def _moment(past: Past, time: int, number: int) -> Moment | None:

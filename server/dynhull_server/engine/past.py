@@ -20,7 +20,6 @@ from ..state.errors import (
     NotStoredError,
     RefusedError,
     RevisionForgottenError,
-    words_for_callers,
 )
 from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
@@ -33,7 +32,7 @@ from .divided_hull import DividedHull
 from .driver import Driver
 from .fences import Fences
 from .live_hull import LiveHull
-from .recalls import UNREADABLE, Recalls
+from .recalls import UNREADABLE, Recalls, past_refusal
 
 T = TypeVar("T")
 Outcome = Literal["anew", "kept", "unreadable"]
@@ -449,7 +448,7 @@ class PastHulls:
             raise HullNotFoundError(name) from None
         except UNREADABLE as error:
             self.outcomes["unreadable"] += 1
-            raise NotStoredError(words_for_callers(error)) from error
+            raise past_refusal(error) from error
 
     async def holes(self) -> list[Hole]:
         """What of the past of hulls could not be read when it was last needed."""

@@ -11,7 +11,13 @@ from typing import Any
 from dynhull.arrays import Points
 
 from ..state.contents import replayed
-from ..state.errors import HullNotFoundError, NotStoredError, RevisionForgottenError, words_for_callers
+from ..state.errors import (
+    HullNotFoundError,
+    NotStoredError,
+    PastDamagedError,
+    RevisionForgottenError,
+    words_for_callers,
+)
 from ..state.hull import Hull
 from ..state.records import HullSettings, Kept
 from ..storage.port import DamagedError, Storage, StorageError
@@ -19,6 +25,14 @@ from ..storage.port import DamagedError, Storage, StorageError
 Answer = Points | Exception
 # The errors of a read when the machine has run out of a resource.
 UNREADABLE = (StorageError, OSError, MemoryError)
+
+
+def past_refusal(error: Exception) -> NotStoredError:
+    """What callers get for a past that cannot be read; only what is not damaged may be asked for again."""
+    kind = PastDamagedError if isinstance(error, DamagedError) else NotStoredError
+    return kind(words_for_callers(error))
+
+
 # Bytes of vertices that callers hold at a time, about: further revisions are read after these.
 MOST_BYTES = 64 * 2**20
 

@@ -38,6 +38,7 @@ from ..state.errors import (
     OutcomeUnknownError,
     PagesForgottenError,
     PartRefusedError,
+    PastDamagedError,
     PointMissingError,
     PositionForgottenError,
     RefusedError,
@@ -190,6 +191,7 @@ REFUSALS: Mapping[type[Exception], Refusal] = {
     OutcomeUnknownError: Refusal("OUTCOME_UNKNOWN"),
     PagesForgottenError: Refusal("REVISION_FORGOTTEN", lambda e: {"field": "vertex_page_token", "value": e.revision}),
     PositionForgottenError: Refusal("REVISION_FORGOTTEN", lambda _: {"field": "position"}),
+    PastDamagedError: Refusal("PAST_DAMAGED"),
     PermissionDeniedError: Refusal("PERMISSION_DENIED", lambda e: {"scope": e.scope, "value": e.name}),
     RestoredError: Refusal(
         "RESTORED", lambda e: {"value": e.name, "uid": e.uid, "last": e.last, "expected": e.last + 1}

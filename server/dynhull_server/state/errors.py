@@ -457,6 +457,10 @@ class DiskFullError(NotStoredError):
     """The disk is full; nothing of the change was applied."""
 
 
+class PastDamagedError(NotStoredError):
+    """What is kept of the past is missing or damaged, and stays so until somebody brings it back."""
+
+
 class ShardAwayError(RefusedError):
     """A shard of the hull does not answer, so nothing of the request was applied, and it may be sent again.
 

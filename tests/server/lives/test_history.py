@@ -1,6 +1,7 @@
 """The past of hulls that keep theirs, as clients of real processes see it: how much is there, and that it survives."""
 
 import json
+import os
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
@@ -10,9 +11,16 @@ from cases import with_all_cases
 from command_line import dynhull
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
-from server_process import server_process, shape_options
+from server_process import run, server_process, shape_options
 
-from dynhull_client import DynhullError, HullClient, HullUnsuitableError, InvalidRequestError
+from dynhull_client import (
+    DynhullError,
+    HullClient,
+    HullUnsuitableError,
+    InvalidRequestError,
+    PastDamagedError,
+    UnavailableError,
+)
 from dynhull_server.state.records import KeyRows
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -69,6 +77,57 @@ def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_pa
         newest.write_bytes(content)
         assert client.at("fleet", int(first)).positions(KEYS).positions.tolist() == positions(int(first)).tolist()
         assert not [name for name in scrape(metrics) if name.startswith("dynhull_past_holes")]
+
+
+def test_what_is_in_memory_or_a_part_of_a_file_does_not_hide_a_hole(tmp_path):
+    with measured("--data", str(tmp_path), *SNAPSHOTS) as (server, metrics), HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="str", history="30d")
+        write_until_filed(client, "fleet", 1)
+        client.at("fleet", 2).positions(KEYS)  # the batches stay in memory
+        file = min(tmp_path.rglob("*.batches.parquet"))
+        first, last, *_ = file.name.split("-")
+        content = file.read_bytes()
+        file.write_bytes(content + b"more")
+        named = f"revisions {int(first)} to {int(last)} cannot be read"
+        with pytest.raises(PastDamagedError, match=named):
+            client.track("fleet", KEYS[:1])
+        client.at("fleet", 3).positions(KEYS)
+        hole = f'dynhull_past_holes{{first="{int(first)}",hull="fleet",last="{int(last)}"}}'
+        assert scrape(metrics)[hole] == 1
+
+        file.write_bytes(content)
+        client.track("fleet", KEYS[:1])
+        assert hole in scrape(metrics), "a part of a file says nothing of the rest"
+    with measured("--data", str(tmp_path), *SNAPSHOTS) as (server, metrics), HullClient(server.address) as client:
+        file.unlink()
+        os.mkfifo(file)  # nobody writes to it
+        with pytest.raises(UnavailableError, match=named):
+            client.at("fleet", int(first))
+        assert scrape(metrics)[hole] == 1
+        file.unlink()
+        file.write_bytes(content)
+        client.at("fleet", int(first)).positions(KEYS)
+        assert hole not in scrape(metrics)
+
+
+def test_a_feed_ends_at_a_hole_with_its_revisions_and_goes_on_behind_it(tmp_path):
+    with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="str", history="30d")
+        revision = write_until_filed(client, "fleet", 1)
+        file = min(tmp_path.rglob("*.batches.parquet"))
+        file.unlink()
+        last = int(file.name.split("-")[1])
+        named = f"revisions 1 to {last} cannot be read"
+        for begin in ({"after": 0}, {"consumer": "sink"}):
+            with client.feed("fleet", **begin, timeout=PATIENCE) as feed, pytest.raises(PastDamagedError, match=named):
+                next(feed)
+        with client.feed(prefix="", after=0, timeout=PATIENCE) as feed, pytest.raises(PastDamagedError, match=named):
+            next(feed)
+        command = run("feed", "fleet", "--after", "0", "--address", server.address)
+        assert (command.returncode, named in command.stderr) == (1, True), command.stderr
+        client.ack_feed("fleet", consumer="sink", after=last)
+        with client.feed("fleet", consumer="sink", timeout=PATIENCE) as feed:
+            assert [next(feed).revision for _ in range(revision - last)] == list(range(last + 1, revision + 1))
 
 
 def test_how_much_is_kept_is_told_changed_and_lost_with_the_hull(tmp_path):

@@ -38,7 +38,7 @@ class Filed:
         archive: has their files.
 
     Attributes:
-        unreadable: the names of the files that could not be read when they were last needed.
+        unreadable: the names of the files that could not be read, and have not been read as a whole since.
     """
 
     def __init__(self, archive: Archive) -> None:
@@ -124,7 +124,7 @@ class Filed:
         for segment in segments:
             name = segment.file + BATCHES
             try:
-                with self._noted(segment, BATCHES), self._archive.parts(name, segment.facts.wrote) as file:
+                with self._named(segment, BATCHES), self._archive.parts(name, segment.facts.wrote) as file:
                     columns, _, _ = keys_from_parquet(file, name, keys)
             except StorageError as error:
                 return [*found, error]
@@ -140,8 +140,10 @@ class Filed:
         """What a function makes of the moves of keys of one segment, from a revision on."""
         segment = _segment(hull, after + 1)
         name, last = segment.file + BATCHES, min(until, segment.last)
-        with self._noted(segment, BATCHES):
-            ways = ways_from_parquet(self._archive.read(name, segment.facts.wrote), name, after, last)
+        with self._named(segment, BATCHES):
+            content = self._archive.read(name, segment.facts.wrote)
+            self._readable(name)
+            ways = ways_from_parquet(content, name, after, last)
             return last, None if ways is None else read(ways)
 
     def forget(self, file: str) -> None:
@@ -161,7 +163,7 @@ class Filed:
         reading, begins = self._reading(segment)
         if begins:
             self._read(segment, reading)
-        with self._noted(segment, BATCHES):
+        with self._named(segment, BATCHES):
             return reading.result()
 
     def _reading(self, segment: StoredSegment) -> "tuple[Future[Batches], bool]":
@@ -180,7 +182,9 @@ class Filed:
     def _read(self, segment: StoredSegment, reading: "Future[Batches]") -> None:
         """Read a segment. Others wait for it; if it cannot be read, who needs it next tries again."""
         try:
-            reading.set_result(read_batches(self._archive, segment))
+            found = read_batches(self._archive, segment)
+            self._readable(segment.file + BATCHES)
+            reading.set_result(found)
         except Exception as error:
             self.forget(segment.file)
             reading.set_exception(error)
@@ -197,12 +201,15 @@ class Filed:
     def _read_state(self, segment: StoredSegment, keys: Keys | None) -> Kept:
         if segment.first == 1:
             return Kept()
-        with self._noted(segment, STATE):
-            return read_state(self._archive, segment, keys)
+        with self._named(segment, STATE):
+            found = read_state(self._archive, segment, keys)
+        if keys is None:
+            self._readable(segment.file + STATE)
+        return found
 
     @contextmanager
-    def _noted(self, segment: StoredSegment, end: str) -> Iterator[None]:
-        """Say which revisions cannot be read without a file, and take note of whether it can."""
+    def _named(self, segment: StoredSegment, end: str) -> Iterator[None]:
+        """Say which revisions cannot be read without a file, and take note that it cannot."""
         file, first, last = segment.file + end, segment.first, segment.last
         what = f"revisions {first} to {last}" if end == BATCHES else f"the state at revision {first - 1}"
         try:
@@ -213,6 +220,9 @@ class Filed:
             why = "is missing or damaged" if isinstance(error, DamagedError) else "cannot be read at present"
             plainly = f"{what} cannot be read: segment {segment.file} {why}"
             raise type(error)(f"{what} cannot be read: {error}", for_callers=plainly) from error
+
+    def _readable(self, file: str) -> None:
+        """Take note that all of a file has been read: what is in memory, or a part of it, says nothing of the rest."""
         with self._turn:
             self.unreadable.discard(file)
 

@@ -1,5 +1,6 @@
 """The folder of the past: two files for each segment, written once, and read with the hash of all their bytes."""
 
+import errno
 import io
 import os
 from base64 import b64decode, b64encode
@@ -44,7 +45,7 @@ class _Blocks(io.RawIOBase):
         self._size = written.bytes
         self._at = 0
         self._blocks: dict[int, bytes] = {}  # those that have been read: columns of a group share them
-        self._file = path.open("rb", buffering=0)
+        self._file = _opened(path)
         if os.fstat(self._file.fileno()).st_size != self._size:
             self.close()
             raise _changed(path)
@@ -166,14 +167,14 @@ class Archive:
             raise StorageError(f"{path} cannot be read: {error}") from error
 
     def content(self, file: str, size: int = 0) -> bytes:
-        """All bytes of a file, which had a size, whatever they are.
+        """All bytes of a file, whatever they are; no more than one byte more than a size, if that is not 0.
 
         Raises:
             FileNotFoundError: it is not there.
             OSError: it cannot be read at present.
         """
-        del size
-        return (self.path / file).read_bytes()
+        with _opened(self.path / file) as content:
+            return content.read(size + 1) if size else content.read()
 
     def remove(self, file: str) -> None:
         """Remove the files of a segment; those that are not there are passed over.
@@ -227,6 +228,13 @@ class Archive:
         """Make the names of all files durable."""
         for folder in [self.path.parent, self.path, *(each for each in self.path.iterdir() if each.is_dir())]:
             make_durable(folder)
+
+
+def _opened(path: Path) -> io.BufferedReader:
+    """A file to read. Raises OSError if it is a pipe, which would let nobody go, or a device, which may have no end."""
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "it is no file", str(path))
+    return path.open("rb")
 
 
 def written(content: bytes) -> Written:

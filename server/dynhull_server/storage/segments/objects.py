@@ -85,7 +85,7 @@ class ObjectArchive(Archive):
         return written(content)
 
     def content(self, file: str, size: int = 0) -> bytes:
-        """All bytes of an object, whatever they are.
+        """All bytes of an object, whatever they are; no more than one byte more than a size, if that is not 0.
 
         Raises:
             FileNotFoundError: it is not there.
@@ -95,7 +95,7 @@ class ObjectArchive(Archive):
 
         def get() -> bytes:
             with self._store().open_input_file(key) as stream:
-                found: bytes = stream.read()
+                found: bytes = stream.read(size + 1 if size else None)
             return found
 
         return self._ask(file, get, size)
