@@ -1,6 +1,7 @@
 """A machine in which time is simulated and threads take turns: the event loop, and greenlets for threads.
 
-The loop is first in, first out, as asyncio's is, one callback a turn; time passes in turns of its own, from timer to
+The loop is first in, first out, as asyncio's is, one callback a turn, or in brisk lives often all that are ready; time
+passes in turns of its own, from timer to
 timer. A thread runs until it waits, or gives way where it would for a disk.
 """
 
@@ -24,6 +25,8 @@ from .schedule import Schedule
 
 # Pauses are as long as the work before them, in which other pauses may pass here: they would grow without end.
 LONGEST_PAUSE = 60.0
+# How often a brisk loop carries out all that is ready.
+ALL_AT_ONCE = 0.8
 # As many as are asked for.
 MANY_THREADS = 1_000
 
@@ -42,6 +45,7 @@ class Loop(asyncio.AbstractEventLoop):
         self.dead = False
         self.tasks: list[asyncio.Task[Any]] = []
         self._model = model
+        self._schedule = schedule
         self._ready: deque[asyncio.Handle] = deque()
         self._timers: list[tuple[float, int, asyncio.TimerHandle]] = []
         self._timer_count = 0
@@ -50,13 +54,15 @@ class Loop(asyncio.AbstractEventLoop):
         schedule.actor("time", self._may_pass, self._pass)
 
     def _run(self) -> None:
-        handle = self._ready.popleft()
-        if not handle.cancelled():
-            asyncio._set_running_loop(self)
-            try:
-                handle._run()
-            finally:
-                asyncio._set_running_loop(None)
+        all_of_them = self._schedule.brisk and len(self._ready) > 1 and self._schedule.random.random() < ALL_AT_ONCE
+        asyncio._set_running_loop(self)
+        try:
+            for _ in range(len(self._ready) if all_of_them else 1):
+                handle = self._ready.popleft()
+                if not handle.cancelled():
+                    handle._run()
+        finally:
+            asyncio._set_running_loop(None)
 
     def _may_pass(self) -> object:
         """Whether time may pass to the next timer."""

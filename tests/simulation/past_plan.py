@@ -69,10 +69,11 @@ def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
         for client in life["clients"]:
             for op in client:
                 if op["do"] == "create" and files:
-                    op |= _kept(draw)
+                    op |= kept(draw)
             for _ in range(draw.randint(0, 3)):
-                client.insert(draw.randint(0, len(client)), _of_past(draw, draw.choice(names), files=files))
-        life["clients"].append(_written_until_filed(draw, draw.choice(names), files=files))
+                client.insert(draw.randint(0, len(client)), of_past(draw, draw.choice(names), files=files))
+        name, rounds = draw.choice(names), draw.randint(2, 6)
+        life["clients"].append(written_until_filed(draw, name, rounds=rounds, reads=(0, 1, 2), files=files))
     fed = random.Random(f"fed {plan['seed']}")
     if fed.random() < WITH_CONSUMERS:
         for life in plan["lives"]:
@@ -82,9 +83,9 @@ def add_past(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
             plan["faults"].append(fault)
     aged = random.Random(f"aged {plan['seed']}")  # the other plans stay as they were
     if files and plan["segment_rows"] is None and aged.random() < BEYOND_ITS_AGE:
-        aged.choice(plan["lives"])["clients"].append(_written_beyond_its_age(aged.choice(names)))
+        aged.choice(plan["lives"])["clients"].append(written_beyond_its_age(aged.choice(names)))
     if files and draw.random() < 0.6:
-        plan["faults"] += [_fault(draw, in_store=plan["store"]) for _ in range(draw.choice((1, 1, 2, 3)))]
+        plan["faults"] += [fault_of_past(draw, in_store=plan["store"]) for _ in range(draw.choice((1, 1, 2, 3)))]
 
 
 def add_past_to_cluster(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
@@ -122,21 +123,29 @@ def _add_consumers(draw: random.Random, life: dict[str, Any], name: str) -> None
     """Consumers follow the feed of a hull, each from where it was in the life before."""
     clients = [*life["clients"], []]
     for _ in range(draw.choice((2, 4, 8))):
-        do = draw.choice(("consume",) * 9 + ("unconsume",))
-        op: Operation = {"do": do, "name": name, "consumer": draw.randrange(2), "most": draw.choice((1, 1, 3, 100))}
-        if draw.random() < 0.15:
-            op["leave"] = int(draw.expovariate(1 / 5))
+        op = consumes(draw, name)
         client = draw.choice((*clients, clients[-2]))
         client.insert(draw.randint(0, len(client)), op)
     life["clients"] = [each for each in clients if each]
 
 
-def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list[Operation]:
+def consumes(draw: random.Random, name: str) -> Operation:
+    """A consumer of the feed of a hull reads on, or is deleted."""
+    do = draw.choice(("consume",) * 9 + ("unconsume",))
+    op: Operation = {"do": do, "name": name, "consumer": draw.randrange(2), "most": draw.choice((1, 1, 3, 100))}
+    if draw.random() < 0.15:
+        op["leave"] = int(draw.expovariate(1 / 5))
+    return op
+
+
+def written_until_filed(
+    draw: random.Random, name: str, *, rounds: int, reads: tuple[int, ...], files: bool = True
+) -> list[Operation]:
     """A hull is written to, and rests until its snapshots and segments are written, again and again."""
     create = _creation(name)
-    scene = [create | _kept(draw) if files else create]
+    scene = [create | kept(draw) if files else create]
     write, put = _writes(name)
-    for _ in range(draw.randint(2, 6)):
+    for _ in range(rounds):
         for _ in range(draw.randint(1, 4)):
             if name not in TIMED:
                 scene.append(write | ({"delete": "lenient"} if draw.random() < 0.3 else {}))
@@ -146,11 +155,11 @@ def _written_until_filed(draw: random.Random, name: str, *, files: bool) -> list
                 scene.append(put | {"keys": keys, "removes": removes})
         if draw.random() < 0.8:
             scene.append({"do": "rest", "name": name, "seconds": draw.choice((0.3, ROUND, ROUND, 2 * ROUND))})
-        scene += [_of_past(draw, name, files=files) for _ in range(draw.choice((0, 1, 2)))]
+        scene += [of_past(draw, name, files=files) for _ in range(draw.choice(reads))]
     return scene
 
 
-def _written_beyond_its_age(name: str) -> list[Operation]:
+def written_beyond_its_age(name: str) -> list[Operation]:
     """A hull is written to until its first segments are too old, each for a while only in part."""
     write, put = _writes(name)
     one = put | {"keys": [0]} if name in TIMED else write
@@ -171,7 +180,7 @@ def _writes(name: str) -> tuple[Operation, Operation]:
     return write, write | {"do": "put", "removes": [], "time": 0}
 
 
-def _of_past(draw: random.Random, name: str, *, files: bool) -> Operation:
+def of_past(draw: random.Random, name: str, *, files: bool) -> Operation:
     """A request about the past."""
     do = draw.choice((*READS * 3, *(("keep_past", "erase", "erase") if files else ())))
     if draw.random() < 0.05:
@@ -188,12 +197,14 @@ def _of_past(draw: random.Random, name: str, *, files: bool) -> Operation:
     return op
 
 
-def _kept(draw: random.Random) -> Operation:
+def kept(draw: random.Random) -> Operation:
+    """How much of the past is kept."""
     history, most_bytes = draw.choice(HISTORIES)
     return {"history": history, "history_bytes": most_bytes}
 
 
-def _fault(draw: random.Random, *, in_store: bool) -> dict[str, Any]:
+def fault_of_past(draw: random.Random, *, in_store: bool) -> dict[str, Any]:
+    """A file, a call of a store, a step of filing or a read fails."""
     at = draw.choice((*(STORE_PLACES if in_store else FILE_PLACES), "step", "step", "settings", "history", "past"))
     match at:
         case "fetch":

@@ -32,6 +32,7 @@ from .model import Model, Truth
 from .operations import TIMED
 from .past_model import ERASED, consumer_of, plain
 from .quarantine_model import waiting_of
+from .schedule import Schedule
 
 if TYPE_CHECKING:
     from dynhull.arrays import Points
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 AT_ONCE = Pace(0.0, 0, 0.0, None)
 # The keys that are followed: those that clients put.
 FOLLOWED = range(4)
+# How the past is read in a last look at brisk lives, beside its batches.
+WAYS = "as_of", "replay", "track"
 
 
 class PastReader:
@@ -48,11 +51,13 @@ class PastReader:
     Args:
         engine: the server.
         model: judges the answers.
+        schedule: draws what is looked at in brisk lives.
     """
 
-    def __init__(self, engine: Engine, model: Model) -> None:
+    def __init__(self, engine: Engine, model: Model, schedule: Schedule) -> None:
         self._engine = engine
         self._model = model
+        self._schedule = schedule
 
     async def ask(self, client: Client, op: Operation) -> None:
         """Carry out one operation of a client."""
@@ -303,12 +308,15 @@ class PastReader:
             self._forgotten(truth, error)
 
     async def _all(self, live: LiveHull, truth: Truth, first: int, last: int) -> None:
-        """Read all there is from one revision to another one."""
+        """Read all there is from one revision to another one; in brisk lives each batch, and the rest in one way."""
         await self.feed(live, truth, first, last + 1)
-        for revision in {first, (first + last) // 2, last}:
-            await self.as_of(live, truth, revision)
-        await self._replay(live, truth, first, last)
-        if live.keyed:
+        way = self._schedule.random.choice(WAYS) if self._schedule.brisk else None
+        if way in (None, "as_of"):
+            for revision in {first, (first + last) // 2, last}:
+                await self.as_of(live, truth, revision)
+        if way in (None, "replay"):
+            await self._replay(live, truth, first, last)
+        if live.keyed and way in (None, "track"):
             await self._track(live, truth, first, last)
 
 

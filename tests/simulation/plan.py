@@ -7,7 +7,8 @@ says who comes when, is drawn from the plan's seed and nothing else.
      "lives": [{"clients": [[operation, ...], ...], "end": "kill", "after": 40}, ...],
      "faults": [{"at": "commit", "nth": 3, "kind": "ghost", "calls": 1}, ...]}
 
-A life with `restored` begins with the last backup in place of what the life before has left.
+A life with `restored` begins with the last backup in place of what the life before has left. Of a `short`
+plan only lives `looked_at`, and the last one, end with a look at everything; see `short_plan`.
 An operation names what to do and to which hull; with `leave` its caller disconnects after that number of turns.
 """
 
@@ -42,6 +43,7 @@ from .scenes import (
     recall_beside_delete,
     refused_stream,
 )
+from .short_plan import random_short_plan
 
 # What can be asked for, and how often. Each plan has some of it much more often, and some not at all: faults hide where
 # a few operations meet (swarm testing: Groce and others, 2012).
@@ -95,10 +97,8 @@ WITH_DELETED_FENCES = 0.3
 # The share of plans with immediate commits in which a stream goes on after a batch that is refused.
 WITH_REFUSED_STREAMS = 0.3
 
-# The share of the engine's plans in which the past is read: on SQLite, where hulls keep it, and in memory.
-WITH_PAST = {"past": 1.0, "sqlite": 0.1, "shell": 0.15, "cluster": 0.4}
-# A layer of plans that are like those of another one.
-LIKE = {"past": "sqlite"}
+# The share of the other layers' plans in which the past is read: on SQLite, where hulls keep it, and in memory.
+WITH_PAST = {"sqlite": 0.2, "shell": 0.15, "cluster": 0.4}
 
 SWARM = (0, 1, 1, 5)
 
@@ -128,8 +128,9 @@ def random_plan(seed: int, layer: str) -> Plan:
         return _cluster_plan(seed)
     if layer == "links":
         return random_link_plan(seed)
+    if layer == "past":
+        return random_short_plan(seed)
     with_past = WITH_PAST.get(layer, 0.0)
-    layer = LIKE.get(layer, layer)
     draw = random.Random(seed)
     with_fences = draw.random() < WITH_FENCES
     with_times = with_fences or draw.random() < 0.5

@@ -69,6 +69,7 @@ def _play_lives(plan: Plan) -> Outcome:
     model, schedule = Model(limits), Schedule(plan["seed"])
     model.immediate = plan["storage"] == "immediate"
     model.forgets = plan.get("history_bytes", 0) > 0
+    schedule.brisk = plan.get("short", False)
     storage = _storage(plan, model)
     lives = 0
     where = ""
@@ -104,7 +105,8 @@ def _play_cluster(plan: Plan) -> Outcome:
 
 def _storage(plan: Plan, model: Model) -> FaultyStorage:
     if plan["storage"] == "sqlite":
-        return SQLiteLives(model, plan["faults"], plan.get("history_bytes", 0), in_store=plan.get("store", False))
+        most_bytes, short = plan.get("history_bytes", 0), plan.get("short", False)
+        return SQLiteLives(model, plan["faults"], most_bytes, in_store=plan.get("store", False), one_reader=short)
     return FaultyStorage(MemoryStorage(), model, plan["faults"], immediate=plan["storage"] == "immediate")
 
 
@@ -152,7 +154,8 @@ def _lead(
                 break
     else:
         server.rest()
-        _look(server, model, schedule, storage)
+        if life.get("looked_at", True):
+            _look(server, model, schedule, storage)
     if life["end"] == "stop":
         server.stop()
         if server.waiting():

@@ -16,6 +16,8 @@ class Schedule:
     Attributes:
         turns: how many turns there have been.
         trace: a hash of all turns and of what was noted in them.
+        brisk: whether the event loop mostly carries out all that is ready in a turn, as asyncio does, and how the past
+            is looked at in the end is drawn.
         patient: whether time passes only when nothing else is left to do; else much may pass while a slow actor does
             little, and most turns are those of periodic work.
     """
@@ -24,6 +26,7 @@ class Schedule:
         self.random = random.Random(seed)
         self.turns = 0
         self.trace = 0
+        self.brisk = False
         self.patient = False
         self._actors: list[tuple[Callable[[], object], float, Callable[[], None], bytes]] = []
 

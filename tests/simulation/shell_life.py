@@ -241,7 +241,7 @@ class ShellServer:
             self.model.wall += op["seconds"]
             return
         if op["do"] in OF_PAST:
-            await PastReader(self._engine, self.model).ask(client, op)
+            await PastReader(self._engine, self.model, self.schedule).ask(client, op)
             return
         if op["do"] == "query":
             await Queries(self._engine, self.model).ask(client, op)
@@ -297,7 +297,7 @@ class ShellServer:
         """The past of each hull is as it was, and has the files that it needs, and no others."""
         self._until(lambda: self._storage.files_are_needed(self.time()), "what is to be filed")
         for name in sorted(self.model.alive):
-            self.probe(PastReader(self._engine, self.model).probe(name))
+            self.probe(PastReader(self._engine, self.model, self.schedule).probe(name))
 
     def let_leave(self) -> None:
         """Whoever should have left by now leaves, and who has been inside for long makes an event."""

@@ -4,7 +4,6 @@ A kill takes a copy of the database and its log, as they are between two calls, 
 and checkpoints in the middle of a commit are not simulated: SQLite does its work within one turn.
 """
 
-import os
 import shutil
 import sqlite3
 import tempfile
@@ -13,6 +12,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, NoReturn
+from unittest.mock import patch
 
 from dynhull_server.state.feed_consumers import DropFeedConsumer, PutFeedConsumer
 from dynhull_server.state.fences.model.records import KeptFence
@@ -30,7 +30,7 @@ from dynhull_server.storage.rows.group import (
 )
 from dynhull_server.storage.rows.ledger import HullRows
 from dynhull_server.storage.segments.archive import HISTORY
-from dynhull_server.storage.sqlite import copies
+from dynhull_server.storage.sqlite import copies, readers
 from dynhull_server.storage.sqlite.disk import Disk, OpenMode
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
@@ -58,27 +58,36 @@ MANY = 10**6
 class SQLiteLives(FaultyStorage):
     """A folder with a database; each life has a storage of its own on it.
 
-    `most_bytes` of the past of all hulls are kept at most, 0 for any number; `in_store`, not in the folder.
+    `most_bytes` of the past of all hulls are kept at most, 0 for any number; `in_store`, not in the folder. With
+    `one_reader` one connection for reading is always open, and others when they are needed.
     """
 
     def __init__(
-        self, model: Model, faults: Sequence[dict[str, Any]], most_bytes: int = 0, *, in_store: bool = False
+        self,
+        model: Model,
+        faults: Sequence[dict[str, Any]],
+        most_bytes: int = 0,
+        *,
+        in_store: bool = False,
+        one_reader: bool = False,
     ) -> None:
         super().__init__(MemoryStorage(), model, faults, immediate=False)
         self._home = tempfile.TemporaryDirectory(dir=SHARED_MEMORY if SHARED_MEMORY.is_dir() else None)
-        self._folders = 1
+        self._enter(1)
         self._disk = _FaultyDisk(self._fault_of_disk, self._landed, self.kill)
         self._store = Store(Path(self._home.name) / "store", lambda: model.clock()) if in_store else None
         self._patches = ExitStack()
         self._patches.enter_context(simulated_reading(self._threads_of_life))
+        if one_reader:
+            self._patches.enter_context(patch.object(readers, "KEPT_OPEN", 1))
         self._pending: tuple[Sequence[Any], int] = (), 0
         self._most_bytes = most_bytes
         self._backup: tuple[Path, Backup] | None = None
         self._restores = False
 
-    @property
-    def _folder(self) -> Path:
-        return Path(self._home.name) / str(self._folders)
+    def _enter(self, number: int) -> None:
+        """The next life has a folder of its own."""
+        self._folders, self._folder = number, Path(self._home.name) / str(number)
 
     def _fault_of_disk(self, place: str) -> str | None:
         """What fails at this call of a method of the disk."""
@@ -97,7 +106,7 @@ class SQLiteLives(FaultyStorage):
         """Take up what the life before has left."""
         if self.dead:
             left = self._folder
-            self._folders += 1
+            self._enter(self._folders + 1)
             self._folder.mkdir()
             self._follow(left)
             self._disk.drop()
@@ -118,9 +127,9 @@ class SQLiteLives(FaultyStorage):
             return
         for file in left.iterdir():
             if file.is_dir():
-                shutil.copytree(file, self._folder / file.name, copy_function=os.link)
+                file.rename(self._folder / file.name)
             elif not file.name.endswith("-shm"):
-                shutil.copy(file, self._folder)
+                shutil.copyfile(file, self._folder / file.name)
 
     def _new_archive(self) -> FaultyArchive | FaultyStore:
         if self._store is None:
@@ -267,8 +276,8 @@ class _FaultyDisk(Disk):
         return connection
 
     def drop(self) -> None:
-        """Close everything that a life has opened."""
-        for each in self._opened:
+        """Close everything that a life has opened, the last first: while the first one reads, no log is copied."""
+        for each in reversed(self._opened):
             if each is not None:
                 each.close()
         self._opened = []

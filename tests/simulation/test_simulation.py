@@ -14,7 +14,7 @@ from simulation.play import play
 
 FINDINGS = sorted((Path(__file__).parent / "findings").glob("*.json"))
 # Plans of each layer, a few seconds together; `make simulate` has more.
-PLANS = {"core": 160, "shell": 32, "sqlite": 6, "past": 5, "cluster": 20, "links": 10}
+PLANS = {"core": 160, "shell": 32, "sqlite": 6, "past": 25, "cluster": 20, "links": 10}
 # The first seed: other plans than those of the command line.
 FIRST = 5 * 10**6
 # Faults that are found in a second; `make soak` has all of them.
