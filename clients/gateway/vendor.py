@@ -13,7 +13,7 @@ FILES = {
     "d3-geo": ["dist/d3-geo.min.mjs"],
     "internmap": ["src"],
     "lossless-json": ["lib/esm"],
-    "robust-predicates": ["index.js", "esm"],
+    "robust-predicates": ["esm/orient2d.js", "esm/util.js"],  # the one that is needed, of many
     "topojson-client": ["src"],
     "world-atlas": ["countries-110m.json", "countries-50m.json"],
 }
@@ -41,14 +41,12 @@ def main() -> None:
 
 
 def _copy(source: Path, folder: Path) -> None:
-    """A file into the folder; of a folder its modules, with their folders where the package's own index names them."""
-    if source.is_file():
-        folder.mkdir(exist_ok=True)
-        shutil.copyfile(source, folder / source.name)
-        return
-    within = folder / source.name if (source.parent / "index.js").exists() else folder
-    for module in (each for each in source.rglob("*.js") if not each.name.endswith(".test.js")):
-        target = within / module.relative_to(source)
+    """A file into the folder; of a folder its modules."""
+    modules = (
+        [source] if source.is_file() else [each for each in source.rglob("*.js") if not each.name.endswith(".test.js")]
+    )
+    for module in modules:
+        target = folder / (source.name if module == source else module.relative_to(source))
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(module, target)
 

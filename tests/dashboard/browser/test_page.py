@@ -578,7 +578,8 @@ def test_what_is_shown_is_saved(browser: Browser, url: str, client: HullClient, 
 
         def saved(kind: str) -> Path:
             with page.expect_download() as download:
-                page.get_by_label("Save what is shown").select_option(kind)
+                page.get_by_role("button", name="Save", exact=True).click()
+                page.get_by_role("group", name="Save what is shown").get_by_role("button", name=kind).click()
             return Path(download.value.path())
 
         assert saved("PNG").read_bytes().startswith(b"\x89PNG")

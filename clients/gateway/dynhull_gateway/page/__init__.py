@@ -38,7 +38,7 @@ IMPORTED = {
     "d3-array": "d3-array.min.mjs",
     "internmap": "internmap/index.js",
     "lossless-json": "lossless-json/index.js",
-    "robust-predicates": "robust-predicates/index.js",
+    "robust-predicates": "robust-predicates/orient2d.js",
     "topojson-client": "topojson-client/index.js",
 }
 PATH = "/dashboard"

@@ -1,5 +1,5 @@
 // The list of alarms that are raised, those first that nobody takes care of.
-import { cell, put } from "./dom.js"
+import { cell, find, put } from "./dom.js"
 import { moment_format } from "./time_bar.js"
 const ALARM_WORDS = {raised: "▲ Raised", acknowledged: "◆ Acknowledged", muted: "◇ Muted", cleared: "✓ Cleared"}, MUTE_SECONDS = 3600
 export class Alarms {
@@ -12,7 +12,8 @@ export class Alarms {
   }
   // Only what has changed is written: a button keeps the focus.
   show(rows, raised, trouble) {
-    const body = this.section.querySelector("tbody"), wanted = new Map(rows.map(row => [`${row.alarm} ${row.hull}`, row]))
+    const body = this.section.querySelector("tbody"), focused = body.contains(document.activeElement) ? document.activeElement : undefined
+    const at = focused && [...body.children].indexOf(focused.closest("tr")), wanted = new Map(rows.map(row => [`${row.alarm} ${row.hull}`, row]))
     for (const [id, {element}] of this.rows) {
       if (wanted.has(id)) continue
       element.remove()
@@ -27,10 +28,17 @@ export class Alarms {
       this.write(known, row)
     }
     this.section.classList.toggle("any", rows.length > 0)
+    if (focused && !focused.checkVisibility()) this.focus_again(focused.closest("tr"), body, at)
     this.section.classList.toggle("raised", raised > 0)
     put(this.section.querySelector("h2"), raised ? `▲ ${raised.toLocaleString("en")} ${raised == 1 ? "alarm" : "alarms"}` : "No alarm without somebody who takes care of it")
     put(this.section.querySelector(".trouble"), trouble)
     document.title = raised ? `▲ ${raised} ${this.title}` : this.title
+  }
+  // On the row of a button that is gone, or on the one in its place, and not on the next button: a key may be pressed twice.
+  focus_again(row, body, at) {
+    const next = row.isConnected ? row : body.children[Math.min(at, body.children.length - 1)]
+    if (next) next.focus()
+    else find(".map").focus()
   }
   write({element, cells, acknowledge, mute}, row) {
     const {hull, alarm, rule, state, value, since, muted, may} = row
@@ -47,6 +55,7 @@ export class Alarms {
   }
   element({alarm, hull}) {
     const element = document.createElement("tr")
+    element.tabIndex = -1
     const cells = Object.fromEntries(["state", "hull", "value", "rule", "since"].map(name => [name, cell(name, "")]))
     const [acknowledge, mute] = ["Acknowledge", "Mute 1 h"].map(text => {
       const button = document.createElement("button")

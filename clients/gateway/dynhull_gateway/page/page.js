@@ -7,13 +7,14 @@ import { find, put, settings } from "./dom.js"
 import { Drawers } from "./drawers.js"
 import { Events } from "./events.js"
 import { Finder, show_lines } from "./finder.js"
+import { FullScreen } from "./full_screen.js"
 import { lit as lit_at, shades } from "./dynhull/map/looks.js"
 import { FENCE_LOOKS, INSIDE, LOOKS, MEAN, NEUTRAL, PERCENTILE, key, symbol } from "./looks.js"
 import { Kiosk } from "./kiosk.js"
 import { Night } from "./night.js"
 import { Picker, best_match } from "./picker.js"
 import { Recorder } from "./recorder.js"
-import { SAVES } from "./saving.js"
+import { SAVES, SaveMenu } from "./saving.js"
 import { Sound } from "./sound.js"
 import { ServerMetrics } from "./sources/server_metrics.js"
 import { Viewer } from "./sources/viewer.js"
@@ -137,7 +138,7 @@ function update({kind: _, ...changes}) {
   for (const picker of pickers) if (changes[picker.offered]) picker.offer()
   for (const [name, selector] of [["banner", ".banner"], ["note", ".note"], ["fence_hint", ".hint"]])
     if (changes[name] != undefined) put(find(selector), changes[name])
-  if (changes.refused != undefined) find(".token").hidden = !changes.refused
+  if (changes.refused != undefined) show_token(changes.refused)
   find(".page").classList.toggle("keyed", Boolean(state.keyed || state.sought))
   if (changes.places || changes.sought != undefined) {
     picture.places = state.places.map(([x, y, colour, disk]) => [x, y, lit(colour), disk])
@@ -145,6 +146,12 @@ function update({kind: _, ...changes}) {
     picture.draw_soon()
   }
   if (changes.found) show_found()
+}
+// Whoever has given a token goes on at the map.
+function show_token(refused) {
+  const form = find(".token"), typed = form.contains(document.activeElement)
+  form.hidden = !refused
+  if (typed && !refused) find(".map").focus()
 }
 function show_picked() {
   const [hulls, fences, prefixes] = [state.hulls, state.fences, state.prefixes].map(looks => looks.map(({name}) => name))
@@ -172,10 +179,8 @@ const pickers = [
   {form: ".fences", noun: "fence", most: FENCE_LOOKS.length, offered: "offered_fences", picked: {fence: "fences"}},
 ].map(each => new Picker(each, state, ask, keep_in_address))
 find("[name=verify]").onclick = () => ask({verify: true})
-find("[name=save]").onchange = ({target}) => {
-  SAVES[target.value](picture, new Date(recorder.moment).toISOString())
-  target.value = ""
-}
+new SaveMenu(find("[popovertarget=saves]"), find("#saves"), kind => SAVES[kind](picture, new Date(recorder.moment).toISOString()))
+new FullScreen(find("[name=full]"), document.documentElement)
 find(".token").onsubmit = event => {
   event.preventDefault()
   const field = find(".token input")

@@ -28,6 +28,7 @@ export class Picker {
     return this.picked.flatMap(([, names], row) => row ? state[names].map(look => ({...look, name: look.name + ALL_OF})) : state[names])
   }
   add() {
+    if (this.field.readOnly) return
     const name = best_match(this.field.value, this.state[this.offered])
     if (name && !this.names.includes(name)) this.pick([...this.names, name])
     this.field.value = ""
@@ -38,11 +39,19 @@ export class Picker {
     this.picked.forEach(([noun], row) => this.keep(noun, row ? many : one.length ? one : [""]))
   }
   show() {
-    const full = this.names.length >= this.most
+    const full = this.names.length >= this.most, list = this.form.querySelector("ul")
+    const buttons = [...list.querySelectorAll("button")], at = buttons.indexOf(document.activeElement)
     const remove = removed => this.pick(this.names.filter(name => name != removed))
-    this.form.querySelector("ul").replaceChildren(...this.looks.map(each => chip(each, remove)))
-    this.field.disabled = full
+    list.replaceChildren(...this.looks.map(each => chip(each, remove)))
+    if (at >= 0) this.focus_again([...list.querySelectorAll("button")], buttons[at].ariaLabel, at)
+    this.field.readOnly = full  // not disabled: it may have the focus
     this.field.placeholder = full ? `Remove a ${this.noun} to pick another` : `Pick ${this.noun}s`
+  }
+  // On the button that had the focus, on the one in its place, or in the field.
+  focus_again(buttons, label, at) {
+    const same = buttons.find(({ariaLabel}) => ariaLabel == label)
+    const next = same ?? buttons[Math.min(at, buttons.length - 1)] ?? this.field
+    next.focus()
   }
   offer() {
     this.field.list.replaceChildren(...this.state[this.offered].map(name => new Option(name, name)))

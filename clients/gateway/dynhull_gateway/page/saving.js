@@ -1,5 +1,21 @@
 // What the page shows, as a file: with the vertices that are drawn, of very many some.
 export const SAVES = {PNG: save_picture, GeoJSON: save_shapes, CSV: save_vertices}
+// The list of kinds below a button; Escape closes it, and the focus is where it was.
+export class SaveMenu {
+  // `save` is called with the kind that is chosen.
+  constructor(button, list, save) {
+    list.addEventListener("toggle", () => {
+      const {left, bottom} = button.getBoundingClientRect()
+      list.style.left = `${Math.max(0, Math.min(left, innerWidth - list.offsetWidth))}px`
+      list.style.top = `${Math.max(0, Math.min(bottom, innerHeight - list.offsetHeight))}px`
+    })
+    for (const kind of list.children)
+      kind.onclick = () => {
+        list.hidePopover()
+        save(kind.textContent)
+      }
+  }
+}
 // Without the tiles of a map, which are others' and which browsers do not give away.
 function save_picture(picture, moment) {
   const {width, height} = picture.canvases[1], canvas = document.createElement("canvas"), context = canvas.getContext("2d")

@@ -22,7 +22,10 @@ export class TimeBar {
     this.why = at(".why")
     this.back = at(".live")
     this.button.onclick = () => recorder.toggle()
-    this.back.onclick = () => recorder.go_live()
+    this.back.onclick = () => {
+      recorder.go_live()
+      this.button.focus()  // the other one has nothing to do any more
+    }
     at("select").onchange = ({target}) => recorder.speed = +target.value
     this.slider.oninput = () => recorder.go(this.slider.value - this.slider.step / 2 < this.leftmost ? recorder.earliest : Date.now() + 1000 * this.slider.value)
     this.field.onchange = () => this.field.value && recorder.go(new Date(this.field.value).getTime())

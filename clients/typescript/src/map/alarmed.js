@@ -9,10 +9,10 @@ import { box_around } from "./views.js"
 export const ALARM_FONT = `bold 16px ${FONT}`, ALARM_HEIGHT = 24, ALARM_GAP = 6, FRAME_PIXELS = 14, SMALL_PIXELS = 60
 /** @param {CanvasRenderingContext2D} canvas @param {Picture} picture */
 export function draw_alarmed(canvas, picture) {
-  const {hulls, many, alarmed, colours, view} = picture
+  const {alarmed, colours, view} = picture
   canvas.lineWidth = 4
   canvas.strokeStyle = colours.alarm
-  const seen = alarmed.flatMap(name => frames_of(hulls.get(name) ?? many.find(name), view))
+  const seen = alarmed.flatMap(name => frames_of(picture.find(name), view))
   for (const {hull, left, top, right, low, gap} of seen) {
     canvas.beginPath()
     for (const rings of hull.polygons(view)) view.polygon(canvas, rings)

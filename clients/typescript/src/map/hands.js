@@ -14,7 +14,7 @@ export class Hands {
     this.picture = picture
     this.tip = tip
     const element = picture.element
-    /** @type {Record<string, () => void>} */
+    /** @type {Record<string, (event: KeyboardEvent) => void>} */
     const keys = {
       ArrowLeft: () => picture.move(view => view.pan(PAN_STEP, 0)),
       ArrowRight: () => picture.move(view => view.pan(-PAN_STEP, 0)),
@@ -25,12 +25,18 @@ export class Hands {
       "-": () => this.zoom(1 / ZOOM_STEP),
       0: () => picture.follow(),
       " ": toggle_pause,
+      h: ({shiftKey}) => this.go_on(shiftKey ? -1 : 1),
+      v: ({shiftKey}) => this.go_around(shiftKey ? -1 : 1),
+      Escape: () => this.let_go(),
     }
     element.addEventListener("keydown", event => {
-      if (event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return
+      const act = keys[event.key] ?? keys[event.key.toLowerCase()]
+      if (event.ctrlKey || event.metaKey || event.altKey || !act) return
       event.preventDefault()
-      keys[event.key]()
+      act(event)
     })
+    element.addEventListener("blur", () => this.let_go())
+    picture.drawn = () => this.show_pointed()
     element.addEventListener("wheel", event => {
       event.preventDefault()
       const pixels = event.deltaMode == WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : 30 * event.deltaY
@@ -49,7 +55,7 @@ export class Hands {
         if (type == "pointerup" && event.pointerType == "touch" && this.moved < CLICK_PIXELS) this.point(event)
       })
     element.addEventListener("pointermove", event => this.pointers.has(event.pointerId) ? this.drag(event) : this.point(event))
-    element.addEventListener("pointerleave", () => this.tip.hidden = true)
+    element.addEventListener("pointerleave", () => this.let_go())
   }
   /** Where the pointer is in the picture, which is drawn larger where the text is. @param {MouseEvent} event @returns {[number, number]} */
   at(event) {
@@ -75,21 +81,63 @@ export class Hands {
   }
   /** Shows what is under the pointer. @param {MouseEvent} event */
   point(event) {
-    const [across, down] = this.at(event), thing = this.nearest(across, down)
+    const [across, down] = this.at(event)
+    this.picture.point_at()
+    this.show(this.nearest(across, down), across, down)
+  }
+  /** What is pointed at, in words. @param {(Thing & {place: Point}) | undefined} thing @param {number} across @param {number} down */
+  show(thing, across, down) {
     this.tip.hidden = !thing
     if (!thing) return
     const title = document.createElement("strong")
     title.textContent = thing.title
     const lines = [...place_words(thing.place, this.picture.view.globe), ...(thing.revision == undefined ? [] : [`revision ${thing.revision.toLocaleString("en")}`])]
-    this.tip.replaceChildren(title, ...lines.map(line => {
+    const said = [title, ...lines.map(line => {
       const element = document.createElement("div")
       element.textContent = line
       return element
-    }))
+    })]
+    // Only what has changed is read aloud.
+    if (said.map(({textContent}) => textContent).join() != [...this.tip.children].map(({textContent}) => textContent).join()) this.tip.replaceChildren(...said)
     const {element: {clientWidth, clientHeight}, enlarged} = this.picture, {offsetWidth, offsetHeight} = this.tip
     const beside = (/** @type {number} */ at, /** @type {number} */ size, /** @type {number} */ room) => `${Math.max(0, at + TIP_GAP + size > room ? at - TIP_GAP - size : at + TIP_GAP)}px`
     this.tip.style.left = beside(across * enlarged, offsetWidth, clientWidth)
     this.tip.style.top = beside(down * enlarged, offsetHeight, clientHeight)
+  }
+  // Points at nothing.
+  let_go() {
+    this.tip.hidden = true
+    this.picture.point_at()
+  }
+  /** Points at the next hull of those in sight, or at the one before. @param {number} step */
+  go_on(step) {
+    const {picture} = this, {hulls, many, pointed} = picture
+    const seen = new Set([...hulls.values(), ...many.hulls].filter(hull => rows_in_sight(hull, picture).length).map(({name}) => name))
+    const names = [...seen], at = pointed ? names.indexOf(pointed.name) : step > 0 ? -1 : 0
+    const hull = picture.find(names[(at + step + names.length) % names.length])
+    if (hull) picture.point_at({name: hull.name, row: rows_in_sight(hull, picture)[0]})
+    else this.let_go()
+  }
+  /** Points at the next vertex of this hull, or at the one before; the picture goes there. @param {number} step */
+  go_around(step) {
+    const {picture} = this, {pointed} = picture, hull = pointed && picture.find(pointed.name)
+    if (!hull) return this.go_on(step)
+    const count = hull.corners.length, {left, top, width, height} = picture.view.rect
+    for (let tries = 1; tries <= count; tries++) {
+      const row = (pointed.row + step * tries + tries * count) % count, [across, down] = picture.view.place(...hull.corners[row])
+      if (isNaN(across)) continue  // on the other side of the globe
+      if (!is_in(across, down, picture)) picture.move(view => view.pan(left + width / 2 - across, top + height / 2 - down))
+      return picture.point_at({name: hull.name, row})
+    }
+  }
+  // What keys point at, wherever it is by now.
+  show_pointed() {
+    const {picture} = this, {pointed} = picture, hull = pointed && picture.find(pointed.name)
+    if (!pointed) return
+    const place = picture.pointed_place(), [across, down] = place ? picture.view.place(...place) : [NaN, NaN]
+    if (!hull || !place || !is_in(across, down, picture)) return void (this.tip.hidden = true)
+    const key = hull.vertices.keys?.[pointed.row], words = `a vertex of ${hull.name}`
+    this.show({title: key == undefined ? words : `${key}: ${words}`, revision: hull.vertices.revision, place}, across, down)
   }
   /** @param {number} across @param {number} down */
   nearest(across, down) {
@@ -116,6 +164,14 @@ export class Hands {
       for (const {key, place} of fence.marks(hulls)) look(place, () => ({title: `${key}: inside ${fence.name}`}), 5)
     return best
   }
+}
+/** Which corners of a hull are in sight. @param {import("./hulls.js").Hull} hull @param {import("./picture.js").Picture} picture */
+function rows_in_sight({corners}, picture) {
+  return [...corners.keys()].filter(row => is_in(...picture.view.place(...corners[row]), picture))
+}
+/** @param {number} across @param {number} down @param {import("./picture.js").Picture} picture */
+function is_in(across, down, {view: {rect: {left, top, width, height}}}) {
+  return across >= left && across <= left + width && down >= top && down <= top + height
 }
 /** @param {Point} one @param {Point} two */
 export function distance(one, two) {

@@ -9,8 +9,8 @@ import { STYLE } from "./style.js"
 
 const FOLLOW = { hull: followHull, prefix: followPrefix, fence: followFence, alarm: followAlarm }
 const BUTTONS = '<button name="in" aria-label="Zoom in">+</button><button name="out" aria-label="Zoom out">−</button><button name="all" aria-label="Show all">⤢</button>'
-const INSIDE = `<div class="map" tabindex="0" role="application" aria-label="Map. Arrow keys move it, plus and minus zoom, 0 shows all">
-<canvas></canvas><canvas></canvas><ul class="alarms" role="status"></ul><div class="buttons">${BUTTONS}</div><p class="attribution"></p><p class="note" role="status"></p><div class="tip" hidden></div></div>`
+const INSIDE = `<div class="map" tabindex="0" role="application" aria-label="Map. Arrow keys move it, plus and minus zoom, 0 shows all. H points at the next hull, V at its next vertex, with Shift at the one before">
+<canvas></canvas><canvas></canvas><ul class="alarms" role="status"></ul><div class="buttons">${BUTTONS}</div><p class="attribution"></p><p class="note" role="status"></p><div class="tip" aria-live="polite" hidden></div></div>`
 const ZOOM = 1.4
 /** Hulls that are drawn because an alarm is raised for them. */
 const MOST_RAISED = 20

@@ -29,8 +29,9 @@ import { EARTH_RADIUS, GlobeView, PlaneView, RADIAN } from "./views.js"
  */
 /** @type {((canvas: CanvasRenderingContext2D, picture: Picture) => void)[]} */
 export const LAYERS = [draw_fences, draw_many, draw_surfaces, draw_layers, draw_trails, draw_points, draw_vertices, draw_marks, draw_alarmed, draw_fence_names, draw_names,
-  draw_accuracy, draw_rings]
+  draw_accuracy, draw_rings, draw_pointed]
 export const AXIS_LEFT = 58, AXIS_BOTTOM = 40, EDGE = 8, MOST_RATIO = 2, TICK_PIXELS = 90, FONT_OF_AXES = `12px ${FONT}`
+export const POINTED_RADIUS = 10
 export const FONT_PIXELS = 14  // of the text around a picture that is drawn at its own size
 export const GRID_STEPS = [30, 15, 10, 5, 2, 1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01], SCALE_BAR_PIXELS = 130, REST_MILLISECONDS = 200, FIT_MILLISECONDS = 1000
 /** @param {CanvasRenderingContext2D} canvas @param {Picture} picture */
@@ -41,6 +42,18 @@ export function draw_trails(canvas, picture) {
 export function draw_names(canvas, picture) {
   picture.labels.draw(canvas, picture)
 }
+/** A ring around the vertex that the viewer's keys point at. @param {CanvasRenderingContext2D} canvas @param {Picture} picture */
+export function draw_pointed(canvas, picture) {
+  const place = picture.pointed_place(), [across, down] = place ? picture.view.place(...place) : [NaN, NaN]
+  if (isNaN(across)) return
+  for (const {style, width} of [{style: picture.colours.paper, width: 6}, {style: picture.colours.focus, width: 3}]) {
+    canvas.beginPath()
+    canvas.arc(across, down, POINTED_RADIUS, 0, 2 * Math.PI)
+    canvas.strokeStyle = style
+    canvas.lineWidth = width
+    canvas.stroke()
+  }
+}
 export class Picture {
   /** The extent to begin with. @type {number[] | undefined} */
   wanted = undefined
@@ -50,6 +63,10 @@ export class Picture {
   places = []
   /** Hulls for which an alarm is raised. @type {string[]} */
   alarmed = []
+  /** A vertex that keys point at. @type {{name: string, row: number} | undefined} */
+  pointed = undefined
+  /** Called when it has been drawn. */
+  drawn = () => {}
   /** How much larger it is drawn than beside text of FONT_PIXELS. */
   enlarged = 1
   /** When the view was last fitted to what is shown. */
@@ -147,6 +164,20 @@ export class Picture {
     const found = this.found().map(({place, hull}) => [`${this.sought} in ${hull?.name}`, place_words(place, Boolean(hull?.globe)).join(", ")])
     return found.length ? found : [[`${this.sought} is not drawn at this moment`, ""]]
   }
+  /** A hull of those in the picture. @param {string} name @returns {Hull | undefined} */
+  find(name) {
+    return this.hulls.get(name) ?? this.many.find(name)
+  }
+  /** @param {{name: string, row: number}} [pointed] */
+  point_at(pointed) {
+    if (!pointed && !this.pointed) return
+    this.pointed = pointed
+    this.draw_soon()
+  }
+  /** @returns {Point | undefined} */
+  pointed_place() {
+    return this.pointed && this.find(this.pointed.name)?.corners[this.pointed.row]
+  }
   draw_all() {
     this.ground_drawn = false
     this.draw_soon()
@@ -236,6 +267,7 @@ export class Picture {
     for (const layer of LAYERS) layer(things, this)
     things.restore()
     this.frames++
+    this.drawn()
   }
   /** @param {CanvasRenderingContext2D} canvas */
   clear(canvas) {
@@ -246,7 +278,7 @@ export class Picture {
   read_colours() {
     const style = getComputedStyle(this.element)
     const colour = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim()
-    this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea", "veil", "alarm", "alarm-ink"].map(name => [name, colour(name)]))
+    this.colours = Object.fromEntries(["ink", "faint", "paper", "grid", "coast", "border", "sea", "veil", "alarm", "alarm-ink", "focus"].map(name => [name, colour(name)]))
   }
   /** @param {CanvasRenderingContext2D} canvas @param {GlobeView} view */
   draw_globe(canvas, view, tiles = this.tiles.url) {
