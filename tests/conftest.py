@@ -114,13 +114,28 @@ def takes_too_long(item: pytest.Item) -> bool:
     return any(os.environ.get(marker.args[0]) != "all" for marker in item.iter_markers("only_with"))
 
 
+def some_of_many(items: list[pytest.Item]) -> set[pytest.Item]:
+    """The cases that `make long` adds to those of every run."""
+    if os.environ.get("LONG_CASES") == "all":
+        return set()
+    seen, left_out = Counter[tuple[Path, str]](), set()
+    for item in items:
+        if marker := item.get_closest_marker("every"):
+            test = item.path, item.name.partition("[")[0]
+            if seen[test] % marker.args[0]:
+                left_out.add(item)
+            seen[test] += 1
+    return left_out
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the long tests: at the end, all workers should have something to do."""
+    one_of_many = some_of_many(items)
     if (seed := config.getoption("--order-seed")) is not None:
         items[:] = shuffled(items, seed)
-    if left_out := [each for each in items if takes_too_long(each)]:
+    if left_out := [each for each in items if each in one_of_many or takes_too_long(each)]:
         config.hook.pytest_deselected(items=left_out)  # not skipped: they have a word of their own
-        items[:] = [each for each in items if not takes_too_long(each)]
+        items[:] = [each for each in items if each not in one_of_many and not takes_too_long(each)]
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if servers.shape != "process":
         for each in items:

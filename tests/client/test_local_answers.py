@@ -6,7 +6,7 @@ import threading
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from inputs import points
 from patience import wait_until
@@ -71,7 +71,6 @@ def answers(hull: DynamicHull | HullCopy, rows: np.ndarray) -> list[object]:
     return [repr(each.tolist() if isinstance(each, np.ndarray) else each) for each in found]
 
 
-@settings(max_examples=40)
 @given(st.lists(points(12), min_size=1, max_size=5), points(8))
 def test_answers_after_any_changes(states: list[list[tuple[float, float]]], rows: list[tuple[float, float]]) -> None:
     asked = np.array([(0.5, 1), (-3, 2), *rows], float)

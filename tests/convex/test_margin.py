@@ -17,6 +17,7 @@ def hard_margin(a, b):
     return 2 / size, weights / size, -machine.intercept_[0] / size
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(10))
 def test_agrees_with_the_support_vector_machine(d, seed):

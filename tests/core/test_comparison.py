@@ -34,6 +34,7 @@ def squared(vertices: np.ndarray, measure: str) -> Fraction:
     return squared_diameter(vertices) if measure == "diameter" else squared_width(vertices)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_it_is_exact_also_beside_the_bound_and_at_any_scale(shape: str, scale: int) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import oracle
 import pytest
 from hulls import HULLS
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from inputs import CIRCLE, point, points
 
@@ -41,7 +41,6 @@ def build(make, rows, how):
 @both
 @pytest.mark.parametrize("how", ["bulk", "one by one", "twice, half deleted"])
 @given(rows=points(40))
-@settings(max_examples=30)
 @example(rows=[])
 @example(rows=[(1.0, 1.0)] * 3)
 @example(rows=CIRCLE)
@@ -125,7 +124,6 @@ def test_changed_is_exact(make, rows, seed):
 
 @both
 @given(rows=points(30), batch=st.lists(st.tuples(st.sampled_from([1, -1]), point), max_size=30), more=points(10))
-@settings(max_examples=75)
 def test_a_batch_is_a_set(make, rows, batch, more):
     batch = batch + [(-1, p) for p in rows[:8]] + [(op, p) for p in more for op in (1, -1)]
     ops = np.array([op for op, _ in batch], np.int8)

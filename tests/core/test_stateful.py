@@ -81,7 +81,7 @@ class HullMachine(RuleBasedStateMachine):
 
 def machine(make):
     case = type("Case", (HullMachine,), {"make": make}).TestCase
-    case.settings = settings(max_examples=25, stateful_step_count=40, deadline=None)
+    case.settings = settings(stateful_step_count=40)
     return case
 
 

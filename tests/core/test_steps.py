@@ -7,6 +7,7 @@ from hulls import TinyLeafTree
 from update_steps import WORKLOADS, count_steps
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("name", WORKLOADS)
 @pytest.mark.parametrize("n", [1000, 4000, 16000])
 def test_no_update_takes_more_than_log_squared(name, n):

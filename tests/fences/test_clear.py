@@ -63,6 +63,7 @@ def near_errors(random, p, polygons, margin):
     return [0.0, float(random.random()), *found]
 
 
+@pytest.mark.every(3)
 @kinds
 @pytest.mark.parametrize("seed", range(3))
 def test_polygons_by_fractions(make, seed):

@@ -267,6 +267,7 @@ def among_long_edges(name):
     return points, keys, sorted(key for key, point in zip(keys, points.tolist(), strict=True) if area.holds(point))
 
 
+@pytest.mark.every(3)
 @kinds
 @pytest.mark.parametrize("name", LARGE)
 def test_subjects_among_long_edges(make, name):

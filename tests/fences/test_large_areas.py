@@ -50,6 +50,7 @@ def lay(index, number, described, **options):
     (index.set_hull if kind == "hull" else index.set_polygons)(number, parts, **options)
 
 
+@pytest.mark.every(3)
 @kinds
 @pytest.mark.parametrize("described", AREAS.values(), ids=AREAS)
 @pytest.mark.parametrize("closed", [True, False], ids=["closed", "open"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from fence_oracle import Area
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dynhull import FenceIndex, KeyedHull, convex_hull
@@ -23,7 +23,6 @@ def tuples(polygons):
     return [[[tuple(corner) for corner in ring] for ring in polygon] for polygon in polygons]
 
 
-@settings(max_examples=40, deadline=None)
 @given(PLACES, st.sampled_from(SCALES), st.booleans(), st.sampled_from([0.0, 1.0, 1.4142135623730951]))
 def test_rows_are_those_of_rational_arithmetic(places, scale, closed, margin):
     points = np.array(places, float) * scale

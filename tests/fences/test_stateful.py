@@ -210,5 +210,5 @@ def same(row, p):
 @pytest.mark.parametrize("kind", [kind for kind in KEYED_HULLS if kind != "python, tiny leaves"])
 def test_lives(kind):
     machine = type("Machine", (FenceMachine,), {"make": KEYED_HULLS[kind]}).TestCase
-    machine.settings = settings(max_examples=120, stateful_step_count=25)
+    machine.settings = settings(stateful_step_count=25)
     machine().runTest()

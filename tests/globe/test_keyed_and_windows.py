@@ -224,7 +224,7 @@ def test_random_lives_of_windows(kind):
 
 def live(machine, make):
     case = type("Lives", (machine,), {"make": staticmethod(make)}).TestCase
-    case.settings = settings(max_examples=60, stateful_step_count=20)
+    case.settings = settings(stateful_step_count=20)
     case("runTest").runTest()
 
 

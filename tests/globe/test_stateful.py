@@ -94,5 +94,5 @@ class GlobeMachine(RuleBasedStateMachine):
 @pytest.mark.parametrize("kind", GEO_HULLS)
 def test_random_lives(kind):
     machine = type("Machine", (GlobeMachine,), {"make": GEO_HULLS[kind]}).TestCase
-    machine.settings = settings(max_examples=40, stateful_step_count=25)
+    machine.settings = settings(stateful_step_count=25)
     machine("runTest").runTest()

@@ -88,6 +88,7 @@ def bad(rng):
     return BAD[rng.integers(0, len(BAD))]
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("center", [None, (0.0, 90.0)])
 def test_trees(seed, center):
@@ -119,6 +120,7 @@ def test_trees(seed, center):
     both.agree()
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("ordered", [False, True])
 @pytest.mark.parametrize("key_type", ["str", "int"])
@@ -161,6 +163,7 @@ def test_entities(seed, ordered, key_type):
     np.testing.assert_equal((same_points, same_times), (points, times))
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("seed", range(16))
 def test_windows(seed):
     rng = np.random.default_rng(seed)

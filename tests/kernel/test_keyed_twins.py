@@ -51,6 +51,7 @@ def outcome(action, *arguments):
         return type(error), str(error), vars(error)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("ordered", [False, True])
 @pytest.mark.parametrize("key_type", ["str", "int"])
 @pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])

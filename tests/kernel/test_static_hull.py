@@ -14,6 +14,7 @@ def test_few_points(rows):
     np.testing.assert_array_equal(convex_hull(rows), monotone_chain(rows))
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("scale", [1.0, 1e-300, 1e280])
 @pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])
 def test_many_points(kind, scale):

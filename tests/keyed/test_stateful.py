@@ -230,7 +230,7 @@ class KeyedMachine(RuleBasedStateMachine):
 
 def machine(make):
     case = type("Case", (KeyedMachine,), {"make": make}).TestCase
-    case.settings = settings(max_examples=30, stateful_step_count=30, deadline=None)
+    case.settings = settings(stateful_step_count=30)
     return case
 
 

@@ -45,7 +45,6 @@ def nearest_double(value):
 
 @both
 @given(rows=points(30), k=st.integers(0, 6))
-@settings(max_examples=30)
 @example(rows=NESTED, k=9)
 @example(rows=CIRCLE, k=2)
 def test_layers(make, rows, k):
@@ -68,7 +67,6 @@ def test_depth(make, asked, k):
 
 @both
 @given(rows=points(25))
-@settings(max_examples=30)
 @example(rows=NESTED)
 @example(rows=CIRCLE)
 @example(rows=[(0.0, 0.0), (1.7e308, -1.7e308), (-1.7e308, -1.7e308)])
@@ -87,7 +85,6 @@ def test_influence(make, rows):
     percent=st.one_of(st.integers(0, 100), st.floats(1, 100)),
     center=st.sampled_from(["mean", "median"]),
 )
-@settings(max_examples=40)
 @example(rows=NESTED, percent=34, center="mean")
 @example(rows=[(0.0, 0.0), (0.0, 0.0), (1e16, 1.0)], percent=99.99, center="median")
 def test_mcp(make, rows, percent, center):
@@ -164,6 +161,7 @@ def test_keyed_hulls_and_windows(make):
         assert tuples(hull.sketch(4)[0]) == tuples(plain.sketch(4)[0])
 
 
+@pytest.mark.every(5)
 @both
 @pytest.mark.parametrize("kind", ["uniform", "grid", "columns", "clusters"])
 def test_many_points(make, kind):

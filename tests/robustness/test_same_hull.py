@@ -66,6 +66,7 @@ def orders(rows):
     return [rows, by_x, by_x[::-1], by_y, by_y[::-1], list(map(tuple, shuffled))]
 
 
+@pytest.mark.every(4)
 @every_input
 @every_static
 def test_static(algorithm, name):
@@ -75,6 +76,7 @@ def test_static(algorithm, name):
             assert tuples(algorithm(rows, collinear="keep")) == boundary(name)
 
 
+@pytest.mark.every(4)
 @every_input
 @every_dynamic
 def test_dynamic(make, build, name):
@@ -85,6 +87,7 @@ def test_dynamic(make, build, name):
     hull.check()
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("rows", PUBLISHED.values(), ids=PUBLISHED.keys())
 def test_published_killers_in_every_order_of_four(rows):
     for four in combinations(rows, 4):

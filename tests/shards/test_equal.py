@@ -23,6 +23,7 @@ ROUNDS = 80
 EVERY = KINDS | {"times ahead refused": HullSettings("str", window=Window(max_skew=10**6), by_event_time=True)}
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("shards", [2, 5])
 @pytest.mark.parametrize("kind", EVERY)
 def test_a_hull_over_shards_is_one_hull(kind, shards):

@@ -13,20 +13,12 @@ from simulation.plan import random_plan
 from simulation.play import play
 
 FINDINGS = sorted((Path(__file__).parent / "findings").glob("*.json"))
-# Plans of each layer, a few seconds together; `make simulate` has more.
-PLANS = {"core": 160, "shell": 32, "sqlite": 6, "past": 25, "cluster": 20, "links": 10}
+# Plans of each layer, two seconds together; `make simulate` has more.
+PLANS = {"core": 60, "shell": 12, "sqlite": 3, "past": 12, "cluster": 20, "links": 10}
 # The first seed: other plans than those of the command line.
 FIRST = 5 * 10**6
-# Faults that are found in a second; `make soak` has all of them.
-QUICK = {
-    "copy_calls_the_original",
-    "dark_link_unnoticed",
-    "fence_not_restored",
-    "hidden_is_dead",
-    "quarantine_not_replayed",
-    "restore_keeps_uids",
-    "row06_commit_thread_catches_one_kind",
-}
+# Faults that are found in a second, one in the pure state and one in a cluster; `make soak` has all of them.
+QUICK = {"fence_not_restored", "hidden_is_dead"}
 
 
 @pytest.mark.parametrize("layer", PLANS)
@@ -43,7 +35,7 @@ def test_what_was_found_stays_mended(file):
 
 
 def test_a_plan_always_ends_the_same_way():
-    command = [sys.executable, "-m", "simulation", "trace", "30"]
+    command = [sys.executable, "-m", "simulation", "trace", "12"]  # two plans of each layer
     runs = [
         subprocess.Popen(
             command,
@@ -56,7 +48,7 @@ def test_a_plan_always_ends_the_same_way():
     ]
     first, second = (run.communicate()[0] for run in runs)
     assert [run.returncode for run in runs] == [0, 0]
-    assert len(set(first.split())) > 50
+    assert len(set(first.split())) > 20
     assert second == first
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import oracle
 import pytest
 from hulls import ONE_SHOT
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from inputs import CIRCLE, points
 
 from dynhull import KERNEL, DynamicHull, convex_hull, static
@@ -24,7 +24,6 @@ def tuples(array):
 
 @every
 @given(rows=points(80))
-@settings(max_examples=100)
 @example(rows=CIRCLE)
 @example(rows=[])
 @example(rows=[(1.0, 2.0)] * 2)
@@ -85,6 +84,7 @@ def plain_chain(cloud):
     return tuples(static.monotone_chain(points_of(cloud)))
 
 
+@pytest.mark.every(4)
 @every
 @pytest.mark.parametrize("cloud", CLOUDS)
 def test_large(hull_of, cloud):

@@ -232,6 +232,7 @@ def near_a_flat(random, d, dimension, thickness):
     return (points @ turn + offset) * random.choice([1, 1e-300, 1e290])
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("d", [2, 3, 4, 5])
 @pytest.mark.parametrize("thickness", [1e-9, 1e-12, 1e-13, 1e-14, 1e-15, 1e-16, 1e-17, 0])
 def test_points_near_a_flat(thickness, d):

@@ -6,7 +6,7 @@ import numpy as np
 import oracle
 import pytest
 from hulls import ALGORITHMS
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from inputs import CIRCLE, points
 
 from dynhull import static
@@ -21,7 +21,6 @@ def tuples(array):
 
 @every
 @given(rows=points(40))
-@settings(max_examples=100)
 @example(rows=CIRCLE)
 @example(rows=[])
 @example(rows=[(1.0, 2.0)] * 2)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dynhull_server.state.fences.events.block import block_of
@@ -56,7 +56,6 @@ def encoded(made):
     return encode_block(block, np.array([name == OWN for name in block.names])[block.runs["hull"]])
 
 
-@settings(max_examples=50)
 @given(many())
 def test_what_is_written_is_read(made):
     payload = encoded(made)
@@ -66,7 +65,6 @@ def test_what_is_written_is_read(made):
     assert (runs.fences.tolist(), runs.counts.tolist()) == (found.fences.tolist(), found.counts.tolist())
 
 
-@settings(max_examples=50)
 @given(many(), st.data())
 def test_a_payload_that_is_cut_off_is_no_events(made, data):
     payload = encoded(made)

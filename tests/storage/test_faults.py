@@ -49,6 +49,7 @@ ERRORS = [
 ]
 
 
+@pytest.mark.every(7)
 @pytest.mark.parametrize("late", [False, True])
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: str(getattr(error, "sqlite_errorcode", "memory")))
 @pytest.mark.parametrize("statement", ["BEGIN IMMEDIATE", "INSERT INTO batches", "UPDATE totals"])

@@ -134,7 +134,6 @@ def test_gathered_batches_lead_to_the_same_state(kind, steps, after):
 
 
 @given(kind=st.sampled_from(sorted(KINDS)), steps=STEPS, together=st.integers(1, 5))
-@settings(max_examples=40, deadline=None)
 def test_rows_of_the_journal_are_the_same_columns_in_both_languages(kind, steps, together):
     hull = KINDS[kind]
     records = lived(hull, steps)
@@ -153,7 +152,6 @@ def test_rows_of_the_journal_are_the_same_columns_in_both_languages(kind, steps,
 
 
 @given(kind=st.sampled_from(sorted(KINDS)), steps=STEPS, wanted=st.sets(st.integers(0, 9), min_size=1, max_size=3))
-@settings(max_examples=40, deadline=None)
 def test_rows_of_keys_that_are_wanted_say_the_same_of_these(kind, steps, wanted):
     hull = KINDS[kind]
     if hull.identity == "multiset":

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from folders import same
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dynhull.keys import PackedKeys
@@ -138,7 +138,6 @@ def events(hull, config, past, after, until, *, sifted):
     stretch=st.integers(1, 20),
     in_file=st.booleans(),
 )
-@settings(max_examples=60, deadline=None)
 def test_the_events_are_the_same(hull, config, steps, after, stretch, in_file):
     records = lived(hull, steps)
     after = min(after, len(records))
@@ -155,6 +154,7 @@ def test_the_events_are_the_same(hull, config, steps, after, stretch, in_file):
     assert past.sifted or after == len(records) or any(each.clock for each in records)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", AREAS)
 @pytest.mark.parametrize("margin", [0.0, 0.25])
 def test_the_sides_of_points_are_exact(name, margin):

@@ -42,6 +42,7 @@ RUN_BY = {
 }
 RUN_BY_SEVERAL = ["dynhull_cluster.process", "dynhull_cluster.child"]
 RUN_ON_DATABASE = ["dynhull_cluster.storages.postgresql", "dynhull_cluster.machines.only_member"]
+SERVER = "dynhull_server"  # the module
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
 
 CHILD_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl
@@ -49,7 +50,7 @@ REQUEST_BYTES = 2**18
 
 
 class Process(subprocess.Popen[str]):
-    """`subprocess.Popen`, but a process that runs `COMMAND` or a Python file, in our environment, is forked."""
+    """`subprocess.Popen`, but processes of `COMMAND`, Python files and modules, in our environment, are forked."""
 
     def kill(self) -> None:
         """End it at once: when this returns it has ended, and its locks are free."""
@@ -60,8 +61,9 @@ class Process(subprocess.Popen[str]):
         call = inspect.signature(super()._execute_child).bind(*arguments).arguments
         ours = [call[each] for each in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")]
         command = list(map(str, call["args"]))
-        is_ours = command[0] == COMMAND or (command[0] == sys.executable and command[1].endswith(".py"))
-        if sys.platform != "linux" or not is_ours or call["env"] is not None:
+        is_python = command[0] == sys.executable and (command[1] == "-m" or command[1].endswith(".py"))
+        apart = call["env"] is not None or call["start_new_session"]
+        if sys.platform != "linux" or apart or not (is_python or command[0] == COMMAND):
             super()._execute_child(*arguments)
             return
         files = [number if given == -1 else given for number, given in enumerate((ours[0], ours[3], ours[5]))]
@@ -132,6 +134,8 @@ def _wait_to_be(connection: socket.socket) -> None:
 def import_for(command: list[str]) -> None:
     for module in ("dynhull_client",) if command[0] == sys.executable else ("dynhull_cli.main", "dynhull_cli.commands"):
         importlib.import_module(module)
+    if SERVER in command:
+        command = [*command, "serve"]
     for entry in _entries():
         if entry.name in command:
             for module in (entry.module, *RUN_BY.get(entry.name, RUN_BY_OTHERS)):
@@ -173,7 +177,7 @@ def _become(command: list[str], folder: str, environment: dict[str, str], files:
     multiprocessing.util.spawnv_passfds = _fork_instead
     time.tzset()
     sys.argv = command[command[0] == sys.executable :]
-    sys.path[0] = str(Path(sys.argv[0]).parent)
+    sys.path[0] = folder if sys.argv[0] == "-m" else str(Path(sys.argv[0]).parent)
     sys.stdin, sys.stdout, sys.stderr = (
         open(number, mode, buffering, encoding=old.encoding, errors=old.errors, closefd=False)  # noqa: SIM115
         for number, mode, buffering, old in ((0, "r", -1, sys.stdin), (1, "w", -1, sys.stdout), (2, "w", 1, sys.stderr))
@@ -224,7 +228,11 @@ if __name__ == "__main__":
     warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
     _wait_to_be(socket.socket(fileno=int(sys.argv[1])))
     try:
-        runpy.run_path(sys.argv[0], run_name="__main__")
+        if sys.argv[0] == "-m":
+            del sys.argv[0]
+            runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+        else:
+            runpy.run_path(sys.argv[0], run_name="__main__")
     except SystemExit as end:
         if not isinstance(end.code, int):
             raise

@@ -156,7 +156,7 @@ class WindowMachine(RuleBasedStateMachine):
 
 def machine(make):
     case = type("Case", (WindowMachine,), {"make": make}).TestCase
-    case.settings = settings(max_examples=40, stateful_step_count=30, deadline=None)
+    case.settings = settings(stateful_step_count=30)
     return case
 
 

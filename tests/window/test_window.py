@@ -221,6 +221,7 @@ def test_many_deletes_while_an_old_point_stays(make):
     assert_as(window, model)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("kind", ["uniform", "circle", "grid", "columns", "clusters"])
 @pytest.mark.parametrize("delay", [0, 0.01, 1])
 def test_implementations_agree_on_large_inputs(kind, delay):

@@ -85,6 +85,7 @@ def batches(dice: random.Random, scale: float) -> Iterator[tuple[np.ndarray, np.
         yield keys, points
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("measure", ["area", "diameter", "width"])
 @pytest.mark.parametrize(("op", "scale"), [(">", 1.0), (">=", 0.5), ("<", 2.0**-400), ("<=", 3.0)])
 def test_events_are_those_of_exact_rationals(measure: str, op: str, scale: float) -> None:

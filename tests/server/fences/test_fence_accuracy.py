@@ -127,6 +127,7 @@ class Judge:
                 self.events.append(("ENTER" if now else "EXIT", key))
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("kind", AREAS)
 @pytest.mark.parametrize(("margin", "seed"), [(0.0, 1), (0.0, 2), (0.5, 3), (1.0, 4)])
 def test_events_are_those_of_the_judge(kind, margin, seed):

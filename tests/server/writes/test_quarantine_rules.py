@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from quarantine_rules import SECOND, Model
 
@@ -99,7 +99,6 @@ def batches(draw):
     return rows, draw(st.lists(st.sampled_from(free), unique=True, max_size=1)) if free else []
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.sampled_from([None, 0.5, 2.0, 0.1]),
     st.sampled_from([None, 1.0, 1.5, 4.0]),

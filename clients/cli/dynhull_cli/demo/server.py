@@ -1,9 +1,9 @@
 """The processes of the demo: the server and, where the demo is live, its gateway and dashboard."""
 
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from subprocess import PIPE, Popen, TimeoutExpired
 from tempfile import TemporaryDirectory
 
 from . import child
@@ -22,7 +22,7 @@ class Process:
         addresses: the last words of the lines that it has printed.
     """
 
-    def __init__(self, name: str, process: "subprocess.Popen[str]", lines: int) -> None:
+    def __init__(self, name: str, process: Popen[str], lines: int) -> None:
         self._name = name
         self._process = process
         assert process.stdout is not None
@@ -51,15 +51,14 @@ def running(name: str, *arguments: str, lines: int = 1, apart: bool = False) -> 
         apart: whether Ctrl-C on the terminal does not reach it, so that it ends when the block ends.
     """
     command = [sys.executable, "-m", child.__name__, *arguments]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, start_new_session=apart) as process:  # noqa: S603  (our own module)
+    with Popen(command, stdin=PIPE, stdout=PIPE, text=True, start_new_session=apart) as process:  # noqa: S603  (our own module)
         try:
             yield Process(name, process, lines)
         finally:
             process.terminate()
             try:
                 process.wait(STOP_SECONDS)
-            except subprocess.TimeoutExpired:
+            except TimeoutExpired:
                 process.kill()
 
 
