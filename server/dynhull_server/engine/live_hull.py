@@ -184,6 +184,17 @@ class LiveHull:
 
     # Reads
 
+    @property
+    def ended(self) -> bool:
+        """Whether it has been deleted."""
+        return self._hull.ended
+
+    @property
+    def now(self) -> tuple[Counts, Outline] | None:
+        """What a small read needs that can run now; None if it has to wait for its turn."""
+        hull = self._hull
+        return (hull.counts, hull.state.outline()) if self._driver.idle(hull) else None
+
     async def read(self, function: Callable[[HullState], T], rows: int = 0, min_revision: int = 0) -> tuple[Counts, T]:
         """Call `function`, which reads about `rows` points, with the state at one revision, `min_revision` or later."""
         while True:

@@ -48,7 +48,6 @@ class Call:
 
     Attributes:
         caller: the caller.
-        access: the permissions of the call.
         batches: the number of batches the call has applied; None for calls that do not stream batches.
         message_bytes: the size of the last message received.
         counted: the number of calls that it is counted as.
@@ -61,7 +60,7 @@ class Call:
         "_calls",
         "_context",
         "_owner",
-        "access",
+        "_rights",
         "batches",
         "caller",
         "counted",
@@ -73,7 +72,7 @@ class Call:
     def __init__(self, calls: "Calls", context: Context, caller: Caller) -> None:
         self.caller = caller
         self._owner = caller.owner
-        self.access = Rights(caller.access)
+        self._rights: Rights | None = None  # made for those that ask
         self.batches: int | None = None
         self.message_bytes = 0
         self.counted = 1
@@ -89,6 +88,13 @@ class Call:
         return self._begun
 
     @property
+    def access(self) -> Rights:
+        """The permissions of the call."""
+        if self._rights is None:
+            self._rights = Rights(self.caller.access)
+        return self._rights
+
+    @property
     def owner(self) -> str:
         """The owner whose limits apply: that of the token, or without tokens the address of the caller."""
         if not self._owner:
@@ -97,18 +103,26 @@ class Call:
 
     async def receive(self) -> Any:
         """The only message of a call that does not stream."""
-        return self._take(await self._context.read())
+        return self.take(await self.receive_any())
+
+    async def receive_any(self) -> Any:
+        """The same, as it was deserialized; DecodeError if there is none."""
+        received = await self._context.read()
+        if received is grpc.aio.EOF:
+            raise DecodeError("no message")
+        return received
 
     async def read(self) -> Any:
         """The next message, None after the last."""
         received = await self._context.read()
-        return None if received is grpc.aio.EOF else self._take(received)
+        return None if received is grpc.aio.EOF else self.take(received)
 
-    def _take(self, received: Any) -> Any:
+    def take(self, received: Received) -> Any:
+        """A message that was received, or raise the error that it is invalid."""
         if isinstance(received, tuple):
             message, self.message_bytes = received
             return message
-        raise DecodeError("no message") if received is grpc.aio.EOF else received
+        raise received
 
     async def messages(self) -> AsyncIterator[Any]:
         """All messages of a stream."""
@@ -168,7 +182,7 @@ class Call:
 
     async def _send_initial_metadata(self) -> None:
         """Begin the answer, to its end: gRPC could not send the error of `end` with a beginning under way."""
-        task = _current_task()
+        task = self.task()
         in_cutoff = task in self.waiting
         self.waiting.discard(task)
         try:
@@ -183,7 +197,13 @@ class Call:
 
     def finish(self) -> None:
         """Run the call to its end from here, even if the server drains or the token is removed."""
-        self._calls.finish(_current_task())
+        self._calls.finish(self.task())
+
+    def task(self) -> asyncio.Task[Any]:
+        """The task that runs."""
+        task = asyncio.current_task(self._calls.loop())
+        assert task is not None  # gRPC runs each call in a task
+        return task
 
     def cutoff(self) -> "Cutoff":
         """A block that `end` interrupts with its error."""
@@ -230,6 +250,7 @@ class Calls:
         self._open: set[Call] = set()
         self._short: set[asyncio.Task[Any]] = set()
         self._refusals = RefusalLog()
+        self._loop: asyncio.AbstractEventLoop | None = None
 
     def ready(self) -> None:
         """Serve calls from now on; before, they are refused with StartingError."""
@@ -260,6 +281,12 @@ class Calls:
                 call.access.change(call.caller.access)
             except (UnauthenticatedError, PermissionDeniedError) as refusal:
                 call.end(refusal)
+
+    def loop(self) -> asyncio.AbstractEventLoop:
+        """The event loop of all calls; asyncio asks the system for the number of the process to find it."""
+        if self._loop is None:
+            self._loop = asyncio.get_running_loop()
+        return self._loop
 
     def admit(self, context: Context) -> Call:
         """Begin a call, or raise the error that refuses it."""
@@ -366,7 +393,7 @@ class Cutoff:
     def __enter__(self) -> None:
         if self._call.ending is not None:
             raise self._call.ending
-        self._task = _current_task()
+        self._task = self._call.task()
         self._nested = self._task in self._call.waiting
         self._call.waiting.add(self._task)
 
@@ -376,9 +403,3 @@ class Cutoff:
         self._call.waiting.discard(self._task)
         if isinstance(error, asyncio.CancelledError) and self._call.ending and self._task.uncancel() == 0:
             raise self._call.ending from None
-
-
-def _current_task() -> asyncio.Task[Any]:
-    task = asyncio.current_task()
-    assert task is not None  # gRPC runs each call in a task
-    return task

@@ -48,6 +48,7 @@ from .places import Places
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .replays import Replays
+from .short_locates import ShortLocates
 from .status import ANSWERED
 from .tracks import Tracks
 from .vertex_pages import VertexPages, page_token
@@ -80,6 +81,9 @@ class HullService:
         feeds: limits the feeds at a time.
         create_on_write: whether a write to a missing hull creates it.
         max_watch_lag: the seconds that a watcher may take to receive an event.
+
+    Attributes:
+        short: short ways to answer requests, by method.
     """
 
     def __init__(
@@ -107,6 +111,7 @@ class HullService:
         self._create_on_write = create_on_write
         self._max_watch_lag = max_watch_lag
         self._pages = VertexPages(driver.machine.clock)
+        self.short = {"Locate": ShortLocates(hulls).answer}
         self._queried = {kind: getattr(self, method) for kind, method in METHODS.items()}
 
     # Hulls

@@ -4,7 +4,7 @@ All of them are stream handlers, even those of single messages: gRPC reads the m
 the handler, so callers without permission could fill the memory.
 """
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from contextlib import aclosing
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from grpc_reflection.v1alpha import reflection, reflection_pb2
 from dynhull_proto.v1 import alarm_service_pb2, fence_service_pb2, hull_service_pb2
 
 from ..state.errors import LimitExceededError
+from .access import Access
 from .alarm_service import AlarmService
 from .calls import Call, Calls, Context, Received, Work
 from .fence_service import FenceService
@@ -71,6 +72,8 @@ LISTS = {"ListHulls", "ListFences", "ListAlarms"}
 UNKNOWN_METHOD = "unknown"
 
 Behave = Callable[[Any, Call], Awaitable[Any]]
+# The serialized response to a serialized request; None for one that `Behave` answers.
+Short = Callable[[bytes, Access], bytes | None]
 
 
 class RunHandler(NamedTuple):
@@ -82,7 +85,7 @@ class RunHandler(NamedTuple):
 
 def hull_handlers(service: HullService, calls: Calls) -> grpc.GenericRpcHandler:
     """The handlers of the hull service."""
-    return _own_handlers(DESCRIPTOR, service, calls)
+    return _own_handlers(DESCRIPTOR, service, calls, service.short)
 
 
 def fence_handlers(service: FenceService, calls: Calls) -> grpc.GenericRpcHandler:
@@ -147,16 +150,22 @@ async def _refuse_method(_: Call) -> None:
 
 
 def _own_handlers(
-    descriptor: ServiceDescriptor, service: HullService | FenceService | AlarmService, calls: Calls
+    descriptor: ServiceDescriptor,
+    service: HullService | FenceService | AlarmService,
+    calls: Calls,
+    short: Mapping[str, Short] | None = None,
 ) -> grpc.GenericRpcHandler:
-    works = {}
+    works, short = {}, short or {}
     for method in descriptor.methods:
         behave = getattr(service, method.name)
         if method.client_streaming or method.server_streaming:
             works[method.name] = _streaming(method, behave)
+        elif method.name in short:
+            received = _received(GetMessageClass(method.input_type), calls.max_message_bytes)
+            works[method.name] = _shortened(short[method.name], received, _read(behave))
         else:
             works[method.name] = _unary(method, behave if method.name in FINISHED - LISTS else _read(behave))
-    return _handlers(descriptor, works, "", calls, calls.admit, calls.max_message_bytes)
+    return _handlers(descriptor, works, "", calls, calls.admit, calls.max_message_bytes, short)
 
 
 def _handlers(
@@ -166,6 +175,7 @@ def _handlers(
     calls: Calls,
     admit: Callable[[Context], Call],
     max_bytes: int,
+    short: Collection[str] = (),
 ) -> grpc.GenericRpcHandler:
     handlers = {}
     for method in service.methods:
@@ -174,10 +184,9 @@ def _handlers(
         make: Callable[..., Any] = grpc.stream_unary_rpc_method_handler
         if method.server_streaming:
             make = grpc.stream_stream_rpc_method_handler
-        handlers[method.name] = make(
-            calls.handler(prefix + method.name, admit, works[method.name]),
-            request_deserializer=_received(GetMessageClass(method.input_type), max_bytes),
-        )
+        received = bytes if method.name in short else _received(GetMessageClass(method.input_type), max_bytes)
+        handle = calls.handler(prefix + method.name, admit, works[method.name])
+        handlers[method.name] = make(handle, request_deserializer=received)
     return grpc.method_handlers_generic_handler(service.full_name, handlers)
 
 
@@ -226,6 +235,22 @@ def _unary(method: MethodDescriptor, behave: Behave) -> Work:
         return call.serialize(response)
 
     return finish
+
+
+def _shortened(short: Short, received: Callable[[bytes], Received], behave: Behave) -> Work:
+    """A read that is answered the short way where that is one for it."""
+
+    async def answer(call: Call) -> bytes:
+        with call.cutoff():
+            data: bytes = await call.receive_any()
+            found = short(data, call.caller.access)
+            if found is not None:
+                call.require_entitled()
+                return found
+            response = await behave(call.take(received(data)), call)
+        return call.serialize(response)
+
+    return answer
 
 
 def _streaming(method: MethodDescriptor, behave: Behave) -> Work:
