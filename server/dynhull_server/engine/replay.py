@@ -95,9 +95,11 @@ class ReplayedHull(LiveHull):
         self._erasures = erasures
         self._last = last
         self._ahead: deque[Record] = deque()
-        # Where only vertices are asked for, the state is ahead of them: these are here, and those that follow.
+        # Where only vertices are asked for, the state is ahead of them: these are here, those that follow, and those
+        # after them, which are made meanwhile: a thread makes them while the event loop sends the ones before.
         self._at: Outlined | None = None
         self._outlines: deque[Outlined] = deque()
+        self._making: asyncio.Future[list[Outlined]] | None = None
 
     @property
     def counts(self) -> Counts:
@@ -152,8 +154,7 @@ class ReplayedHull(LiveHull):
         await self.reached(0)
         if self._at is not None:
             if not self._outlines and self._at.counts.revision < self._last:
-                arguments = self._live, self._state, self._ahead, self._last, self._erasures
-                self._outlines.extend(await self._pasts.outlined(*arguments))
+                await self._next_outlines()
             return self._outlines[0].time if self._outlines else None
         if not self._ahead:
             if self.counts.revision >= self._last:
@@ -161,6 +162,22 @@ class ReplayedHull(LiveHull):
             after = self.counts.revision
             self._ahead.extend(await self._pasts.batches(self._live, after, self._last, self._erasures))
         return time_of(self._ahead[0], self.committed)
+
+    async def _next_outlines(self) -> None:
+        """Get the next vertices, and have those after them made."""
+        found = await (self._making or self._make())
+        self._outlines.extend(found)
+        self._making = None
+        if found[-1].counts.revision < self._last:
+            self._making = asyncio.ensure_future(self._make())
+
+    async def _make(self) -> list[Outlined]:
+        return await self._pasts.outlined(self._live, self._state, self._ahead, self._last, self._erasures)
+
+    def close(self) -> None:
+        """Make no further vertices: nobody asks for them any more."""
+        if self._making is not None and not self._making.cancel() and not self._making.cancelled():
+            self._making.exception()  # it is the caller's, who has left
 
     async def advance(self, until: int | None) -> None:
         """Go to the next revision; and over those after it that were committed by a time, as far as they are at hand.

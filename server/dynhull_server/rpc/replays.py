@@ -1,5 +1,7 @@
 """Sending the past of a hull to a caller, event by event."""
 
+from contextlib import closing
+
 from dynhull_proto.v1 import hull_service_pb2 as pb
 
 from ..engine.hulls import Hulls
@@ -62,7 +64,8 @@ class Replays:
                 message.erased = hull.erased_at(message.revision)
                 return pb.ReplayResponse(event=message)
 
-            await send_each(call, events, encoded, self._max_lag)
+            with closing(hull):
+                await send_each(call, events, encoded, self._max_lag)
 
     async def _ends(self, request: pb.ReplayRequest, live: LiveHull) -> tuple[Moment, int]:
         """The first revision and the last one."""
