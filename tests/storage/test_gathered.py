@@ -2,7 +2,6 @@
 
 import dataclasses
 import struct
-from io import BytesIO
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from dynhull_server.storage.rows import batch_columns
 from dynhull_server.storage.rows.batch_columns import columns_of_rows
 from dynhull_server.storage.rows.encoding import encode
 from dynhull_server.storage.segments import gathered as gathering
+from dynhull_server.storage.segments.archive import Parts
 from dynhull_server.storage.segments.columns import Batches, columns_of
 from dynhull_server.storage.segments.gathered import gathered, key_codes
 from dynhull_server.storage.segments.parquet import from_parquet, keys_from_parquet, to_parquet
@@ -164,7 +164,7 @@ def test_rows_of_keys_that_are_wanted_say_the_same_of_these(kind, steps, wanted)
     found = columns_of_rows(rows, hull.identity, keys)
     same(changes_of_keys(found, keys), expected)
     assert np.unique(found.revision).tolist() == [each.revision for each in records]
-    file = BytesIO(to_parquet(columns_of(records, hull.identity), {}))
+    file = Parts(memoryview(to_parquet(columns_of(records, hull.identity), {})))
     same(changes_of_keys(keys_from_parquet(file, "a file", keys)[0], keys), expected)
 
 

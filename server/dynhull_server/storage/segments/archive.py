@@ -4,13 +4,15 @@ import errno
 import io
 import os
 from base64 import b64decode, b64encode
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from typing import NamedTuple
+
+import numpy as np
 
 from ..durable import TEMPORARY, make_durable, write_durably
 from ..port import DamagedError, StorageError
@@ -31,59 +33,30 @@ class Written(NamedTuple):
     blocks: str
 
 
-class _Blocks(io.RawIOBase):
-    """A file whose bytes are checked, a block at a time, as they are read.
+class Parts:
+    """The bytes of a file, of which parts are loaded and checked, whole blocks of it at a time; elsewhere are zeros.
 
     Args:
-        path: the file.
-        written: what it was written with.
+        content: the bytes; of a file, room for them.
+        load: loads the block with a number, and checks it; None where all are there.
+
+    Attributes:
+        content: the same.
     """
 
-    def __init__(self, path: Path, written: Written) -> None:
-        self._path = path
-        self._digests = b64decode(written.blocks)
-        self._size = written.bytes
-        self._at = 0
-        self._blocks: dict[int, bytes] = {}  # those that have been read: columns of a group share them
-        self._file = _opened(path)
-        if os.fstat(self._file.fileno()).st_size != self._size:
-            self.close()
-            raise _changed(path)
+    def __init__(self, content: memoryview, load: Callable[[int], None] | None = None) -> None:
+        self.content = content
+        self._load = load
+        self._loaded: set[int] = set()
 
-    def close(self) -> None:
-        self._file.close()
-        super().close()
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def tell(self) -> int:
-        return self._at
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        self._at = offset + (0 if whence == os.SEEK_SET else self._at if whence == os.SEEK_CUR else self._size)
-        return self._at
-
-    def read(self, size: int = -1) -> bytes:
-        start = self._at
-        self._at = end = self._size if size < 0 else min(start + size, self._size)
-        if start >= end:
-            return b""
-        first, last = start // BLOCK, (end - 1) // BLOCK
-        content = self._block(first) if first == last else b"".join(map(self._block, range(first, last + 1)))
-        return content[start - first * BLOCK : end - first * BLOCK]
-
-    def _block(self, number: int) -> bytes:
-        content = self._blocks.get(number)
-        if content is None:
-            content = os.pread(self._file.fileno(), min(BLOCK, self._size - number * BLOCK), number * BLOCK)
-            if _digests_of(content) != self._digests[number * BLOCK_DIGEST_BYTES : (number + 1) * BLOCK_DIGEST_BYTES]:
-                raise _changed(self._path)
-            self._blocks[number] = content
-        return content
+    def load(self, start: int, end: int) -> None:
+        """Have the bytes from one place up to another one. Raises the errors of `Archive.parts`."""
+        if self._load is None or start >= end:
+            return
+        for number in range(start // BLOCK, (end - 1) // BLOCK + 1):
+            if number not in self._loaded:
+                self._load(number)
+                self._loaded.add(number)
 
 
 def is_installed() -> bool:
@@ -143,18 +116,29 @@ class Archive:
         return content
 
     @contextmanager
-    def parts(self, file: str, wrote: Written) -> Iterator[io.IOBase]:
-        """A file that is read in parts. What is read of it is checked; and all of it, where its blocks have no hashes.
+    def parts(self, file: str, wrote: Written) -> Iterator[Parts]:
+        """A file that is read in parts. What is loaded of it is checked; and all, where its blocks have no hashes.
 
         Raises:
             DamagedError: the bytes are not those that were written.
             StorageError: the file cannot be read at present.
         """
         if not self.has_parts or not wrote.blocks:
-            yield io.BytesIO(self.read(file, wrote))
+            yield Parts(memoryview(self.read(file, wrote)))
             return
-        with self._reading(file), _Blocks(self.path / file, wrote) as parts:
-            yield parts
+        path, digests = self.path / file, b64decode(wrote.blocks)
+        with self._reading(file), _opened(path) as opened:
+            if os.fstat(opened.fileno()).st_size != wrote.bytes:
+                raise _changed(path)
+            content = np.zeros(wrote.bytes, np.uint8).data  # memory is taken where something is loaded
+
+            def load(number: int) -> None:
+                block = content[number * BLOCK : (number + 1) * BLOCK]
+                os.preadv(opened.fileno(), [block], number * BLOCK)
+                if _digests_of(block) != digests[number * BLOCK_DIGEST_BYTES : (number + 1) * BLOCK_DIGEST_BYTES]:
+                    raise _changed(path)
+
+            yield Parts(content, load)
 
     @contextmanager
     def _reading(self, file: str) -> Iterator[None]:
@@ -247,7 +231,7 @@ def digest_of(content: bytes) -> str:
     return blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
 
 
-def _digests_of(content: bytes) -> bytes:
+def _digests_of(content: bytes | memoryview) -> bytes:
     """The hashes of the blocks of a file, or of some of them."""
     blocks = (content[start : start + BLOCK] for start in range(0, len(content), BLOCK))
     return b"".join(blake2b(block, digest_size=BLOCK_DIGEST_BYTES).digest() for block in blocks)

@@ -25,13 +25,14 @@ from .gathered import key_codes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from io import IOBase
 
     import numpy.typing as npt
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     from dynhull.keys import Keys
+
+    from .archive import Parts
 
     Rows = npt.NDArray[np.intp]
 
@@ -74,6 +75,7 @@ CODED = ("key", "cause", "kind", "op", "detail")  # what is read as places in a 
 # Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
 SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
 MOVES = ("put", "remove")
+FOOTER = 2**13  # bytes at the end of a file that are read at first
 TOGETHER = 4  # groups that are read at once where one after the other is needed
 SHARED = 4  # rows of a commit, on average, from which on its time is an index into those of all
 
@@ -178,7 +180,7 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
         raise DamagedError(f"{name} is damaged: {error}") from error
 
 
-def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
+def keys_from_parquet(parts: Parts, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
     """The same with the rows of some keys, and of none, alone: no more is read than the groups that have these.
 
     Raises:
@@ -187,17 +189,39 @@ def keys_from_parquet(source: IOBase, name: str, keys: Keys) -> tuple[SegmentCol
     import pyarrow as pa
 
     try:
-        file = _opened(pa.PythonFile(source, mode="r"), name)
+        _load_footer(parts)
+        file = _opened(pa.BufferReader(parts.content), name)
         schema, metadata = file.schema_arrow, file.metadata
         values = sorted(key_list(keys))
         groups = _groups(metadata, schema.names.index("key"), values)
         some = [metadata.row_group(group) for group in groups]
         same = _same(some) if some else {}
-        table = _rows_of(file.read_row_groups(groups, columns=_unknown(schema.names, same), use_threads=False), values)
+        columns = _unknown(schema.names, same)
+        for group in some:
+            _load_columns(parts, group, [schema.names.index(each) for each in columns])
+        table = _rows_of(file.read_row_groups(groups, columns=columns, use_threads=False), values)
         found = schema.metadata
         return _columns(table, same, found), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def _load_footer(parts: Parts) -> None:
+    """Have what Parquet has at the end of a file: its metadata, four bytes with their size, and four others."""
+    size = len(parts.content)
+    parts.load(max(size - FOOTER, 0), size)
+    length = int.from_bytes(parts.content[max(size - 8, 0) : size - 4], "little")
+    parts.load(max(size - 8 - length, 0), size)
+
+
+def _load_columns(parts: Parts, group: pq.RowGroupMetaData, places: Sequence[int]) -> None:
+    """Have some columns of a group of rows."""
+    for place in places:
+        column = group.column(place)
+        start = column.data_page_offset
+        if column.has_dictionary_page:
+            start = min(start, column.dictionary_page_offset)
+        parts.load(start, start + column.total_compressed_size)
 
 
 def ways_from_parquet(data: bytes, name: str, after: int, until: int) -> Iterator[KeyWays] | None:
