@@ -135,6 +135,44 @@ def test_the_link_keeps_the_moment(browser: Browser, url: str, client: HullClien
         ]
 
 
+def test_a_page_that_is_loaded_again(browser: Browser, url: str, client: HullClient, name: str, fleet: str) -> None:
+    """What it was sent before is gone; the server has the last hour of figures, and the past of hulls that keep one."""
+    forgetful = f"{name}/forgetful"
+    client.create_hull(forgetful)
+    client.apply(forgetful, insert=CORNERS)
+    with opened(browser, url, fleet, forgetful) as page:
+        wait_for_vertices(page, fleet, corners(3))
+        client.put(fleet, ["c"], [[8, 4]])
+        client.apply(forgetful, insert=[[9, 9]])
+        wait_for_vertices(page, fleet, corners(4))
+        page.reload()
+        page.evaluate(PARTS)
+        wait_for_vertices(page, fleet, corners(4))
+        # Rows of before it was loaded, which only the server has, and what is now.
+        page.wait_for_function(
+            """hulls => hulls.every(([hull, now]) => {
+                const {time, area} = time_lines.rows.get(hull) ?? {time: []}
+                return time[0] < recorder.began && area.at(-1) == now
+            })""",
+            arg=[[fleet, 24], [forgetful, 36]],
+        )
+        # A few seconds back, before it was loaded: the picture comes from the server.
+        go(page, client, fleet, 2)
+        assert page.evaluate("recorder.moment < recorder.recorded")
+        wait_for_vertices(page, fleet, corners(1))
+        wait_for_vertices(page, forgetful, [])
+        expect(page.locator(".why")).to_contain_text(f"{forgetful} keeps no past. Keep it: dynhull history set")
+        page.get_by_role("button", name="To now").click()
+        expect(page.locator(".oldest")).to_contain_text("Kept since")
+        page.goto(f"{url}?hull={forgetful}")
+        page.evaluate(PARTS)
+        expect(page.locator(".oldest")).to_have_text(
+            re.compile(r"Back to \d\d:\d\d:\d\d \S+, when this page was opened: what it shows keeps no past")
+        )
+        page.evaluate("recorder.began -= 600_000")
+        expect(page.locator(".oldest")).to_have_text("Back for five minutes: what it shows keeps no past")
+
+
 # In each frame, where the bar is: a button that moves between the press and the release of a pointer is not clicked.
 NOTE_PLACES = """() => {
     window.places = new Set()

@@ -4,6 +4,7 @@ import { isoTime } from "./dynhull/json.js"
 const LEAST_STEP = 0.1, MOST_STEPS = 1000, MOST_HOLES = 1000
 export const moment_format = new Intl.DateTimeFormat("en", {year: "numeric", month: "short", day: "numeric", hour: "2-digit", minute: "2-digit",
   second: "2-digit", hourCycle: "h23", timeZoneName: "short"})
+const clock_format = new Intl.DateTimeFormat("en", {hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23", timeZoneName: "short"})
 export class TimeBar {
   constructor(recorder, form) {
     this.recorder = recorder
@@ -67,10 +68,18 @@ export class TimeBar {
     const text = live ? "Live" : `${moment_format.format(moment)}, ${ago(now - moment)}${past && !past.ready ? ", reading" : ""}`
     put(this.output, text)
     this.slider.setAttribute("aria-valuetext", text)
-    put(this.oldest, this.recorder.kept == undefined ? "" : `Kept since ${moment_format.format(this.recorder.kept)}`)
+    put(this.oldest, this.reach_words())
     put(this.why, live && !this.missed ? "" : [this.missed, ...this.hulls.map(({words}) => words)].filter(Boolean).join(" "))
     if (past?.holes.length && this.holes.at(-1) != moment) this.holes = [...this.holes.slice(1 - MOST_HOLES), moment]
     this.draw(earliest, now)
+  }
+  // How far one can go back, and why not further.
+  reach_words() {
+    const {kept, began, recorded} = this.recorder
+    if (kept != undefined) return `Kept since ${moment_format.format(kept)}`
+    if (!this.hulls.every(({known}) => known)) return ""
+    const reach = recorded == began ? `to ${clock_format.format(began)}, when this page was opened` : "for five minutes"
+    return `Back ${reach}: what it shows keeps no past`
   }
   // A line a hull, as far as its past goes back: thin where keys were erased, with marks where it could not be read.
   draw(begin, end) {
