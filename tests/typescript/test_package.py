@@ -316,7 +316,24 @@ INKED = """colour => {
         found += data[i + 3] > 200 && Math.hypot(data[i] - red, data[i + 1] - green, data[i + 2] - blue) < 30
     return found
 }"""
-HULL, FENCE, ALARM = "#0072B2", "#9b5de5", "#D0342C"
+HULL, FENCE, ALARM = "#0072B2", "#7F3BD6", "#D0342C"
+HULL_BY_NIGHT, PAPER, PAPER_BY_NIGHT = "#3D9BE0", "rgb(255, 255, 255)", "rgb(18, 22, 27)"
+
+
+def by_night(seen: Page) -> None:
+    """By night where the system has it, unless the attribute says otherwise: ground and hulls have other colours."""
+    ground = "getComputedStyle(document.querySelector('dynhull-map').shadowRoot.querySelector('.map')).backgroundColor"
+    element = "document.querySelector('dynhull-map')"
+    for system, chosen, dark in (
+        ("dark", "", True),
+        ("dark", "day", False),
+        ("light", "night", True),
+        ("light", "", False),
+    ):
+        seen.emulate_media(color_scheme=system)
+        seen.evaluate(f"chosen => {element}.setAttribute('look', chosen)", chosen)
+        assert seen.evaluate(ground) == (PAPER_BY_NIGHT if dark else PAPER)
+        seen.wait_for_function(f"({INKED})('{HULL_BY_NIGHT if dark else HULL}') > 200")
 
 
 def test_a_map_of_a_hull_a_fence_and_an_alarm(gateway: Gateway, server: MortalServer, tmp_path: Path) -> None:
@@ -336,6 +353,7 @@ def test_a_map_of_a_hull_a_fence_and_an_alarm(gateway: Gateway, server: MortalSe
         # A line of dashes at the margin is more than the area's own border and the name.
         assert seen.evaluate(INKED, FENCE) > seen.evaluate(INKED, HULL) > 200
         assert seen.evaluate(INKED, ALARM) == 0
+        by_night(seen)
         client.put(name, ["c"], [(4, 90)])
         shown = seen.locator("dynhull-map .alarms li")
         expect(shown).to_have_text(f"▲ spread: {name}, 180", timeout=PATIENCE * 1000)

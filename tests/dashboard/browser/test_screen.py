@@ -230,7 +230,9 @@ def test_a_kiosk_turns_and_shows_alarms(browser: Browser, url: str, client: Hull
             assert page.evaluate("document.documentElement.scrollHeight") <= height
             assert page.evaluate("document.documentElement.scrollWidth") <= width
             assert page.evaluate(OVERPRINTED) == []
-        assert page.evaluate(FINDINGS) == []
+            for scheme in ("dark", "light"):
+                page.emulate_media(color_scheme=scheme)
+                assert page.evaluate(FINDINGS) == [], (width, scheme)
         page.set_viewport_size({"width": 1920, "height": 1080})
         raised = page.locator(".alarms tbody tr.raised")
         size = page.locator(".alarms h2").evaluate("each => parseFloat(getComputedStyle(each).fontSize)")

@@ -1,7 +1,7 @@
 import { Client } from "../client.js"
 import { followAlarm, followFence, followHull, followPrefix } from "./following.js"
 import { Hands } from "./hands.js"
-import { ALARM_LOOK, FENCE_LOOKS, HULL_LOOKS } from "./looks.js"
+import { ALARM_LOOK, FENCE_LOOKS, HULL_LOOKS, lit } from "./looks.js"
 import { Picture } from "./picture.js"
 import { STYLE } from "./style.js"
 
@@ -12,6 +12,7 @@ const BUTTONS = '<button name="in" aria-label="Zoom in">+</button><button name="
 const INSIDE = `<div class="map" tabindex="0" role="application" aria-label="Map. Arrow keys move it, plus and minus zoom, 0 shows all. H points at the next hull, V at its next vertex, with Shift at the one before">
 <canvas></canvas><canvas></canvas><ul class="alarms" role="status"></ul><div class="buttons">${BUTTONS}</div><p class="attribution"></p><p class="note" role="status"></p><div class="tip" aria-live="polite" hidden></div></div>`
 const ZOOM = 1.4
+const system = matchMedia("(prefers-color-scheme: dark)")
 /** Hulls that are drawn because an alarm is raised for them. */
 const MOST_RAISED = 20
 
@@ -21,14 +22,14 @@ const MOST_RAISED = 20
  *     <dynhull-map gateway="http://127.0.0.1:8080" hull="fleet" fence="yard" alarm="spread"></dynhull-map>
  *
  * Attributes: `gateway`, its URL, that of the page by default; `hull`, `fence`, `alarm` and `prefix`, names with spaces
- * between; `coasts`, the folder of world-atlas, for coasts below hulls on the globe; `unit`, that of x and y in a plane.
+ * between; `look`, "day" or "night", otherwise as the system has it; `coasts`, the folder of world-atlas, for coasts below hulls on the globe; `unit`, that of x and y in a plane.
  * Set `client` for a token, or to share a client: all maps and streams of one take one connection.
  *
  * Each event is told as `dynhull-event`, with its kind and the event in `detail`; what cannot be followed, and why, as
  * `dynhull-problem`.
  */
 export class DynhullMap extends HTMLElement {
-  static observedAttributes = ["gateway", "hull", "prefix", "fence", "alarm"]
+  static observedAttributes = ["gateway", "hull", "prefix", "fence", "alarm", "look"]
 
   /** What is followed, by kind and name. @type {Map<string, AbortController>} */
   #followed = new Map()
@@ -55,6 +56,7 @@ export class DynhullMap extends HTMLElement {
   /** @param {string} name */
   attributeChangedCallback(name) {
     if (name === "gateway") this.#end()
+    if (name === "look") this.#picture?.draw_all()
     this.#change()
   }
 
@@ -90,6 +92,7 @@ export class DynhullMap extends HTMLElement {
     const picture = new Picture(this.#find(".map"), { x_unit: unit, y_unit: unit, tiles, coasts: this.getAttribute("coasts") })
     const hands = new Hands(picture, this.#find(".tip"), () => {})
     this.#picture = picture
+    system.addEventListener("change", () => this.#keep())
     this.#find("[name=in]").onclick = () => hands.zoom(ZOOM)
     this.#find("[name=out]").onclick = () => hands.zoom(1 / ZOOM)
     this.#find("[name=all]").onclick = () => picture.follow()
@@ -142,8 +145,11 @@ export class DynhullMap extends HTMLElement {
   /** What is in the picture, and how it looks. */
   #keep() {
     const alarmed = new Set([...this.#raised.values()].flatMap((hulls) => [...hulls.keys()]))
-    const look = (/** @type {Look[]} */ looks) => (/** @type {string} */ name, /** @type {number} */ row) => ({ name, ...looks[row % looks.length] })
-    const hulls = this.#hulls.map(look(HULL_LOOKS)).map((each) => (alarmed.has(each.name) ? { ...each, ...ALARM_LOOK } : each))
+    const chosen = this.getAttribute("look") ?? ""
+    const night = chosen === "night" || (chosen !== "day" && system.matches)
+    const shaded = (/** @type {Look & {name: string}} */ { colour, ...rest }) => ({ ...rest, colour: lit(colour, night) })
+    const look = (/** @type {Look[]} */ looks) => (/** @type {string} */ name, /** @type {number} */ row) => shaded({ name, ...looks[row % looks.length] })
+    const hulls = this.#hulls.map(look(HULL_LOOKS)).map((each) => (alarmed.has(each.name) ? shaded({ ...each, ...ALARM_LOOK }) : each))
     this.#picture.keep(hulls, this.#names("fence").map(look(FENCE_LOOKS)), this.#names("prefix").map(look(HULL_LOOKS)))
   }
 

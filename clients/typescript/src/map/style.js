@@ -1,9 +1,12 @@
-/** Colours are those that the picture reads; a page may set them on the element. */
+const DAY = `--ink: #1b1f24; --faint: #5c6570; --paper: #ffffff; --raised: #f3f5f7; --line: #d5dae0; --grid: #e9ecef; --sea: #f6f8fa;
+  --veil: #ffffff59; --coast: #7f8a95; --border: #d5dae0; --alarm: #b3261e; --alarm-ink: #ffffff; --focus: #0072b2;`
+const NIGHT = `--ink: #e6eaee; --faint: #9aa5b1; --paper: #12161b; --raised: #1d232a; --line: #343c46; --grid: #232a32; --sea: #151a20;
+  --veil: #12161b99; --coast: #66717d; --border: #2f3740; --alarm: #ff8a80; --alarm-ink: #12161b; --focus: #56b4e9;`
+/** Colours are those that the picture reads; a page may set them on the element. By night where the attribute, or else the system, says so. */
 export const STYLE = `
-:host { display: block; height: 24rem; --ink: #1b1f24; --faint: #5c6570; --paper: #ffffff; --raised: #f3f5f7; --line: #d5dae0;
-  --grid: #e9ecef; --sea: #f6f8fa; --veil: #ffffff59; --coast: #8b959f; --border: #d5dae0; --alarm: #b3261e; --focus: #0072b2; }
-@media (prefers-color-scheme: dark) { :host { --ink: #e6eaee; --faint: #9aa5b1; --paper: #12161b; --raised: #1d232a; --line: #343c46;
-  --grid: #232a32; --sea: #151a20; --veil: #12161b99; --coast: #66717d; --border: #2f3740; --alarm: #ff8a80; --focus: #56b4e9; } }
+:host { display: block; height: 24rem; ${DAY} }
+@media (prefers-color-scheme: dark) { :host(:not([look=day])) { ${NIGHT} } }
+:host([look=night]) { ${NIGHT} }
 :host([hidden]) { display: none; }
 .map { position: relative; height: 100%; overflow: hidden; touch-action: none; cursor: grab; user-select: none; color: var(--ink);
   background: var(--paper); font: 14px/1.45 system-ui, sans-serif; }
