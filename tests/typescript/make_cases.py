@@ -16,6 +16,7 @@ from dynhull import DynamicHull
 
 CASES = Path(__file__).parents[2] / "clients" / "typescript" / "test" / "cases.json"
 TINY, HUGE = 5e-324, 1.7976931348623157e308
+NOW = 1_700_000_000_000_000  # microseconds
 
 
 def shapes(dice: Random) -> list[list[tuple[float, float]]]:
@@ -85,9 +86,66 @@ def values() -> dict[str, object]:
     return {"keys": [*keys, 2**53 + 3], "batches": steps}
 
 
+class Gathered:
+    """Batches of a writer by their rule: a run of rows joins the batch before it as a whole, or begins another one."""
+
+    def __init__(self, coalesces: bool) -> None:
+        self.count = 0
+        self._coalesces = coalesces
+        self._only: str | None = None
+        self._latest: dict[str, int] = {}
+
+    def add(self, keys: list[str], times: list[int], only: str | None) -> int:
+        """The number of the batch with the last of the rows."""
+        coalesces, runs = self._coalesces and only != "absent", [dict[str, int]()]
+        for key, time in zip(keys, times, strict=True):
+            if key in runs[-1] and not (coalesces and runs[-1][key] <= time):
+                runs.append({})
+            runs[-1][key] = time
+        for run in runs:
+            again = [key for key in run if key in self._latest]
+            if (
+                not self.count
+                or only != self._only
+                or not all(coalesces and self._latest[key] <= run[key] for key in again)
+            ):
+                self.count += 1
+                self._latest = {}
+            self._only = only
+            self._latest |= run
+        return self.count
+
+
+def writers(dice: Random) -> list[dict[str, object]]:
+    """Calls of writers that gather all, the revision of the batch with the last row of each, and what is kept."""
+    found: list[dict[str, object]] = []
+    for place in range(24):
+        coalesce, timed = ("last", None)[place % 2], place % 4 < 2
+        gathered, kept, latest = Gathered(coalesce == "last"), dict[str, list[float]](), dict[str, int]()
+        calls, revisions = list[dict[str, object]](), list[int]()
+        for step in range(12):
+            keys = [dice.choice("abcdef") for _ in range(dice.randrange(1, 5))]
+            points = [[float(step), float(row)] for row in range(len(keys))]
+            times = [NOW + 1000 * step + dice.randrange(-1500, 1500) if timed else NOW for _ in keys]
+            only = None if timed else dice.choice((None, None, None, "absent", "present"))
+            for key, point, time in zip(keys, points, times, strict=True):
+                if time >= latest.get(key, time) and (only is None or (only == "present") == (key in kept)):
+                    kept[key], latest[key] = point, time
+            calls.append({"keys": keys, "points": points, "times": times if timed else None, "only": only})
+            revisions.append(gathered.add(keys, times, only))
+        ordering = "event_time" if timed else "arrival"
+        case = {"coalesce": coalesce, "ordering": ordering, "calls": calls, "revisions": revisions}
+        found.append(case | {"kept": dict(sorted(kept.items()))})
+    return found
+
+
 def main() -> None:
     dice = Random(41)
-    cases = {"values": values(), "hulls": [case(dice, points) for points in shapes(dice)]}
+    cases = {
+        "writers": writers(Random(42)),
+        "values": values(),
+        "hulls": [case(dice, points) for points in shapes(dice)],
+    }
     CASES.write_text(
         json.dumps(cases, allow_nan=False, separators=(",", ":")).replace('{"vertices"', '\n{"vertices"') + "\n"
     )

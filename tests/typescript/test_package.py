@@ -120,6 +120,18 @@ def test_python_has_the_same_values(server: MortalServer) -> None:
             assert np.array_equal(np.sort(client.entities(name).keys), keys[:-1])
 
 
+def test_python_gathers_the_same_batches(server: MortalServer) -> None:
+    for place, case in enumerate(CASES["writers"]):
+        name = f"typescript/gathered/{place}"
+        with HullClient(server.address) as client:
+            client.create_hull(name, keyed="str", ordering=case["ordering"])
+            with client.writer(name, coalesce=case["coalesce"], linger=PATIENCE) as writer:
+                outcomes = [writer.put(**call) for call in case["calls"]]
+            assert [each.result().revision for each in outcomes] == case["revisions"], place
+            assert writer.sequence == case["revisions"][-1]
+            assert client.positions(name, list(case["kept"])).positions.tolist() == list(case["kept"].values())
+
+
 @pytest.mark.parametrize(
     "count", [FEW, pytest.param(MANY, marks=[pytest.mark.long, pytest.mark.only_with("LANGUAGES_CASES")])]
 )

@@ -12,6 +12,7 @@ import { path } from "./connection.js"
  * @property {string} producer
  * @property {number} inFlight
  * @property {boolean} maySkip
+ * @property {string} uid of the hull
  * @property {AbortSignal | null} signal
  */
 
@@ -84,7 +85,7 @@ function bodyOf({ op, conditions, keys, coordinates, destinations, times, expire
   const timed = {
     ...(times.length && { times: times.map(isoTime) }),
     ...(expireTimes.length && { expire_times: expireTimes.map(isoTime) }),
-    ...(accuracies.length && { accuracies }),
+    ...(accuracies.length && { accuracies: [...accuracies.values] }),
   }
   const body = { ...conditions, ...timed }
   if (op === "put") return { ...body, keys, points }
@@ -92,7 +93,7 @@ function bodyOf({ op, conditions, keys, coordinates, destinations, times, expire
   return { ...body, [op]: op === "move" ? { origins: points, destinations: pairs(destinations) } : points }
 }
 
-/** @param {number[]} flat */
-function pairs(flat) {
-  return Array.from({ length: flat.length / 2 }, (_, row) => [flat[2 * row], flat[2 * row + 1]])
+/** @param {import("./batch.js").Column} column */
+function pairs({ values }) {
+  return Array.from({ length: values.length / 2 }, (_, row) => [values[2 * row], values[2 * row + 1]])
 }

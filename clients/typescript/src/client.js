@@ -18,7 +18,7 @@ const SILENCE = 45
  * @typedef {{signal?: AbortSignal | null}} Abortable
  *
  * @typedef {object} Transport how calls and streams reach a server: `dynhull/grpc` has another one
- * @property {Pick<Connection, "url" | "ask" | "events" | "carry" | "inFlight">} connection
+ * @property {Pick<Connection, "url" | "ask" | "events" | "known" | "carry" | "inFlight">} connection
  * @property {Pick<Joined, "follow">} joined
  *
  * @typedef {object} HullInfo

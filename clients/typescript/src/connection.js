@@ -11,6 +11,10 @@ import { parsed } from "./sse.js"
  * @property {number} [silence] seconds without anything, a comment included, after which a stream is connected anew
  * @property {typeof globalThis.fetch} [fetch] another fetch
  *
+ * @typedef {object} Known
+ * @property {bigint} sequence the number of the last batch of a producer that was applied; 0 if there is none
+ * @property {string} uid the uid of the hull
+ *
  * @typedef {string | number | bigint | boolean | null | undefined} Value
  *
  * @typedef {object} Call
@@ -79,6 +83,20 @@ export class Connection {
    */
   ask(path, call = {}) {
     return answered(() => this.#once(path, call), this.#retries, call)
+  }
+
+  /**
+   * What a hull knows of a producer.
+   * @param {string} name
+   * @param {string} producer
+   * @param {AbortSignal | null} signal
+   * @returns {Promise<Known>}
+   */
+  async known(name, producer, signal) {
+    const read = { repeatable: true, signal }
+    const { last_sequence: sequence } = await this.ask(path`/hulls/${name}/producers/${producer}`, read)
+    const { hulls: [first] } = await this.ask("/hulls", { query: { prefix: name, limit: 1 }, ...read })
+    return { sequence: BigInt(sequence), uid: first?.name === name ? first.uid : "" }
   }
 
   /** Send the batches of a writer. @param {string} name @param {import("./in-flight.js").InFlight} batches @param {import("./carrying.js").Carried} options */

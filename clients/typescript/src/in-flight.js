@@ -1,4 +1,4 @@
-import { Batch } from "./batch.js"
+import { Batch, runsOf } from "./batch.js"
 
 /**
  * The batches of a writer that are not acknowledged, in their order: those under way, those that wait, and the last one, which
@@ -7,8 +7,6 @@ import { Batch } from "./batch.js"
 export class InFlight {
   /** The number of the last batch that was acknowledged. */
   sequence = 0n
-  /** What the server said of it. @type {import("./client.js").Applied | null} */
-  applied = null
   /** Rows that are not acknowledged. */
   rows = 0
   /** Called when batches were acknowledged, and when there is more to send. */
@@ -20,9 +18,13 @@ export class InFlight {
   #oldest = 0
   #unsent = 0
 
-  /** @param {number} batchRows rows of a batch at most */
-  constructor(batchRows) {
+  /**
+   * @param {number} batchRows rows of a batch at most
+   * @param {boolean} [coalesces] whether the last position of a key in a batch replaces the ones before it
+   */
+  constructor(batchRows, coalesces = false) {
     this.batchRows = batchRows
+    this.coalesces = coalesces
   }
 
   /** Whether everything is acknowledged. */
@@ -40,20 +42,21 @@ export class InFlight {
     return this.#batches.length - this.#oldest
   }
 
-  /** @param {import("./batch.js").Rows} rows */
+  /** @param {import("./batch.js").Rows} rows @returns {Batch} the one that has the last of them */
   add(rows) {
-    for (let row = 0; row < rows.count; ) {
-      let last = this.#batches.at(-1)
-      const next = last && !last.sequence ? last.add(rows, row, this.batchRows) : row
-      if (next === row) {
+    const coalesces = this.coalesces && rows.op === "put" && rows.conditions.only !== "absent" // of new keys, the first position counts
+    let last = this.#batches.at(-1)
+    for (const run of runsOf(rows, coalesces, this.batchRows)) {
+      if (!last || last.sequence || !last.admits(rows, run, this.batchRows)) {
         if (last) this.#close(last)
-        last = new Batch(rows)
+        last = new Batch(rows, coalesces)
         this.#batches.push(last)
-        row = last.add(rows, row, this.batchRows)
-      } else row = next
-      if (last && last.rows === this.batchRows) this.#close(last)
+      }
+      last.add(rows, run)
+      if (last.rows === this.batchRows) this.#close(last)
     }
     this.rows += rows.count
+    return /** @type {Batch} */ (last) // a call without rows is a run, too
   }
 
   /** Have the batch that gathers sent although others are under way. */
@@ -91,10 +94,9 @@ export class InFlight {
 
   /** @param {Batch} batch @param {import("./client.js").Applied} applied */
   acknowledge(batch, applied) {
-    batch.applied = applied
+    batch.acknowledge(applied)
     while (this.#oldest < this.#unsent && this.#batches[this.#oldest].applied) {
       const first = this.#batches[this.#oldest++]
-      this.applied = first.applied
       this.sequence = first.sequence
       this.rows -= first.rows
     }
@@ -104,6 +106,13 @@ export class InFlight {
       this.#oldest = 0
     }
     this.onAcknowledged()
+  }
+
+  /** None of what is left is sent any more. @param {unknown} error why */
+  abandon(error) {
+    for (const batch of this.#batches.splice(this.#oldest)) if (!batch.applied) batch.abandon(error)
+    this.#unsent = this.#oldest
+    this.rows = 0
   }
 
   /** What was under way is to be sent again. */

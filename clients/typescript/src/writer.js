@@ -1,7 +1,6 @@
 import { rowsOf } from "./batch.js"
-import { growing, path, pause } from "./connection.js"
+import { growing, pause } from "./connection.js"
 import { DynhullError } from "./errors.js"
-import { fromWire } from "./json.js"
 import { InFlight } from "./in-flight.js"
 
 /**
@@ -13,11 +12,15 @@ import { InFlight } from "./in-flight.js"
  * @typedef {object} WriterOptions
  * @property {string} [producer] the name under which batches are numbered; default: a new one. A writer with the name of an earlier
  *   one goes on after the last batch of that which was applied. Two at the same time must not share a name.
- * @property {bigint} [sequence] the number of the last batch that was sent before, to go on after it; default: as the server says
  * @property {number} [batchRows] rows of a batch at most
  * @property {number} [inFlight] batches that are sent and not acknowledged, at most
  * @property {number} [room] rows that wait before `put` does
  * @property {number} [patience] seconds to try for while nobody answers
+ * @property {"last" | null} [coalesce] "last" keeps the last of several positions of a key in a batch; by default a key that comes
+ *   again begins a batch, and no position is lost
+ * @property {string} [uid] the uid of the hull that an earlier writer with this name wrote to: RESTORED if a backup of the hull was
+ *   restored since then. Over a gateway it is compared when the writer begins, and where numbers leave a gap.
+ * @property {bigint} [acknowledged] the number of the last batch that was acknowledged to that writer: RESTORED if the hull lacks it
  * @property {"raise" | "count"} [missing] whether a point or key to delete, move or remove that is not there refuses the batch;
  *   default: a point does, and a key does not
  * @property {boolean} [maySkip] accept that batches are passed over after a restore of the server
@@ -52,7 +55,8 @@ export class Writer {
   /** @type {(() => void)[]} who waits for room, or for everything to be acknowledged */
   #waiters = []
   #sending = false
-  #begun
+  #uid = ""
+  #begun = false
 
   /**
    * @param {Connection} connection
@@ -60,18 +64,17 @@ export class Writer {
    * @param {WriterOptions} options
    */
   constructor(connection, name, options) {
-    const { producer = crypto.randomUUID(), sequence, batchRows = 8192, inFlight = connection.inFlight, patience = 60 } = options
+    const { producer = crypto.randomUUID(), batchRows = 8192, inFlight = connection.inFlight, patience = 60, coalesce = null } = options
     for (const [option, value] of Object.entries({ batchRows, inFlight })) {
       if (!Number.isSafeInteger(value) || value < 1) throw new RangeError(`${option} must be an integer from 1 on, got ${value}`)
     }
+    if (coalesce !== null && coalesce !== "last") throw new RangeError(`coalesce must be null or "last", got ${coalesce}`)
     this.#connection = connection
     this.#name = name
-    this.#options = { room: (inFlight + 1) * batchRows, patience, maySkip: false, signal: null, ...options, inFlight, producer }
-    this.#batches = new InFlight(batchRows)
+    this.#options = { room: (inFlight + 1) * batchRows, patience, maySkip: false, signal: null, uid: "", acknowledged: 0n, ...options, inFlight, producer }
+    this.#batches = new InFlight(batchRows, coalesce === "last")
     this.#batches.onAcknowledged = () => this.#wake()
     this.producer = producer
-    this.#begun = sequence !== undefined || options.producer === undefined
-    this.#batches.begin(sequence ?? 0n)
   }
 
   /** The number of the last batch that was acknowledged. @returns {bigint} */
@@ -79,13 +82,14 @@ export class Writer {
     return this.#batches.sequence
   }
 
-  /** What the server said of it. @returns {import("./client.js").Applied | null} */
-  get applied() {
-    return this.#batches.applied
+  /** The uid of the hull, for a later writer; empty until the writer has begun. */
+  get uid() {
+    return this.#uid
   }
 
   /**
-   * Put keys at positions. Resolves when there is room for more. A bad value throws, and nothing was added.
+   * Put keys at positions. Resolves when there is room for more; `applied` of what it resolves to is the promise of what the batch
+   * has changed, or of the last one of several. Calls may share a batch. A bad value throws, and nothing was added.
    * @param {readonly AnyKey[]} keys
    * @param {readonly Point[]} points
    * @param {readonly Time[] | Putting} [times] of the positions, or with what else `Client.put` takes
@@ -133,13 +137,13 @@ export class Writer {
   async flush() {
     this.#batches.hurry()
     this.#batches.onMore()
-    await this.#until(() => !this.#batches.rows)
+    await this.#until(() => this.#batches.empty)
   }
 
   /** Flush, and take nothing more. */
   async close() {
     await this.flush()
-    this.#failed = new DynhullError({ reason: "CLOSED", detail: "the writer is closed" })
+    this.#failed ??= new DynhullError({ reason: "CLOSED", detail: "the writer is closed" })
   }
 
   get #missing() {
@@ -147,14 +151,20 @@ export class Writer {
     return missing ? { missing } : {}
   }
 
-  /** @param {import("./batch.js").Operation} op @param {import("./batch.js").Columns} columns @param {import("./batch.js").Conditions} [conditions] */
+  /**
+   * @param {import("./batch.js").Operation} op
+   * @param {import("./batch.js").Columns} columns
+   * @param {import("./batch.js").Conditions} [conditions]
+   * @returns {Promise<import("./batch.js").Outcome>}
+   */
   async #add(op, columns, conditions) {
     if (this.#failed) throw this.#failed
-    this.#batches.add(rowsOf(op, columns, conditions))
+    const { outcome } = this.#batches.add(rowsOf(op, columns, conditions))
     this.#batches.onMore()
     void this.#send()
     const { room, inFlight } = this.#options
     await this.#until(() => this.#batches.rows <= room && this.#batches.batches <= 2 * inFlight + 1)
+    return outcome
   }
 
   async #send() {
@@ -166,6 +176,7 @@ export class Writer {
       await this.#carry()
     } catch (error) {
       this.#failed = error
+      this.#batches.abandon(error)
     } finally {
       this.#sending = false
       this.#wake()
@@ -173,21 +184,42 @@ export class Writer {
     if (!this.#failed && !this.#batches.empty) void this.#send() // came while the last connection ended
   }
 
-  /** After what an earlier writer with this name has sent. */
+  /** After what an earlier writer with this name has sent, to the same hull. */
   async #begin() {
     if (this.#begun) return
-    const { producer, signal } = this.#options
-    const asked = path`/hulls/${this.#name}/producers/${producer}`
-    const ask = () => this.#connection.ask(asked, { repeatable: true, signal })
-    this.#batches.begin(fromWire(await this.#patiently(ask)).lastSequence)
+    const { uid, acknowledged } = this.#options
+    const known = await this.#patiently(() => this.#known())
+    if (uid && (known.uid !== uid || known.sequence < acknowledged)) throw this.#restored(known)
+    this.#uid = known.uid
+    this.#batches.begin(known.sequence)
     this.#begun = true
+  }
+
+  #known() {
+    const { producer, signal } = this.#options
+    return this.#connection.known(this.#name, producer, signal)
+  }
+
+  /** @param {import("./connection.js").Known} known */
+  #restored({ uid, sequence }) {
+    const what = uid === (this.#options.uid || this.#uid) ? "was led back to an earlier state" : "is another one, or was restored from a backup"
+    const detail = `the hull ${JSON.stringify(this.#name)} ${what}, and the last batch of producer ${this.producer} that it has is number ${sequence}: go on from there, with a new writer`
+    return new DynhullError({ reason: "RESTORED", status: 409, detail, expected: sequence + 1n })
   }
 
   /** Send what there is, over one connection after the other. */
   async #carry() {
     while (!this.#batches.empty) {
-      await this.#patiently(() => this.#connection.carry(this.#name, this.#batches, this.#options))
+      const carrying = { ...this.#options, uid: this.#uid }
+      await this.#patiently(() => this.#connection.carry(this.#name, this.#batches, carrying).catch((error) => this.#explained(error)))
     }
+  }
+
+  /** A gap before batches that were acknowledged: the hull is not what it was. @param {unknown} error @returns {Promise<never>} */
+  async #explained(error) {
+    const gap = error instanceof DynhullError && error.reason === "SEQUENCE_GAP" ? error.expected : null
+    if (gap === null || BigInt(gap) > this.sequence) throw error
+    throw this.#restored(await this.#known())
   }
 
   /**

@@ -292,12 +292,62 @@ live("a writer gathers, waits for room, and stops where the server refuses", asy
   await assert.rejects(writer.put([1, 2], [[1, 1], [2, 2]], [new Date(), "yesterday"]), bad)
   await assert.rejects(writer.put([1, -2], [[1, 1], [2, 2]]), { field: "keys", row: 1, value: "-2" })
   await assert.rejects(writer.put([1, 2], [[1, 1], [2, NaN]]), { field: "points", row: 1 })
-  await writer.put([2], [[2, 2]])
+  const { applied } = await writer.put([2], [[2, 2]])
   await writer.flush() // nothing of what was bad was added
-  assert.equal(writer.applied?.points, 699)
-  await writer.put(["a key of another kind"], [[1, 1]])
+  assert.deepEqual([(await applied).points, (await applied).moved], [699, 1])
+  const wrong = await writer.put(["a key of another kind"], [[1, 1]])
+  const after = await writer.put([2], [[3, 3]])
   await assert.rejects(writer.flush(), { name: "DynhullError" })
   await assert.rejects(writer.put([2], [[2, 2]]), { name: "DynhullError" })
+  await assert.rejects(wrong.applied, { name: "DynhullError" })
+  await assert.rejects(after.applied, { name: "DynhullError" })
+  await assert.rejects(writer.close(), { name: "DynhullError" })
+  assert.deepEqual((await client.positions(hull, [2])).positions, [[2, 2]])
+})
+
+live("a writer keeps every position of a key, or the last of a batch, as the Python SDK's does", async (client, name) => {
+  const { writers } = fromJson(await readFile(new URL("cases.json", import.meta.url), "utf8"))
+  for (const [place, { coalesce, ordering, calls, revisions, kept }] of writers.entries()) {
+    const hull = name(`kept/${place}`)
+    await client.createHull(hull, { keyed: "str", ordering })
+    const writer = client.writer(hull, { coalesce })
+    const outcomes = []
+    for (const { keys, points, times, only } of calls) {
+      const columns = { ...(times && { times: times.map(BigInt) }), ...(only && { only }) }
+      outcomes.push(await writer.put(keys, points, columns))
+    }
+    await writer.close()
+    const found = await Promise.all(outcomes.map(async ({ applied }) => Number((await applied).revision)))
+    assert.deepEqual(found, revisions, `case ${place}`)
+    assert.equal(writer.sequence, BigInt(revisions.at(-1)))
+    assert.deepEqual((await client.positions(hull, Object.keys(kept))).positions, Object.values(kept), `case ${place}`)
+  }
+  const bad = /** @type {any} */ ({ coalesce: "first" })
+  assert.throws(() => client.writer("kept", bad), /coalesce must be null or "last", got first/)
+})
+
+live("a writer of a hull that is another one is refused", async (client, name) => {
+  const hull = name("another")
+  await client.createHull(hull, { keyed: "int" })
+  const first = client.writer(hull, { producer: "p" })
+  assert.equal(first.uid, "")
+  await first.put([1], [[1, 1]])
+  await first.flush()
+  assert.equal(first.uid, (await client.getHull(hull)).info.uid)
+  const second = client.writer(hull, { producer: "p", uid: first.uid, acknowledged: first.sequence })
+  await second.put([2], [[2, 2]])
+  await second.close()
+  const ahead = client.writer(hull, { producer: "p", uid: first.uid, acknowledged: 9n })
+  await ahead.put([3], [[3, 3]])
+  await assert.rejects(ahead.flush(), { reason: "RESTORED", expected: 3n, message: /led back/ })
+  await client.deleteHull(hull)
+  await client.createHull(hull, { keyed: "int" })
+  const third = client.writer(hull, { producer: "p", uid: first.uid })
+  const { applied } = await third.put([4], [[4, 4]])
+  await assert.rejects(applied, { reason: "RESTORED", expected: 1n, message: /another one/ })
+  await first.put([5], [[5, 5]])
+  await assert.rejects(first.flush(), { reason: "RESTORED" })
+  assert.equal((await client.getHull(hull)).info.points, 0)
 })
 
 live("a writer with the name of an earlier one goes on after its last batch", async (client, name) => {
@@ -338,10 +388,10 @@ live("a writer moves points, and puts keys under conditions", async (client, nam
   const mover = client.writer(points, { missing: "count" })
   await mover.insert([[0, 0], [4, 0], [4, 3]])
   await mover.move([[0, 0]], [[0, 3]])
-  await mover.delete([[7, 7], [4, 3]])
+  const { applied } = await mover.delete([[7, 7], [4, 3]])
   await mover.close()
   assert.deepEqual((await client.getHull(points)).vertices, [[0, 3], [4, 0]])
-  assert.equal(mover.applied?.missing, 1)
+  assert.equal((await applied).missing, 1)
   const strict = client.writer(points)
   await strict.delete([[7, 7]])
   await assert.rejects(strict.flush(), { name: "DynhullError" })

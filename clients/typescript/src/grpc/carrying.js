@@ -1,5 +1,7 @@
 // How the batches of a writer go over gRPC: a stream of them, and one of acknowledgements.
 
+import { endianness } from "node:os"
+
 import { DynhullError } from "../errors.js"
 import { appliedOf } from "./answers.js"
 import { conditionOf } from "./requests.js"
@@ -16,14 +18,14 @@ const MESSAGE_BYTES = 2 ** 16
  * @param {import("../carrying.js").Carried} options
  * @returns {Promise<void>}
  */
-export async function carryOverGrpc(channel, name, batches, { producer, inFlight, maySkip, signal }) {
+export async function carryOverGrpc(channel, name, batches, { producer, inFlight, maySkip, uid, signal }) {
   let [begun, closed] = [false, false]
   let several = 0 // batches of a message, once the server has said that it takes several
   const send = () => {
     while (!closed) {
       const taken = takes(batches, inFlight, several)
       if (!taken.length) break
-      const first = begun ? {} : { name, producer, acceptResults: true, maySkip }
+      const first = begun ? {} : { name, producer, acceptResults: true, maySkip, uid }
       const numbered = taken.map((batch) => ({ batch: messageOf(batch), sequence: String(batch.sequence) }))
       call.write({ ...first, ...(several ? { batches: numbered } : numbered[0]) })
       begun = true
@@ -60,13 +62,15 @@ export async function carryOverGrpc(channel, name, batches, { producer, inFlight
 function takes(batches, inFlight, several) {
   const { underWay } = batches
   const most = Math.min(Math.max(several, 1), inFlight - underWay)
-  let [count, bytes] = [0, 0]
+  let [count, bytes, full] = [0, 0, false]
   for (; count < most; count++) {
     const batch = batches.peek(count)
-    if (batch === null || (count && (!batch.sequence || bytes + batch.size > MESSAGE_BYTES))) break
+    if (batch === null || (count && !batch.sequence)) break
+    full = bytes + batch.size > MESSAGE_BYTES
+    if (full && count) break
     bytes += batch.size
   }
-  if (several && count < Math.min(underWay, most) && bytes < MESSAGE_BYTES) return []
+  if (several && !full && count < Math.min(underWay, most)) return []
   const taken = []
   while (taken.length < count) taken.push(/** @type {import("../batch.js").Batch} */ (batches.take()))
   return taken
@@ -97,7 +101,7 @@ function messageOf({ op, conditions, keys, coordinates, destinations, times, exp
   if (op === "remove") return { removes: packKeys("remove", keys), ...(missing === "raise" && { missingKeys: "MISSING_KEY_POLICY_REFUSE" }) }
   const points = { packed: packed(coordinates) }
   if (op === "put") {
-    const errors = accuracies.length ? { values: accuracies } : null
+    const errors = accuracies.length ? { values: [...accuracies.values] } : null
     const ends = expireTimes.length ? packTimes("expire_times", expireTimes) : null
     const rules = { condition: conditionOf(conditions.only), ttl: duration(conditions.ttl, "ttl") }
     return { puts: { keys: packKeys("keys", keys), points, times: stamps, expireTimes: ends, accuracies: errors, ...rules } }
@@ -108,9 +112,8 @@ function messageOf({ op, conditions, keys, coordinates, destinations, times, exp
   return { moves: { origins: points, destinations: { packed: packed(destinations) } }, ...counted }
 }
 
-/** @param {number[]} numbers */
-function packed(numbers) {
-  const view = new DataView(new ArrayBuffer(8 * numbers.length))
-  numbers.forEach((each, row) => view.setFloat64(8 * row, each, true))
-  return Buffer.from(view.buffer)
+/** The doubles of a column as messages have them, little end first. @param {import("../batch.js").Column} column */
+function packed({ values }) {
+  const bytes = Buffer.from(values.buffer, values.byteOffset, values.byteLength)
+  return endianness() === "LE" ? bytes : Buffer.from(bytes).swap64()
 }

@@ -61,6 +61,21 @@ class GrpcConnection {
     })
   }
 
+  /**
+   * What a hull knows of a producer.
+   * @param {string} name
+   * @param {string} producer
+   * @param {AbortSignal | null} signal
+   * @returns {Promise<import("../connection.js").Known>}
+   */
+  known(name, producer, signal) {
+    const ask = async () => {
+      const { lastSequence, uid } = await this.#channel.unary("GetProducer", { name, producer }, { signal, timeout: this.#timeout })
+      return { sequence: BigInt(lastSequence), uid }
+    }
+    return answered(ask, this.#retries, { repeatable: true, signal }, notSent)
+  }
+
   /** Send the batches of a writer. @param {string} name @param {import("../in-flight.js").InFlight} batches @param {import("../carrying.js").Carried} options */
   carry(name, batches, options) {
     return carryOverGrpc(this.#channel, name, batches, options)
