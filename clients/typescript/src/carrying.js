@@ -14,22 +14,26 @@ import { path } from "./connection.js"
  * @property {boolean} maySkip
  * @property {string} uid of the hull
  * @property {AbortSignal | null} signal
+ *
+ * @typedef {object} Ways
+ * @property {(path: string, call: import("./connection.js").Call) => Promise<any>} ask
+ * @property {() => Promise<bigint>} last the number of the producer's last batch that was applied
  */
 
 /**
  * Send what there is until everything is acknowledged. Calls may overtake each other: a batch that arrives before the one before
  * it is refused, since its number leaves a gap, and goes again when that is acknowledged.
- * @param {(path: string, call: import("./connection.js").Call) => Promise<any>} ask
+ * @param {Ways} ways
  * @param {string} name
  * @param {InFlight} batches
  * @param {Carried} options
  */
-export async function carryOverHttp(ask, name, batches, options) {
+export async function carryOverHttp(ways, name, batches, options) {
   // Numbers that may be skipped hide that a batch was overtaken.
   const most = options.maySkip ? 1 : options.inFlight
   let first = most
   while (!batches.empty) {
-    const { failure, overtaken } = await round(ask, name, batches, options, first, most)
+    const { failure, overtaken } = await round(ways, name, batches, options, first, most)
     batches.rewind()
     if (failure) throw failure
     first = overtaken ? 1 : most
@@ -37,14 +41,14 @@ export async function carryOverHttp(ask, name, batches, options) {
 }
 
 /**
- * @param {(path: string, call: import("./connection.js").Call) => Promise<any>} ask
+ * @param {Ways} ways
  * @param {string} name
  * @param {InFlight} batches
  * @param {Carried} options
  * @param {number} limit calls side by side until one is answered,
  * @param {number} most and from then on
  */
-async function round(ask, name, batches, { producer, maySkip, signal }, limit, most) {
+async function round({ ask, last }, name, batches, { producer, maySkip, signal }, limit, most) {
   /** @type {Set<Promise<void>>} */
   const calls = new Set()
   /** @type {{sequence: bigint, error: unknown} | null} of the oldest batch that failed */
@@ -54,8 +58,10 @@ async function round(ask, name, batches, { producer, maySkip, signal }, limit, m
     const early = !batches.isOldest(batch)
     const call = { method: "POST", query: { may_skip: maySkip || undefined }, body: bodyOf(batch), signal }
     try {
-      const answer = await ask(path`/hulls/${name}/points`, { ...call, idempotencyKey: `${producer}:${batch.sequence}` })
-      batches.acknowledge(batch, fromWire(answer))
+      const applied = fromWire(await ask(path`/hulls/${name}/points`, { ...call, idempotencyKey: `${producer}:${batch.sequence}` }))
+      // A gateway may have sent it twice itself. But numbers beyond all that were sent are those of another writer.
+      if (applied.duplicate && batch.sent === 1 && (await last()) > batches.greatest) throw inUse(producer, batch.sequence)
+      batches.acknowledge(batch, applied)
       limit = most
     } catch (error) {
       if (early && error instanceof DynhullError && error.reason === "SEQUENCE_GAP") overtaken = true
@@ -79,6 +85,12 @@ async function round(ask, name, batches, { producer, maySkip, signal }, limit, m
   return { failure: /** @type {{error: unknown} | null} */ (failed)?.error, overtaken }
 }
 
+/** @param {string} producer @param {bigint} sequence */
+export function inUse(producer, sequence) {
+  const detail = `batch ${sequence} of producer ${producer} had been applied before it was sent: another writer uses the same name`
+  return new DynhullError({ reason: "PRODUCER_IN_USE", status: 409, detail })
+}
+
 /** @param {Batch} batch */
 function bodyOf({ op, conditions, keys, coordinates, destinations, times, expireTimes, accuracies }) {
   const points = pairs(coordinates)
@@ -95,5 +107,7 @@ function bodyOf({ op, conditions, keys, coordinates, destinations, times, expire
 
 /** @param {import("./batch.js").Column} column */
 function pairs({ values }) {
-  return Array.from({ length: values.length / 2 }, (_, row) => [values[2 * row], values[2 * row + 1]])
+  const points = new Array(values.length / 2) // Array.from takes five times as long
+  for (let row = 0; row < points.length; row++) points[row] = [values[2 * row], values[2 * row + 1]]
+  return points
 }

@@ -101,7 +101,10 @@ export class Connection {
 
   /** Send the batches of a writer. @param {string} name @param {import("./in-flight.js").InFlight} batches @param {import("./carrying.js").Carried} options */
   carry(name, batches, options) {
-    return carryOverHttp((path, call) => this.ask(path, call), name, batches, options)
+    const { producer, signal } = options
+    const ask = (/** @type {string} */ path, /** @type {Call} */ call) => this.ask(path, call)
+    const last = async () => (await this.known(name, producer, signal)).sequence
+    return carryOverHttp({ ask, last }, name, batches, options)
   }
 
   /**

@@ -7,6 +7,8 @@ import { Batch, runsOf } from "./batch.js"
 export class InFlight {
   /** The number of the last batch that was acknowledged. */
   sequence = 0n
+  /** The greatest number that was sent. */
+  greatest = 0n
   /** Rows that are not acknowledged. */
   rows = 0
   /** Called when batches were acknowledged, and when there is more to send. */
@@ -78,6 +80,7 @@ export class InFlight {
     if (batch === null) return null
     this.#close(batch)
     batch.sent++
+    if (batch.sequence > this.greatest) this.greatest = batch.sequence
     this.#unsent++
     return batch
   }

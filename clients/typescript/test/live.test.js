@@ -326,6 +326,24 @@ live("a writer keeps every position of a key, or the last of a batch, as the Pyt
   assert.throws(() => client.writer("kept", bad), /coalesce must be null or "last", got first/)
 })
 
+live("of two writers with one name at the same time, one is refused", async (client, name) => {
+  const hull = name("shared")
+  await client.createHull(hull, { keyed: "int" })
+  const [one, two] = [1, 2].map(() => client.writer(hull, { producer: "shared" }))
+  await two.put([100], [[1, 1]])
+  await two.flush()
+  for (let key = 0; key < 5; key++) {
+    await one.put([key], [[key, key * key]])
+    await one.flush()
+  }
+  const { applied } = await two.put([101], [[2, 2]])
+  await assert.rejects(applied, { reason: "PRODUCER_IN_USE" })
+  await assert.rejects(two.put([101], [[2, 2]]), { reason: "PRODUCER_IN_USE" })
+  await one.put([5], [[5, 25]])
+  await one.close()
+  assert.deepEqual((await client.positions(hull, [100, 5, 101])).present, [true, true, false])
+})
+
 live("a writer of a hull that is another one is refused", async (client, name) => {
   const hull = name("another")
   await client.createHull(hull, { keyed: "int" })

@@ -2,6 +2,7 @@
 
 import { endianness } from "node:os"
 
+import { inUse } from "../carrying.js"
 import { DynhullError } from "../errors.js"
 import { appliedOf } from "./answers.js"
 import { conditionOf } from "./requests.js"
@@ -87,10 +88,7 @@ function acknowledge(batches, producer, sequence, applied) {
   if (batch === null || batch.sequence !== sequence) {
     throw new DynhullError({ reason: "REFUSED", detail: `batch ${sequence} of ${producer} was acknowledged in place of ${batch?.sequence}` })
   }
-  if (applied.duplicate && batch.sent === 1) {
-    const detail = `batch ${sequence} of producer ${producer} had been applied before it was sent: another writer uses the same name`
-    throw new DynhullError({ reason: "PRODUCER_IN_USE", status: 409, detail })
-  }
+  if (applied.duplicate && batch.sent === 1) throw inUse(producer, sequence)
   batches.acknowledge(batch, applied)
 }
 
