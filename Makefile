@@ -13,8 +13,10 @@ export OPENBLAS_THREAD_TIMEOUT ?= 4
 export DYNHULL_REQUIRE_KERNEL ?= $(if $(COMPILER),1,0)
 DAY ?= 2013-03-08
 T ?=
-# More workers than cores: many tests wait, for processes, disks and clocks.
-WORKERS = -n 6 --dist worksteal
+# More workers than cores, as many tests wait for processes and clocks; each finds all tests, and starts what its own share.
+WORKERS = -n 4 --dist worksteal
+# Folders of tests in memory, where there is room: on a disk, tests and their servers wait for thousands of syncs.
+MEMORY = $(shell test "$$(df -Pk /dev/shm 2>/dev/null | awk 'NR == 2 {print $$4}')" -gt 4000000 2>/dev/null && echo /dev/shm)
 # `make test` counts lines where Python reports them itself (sys.monitoring, 3.12); tracing on 3.11 takes twice as long.
 MONITORING = $(shell $(BIN)/python -c 'import sys; print("sysmon" if sys.version_info >= (3, 12) else "")')
 COVERAGE_CORE = $(or $(MONITORING),ctrace)
@@ -31,7 +33,7 @@ demo: .venv/.demo  ## replay a real day of flights through a real server and ver
 	$(BIN)/dynhull demo --day $(DAY)
 
 test: .venv/.test .venv/.peers  ## run the tests: all of them on two cores, or those of T, a path: make test T=tests/core
-	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),$(WORKERS) $(COVERAGE))
+	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),$(WORKERS) $(COVERAGE))
 
 FUZZ_THREADS := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -pthread -DDYNHULL_FAIL_ALLOCATIONS
 FUZZ := $(FUZZ_THREADS) -fsanitize=address,undefined -fno-sanitize-recover=undefined

@@ -80,13 +80,15 @@ def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
-    """One worker finds the tests before the others: in a fresh clone it compiles, for all of them, what is imported.
+    """In a fresh clone, one worker finds the tests before the others: it compiles, for all, what is imported.
 
     No collections of garbage meanwhile: they went through all that is imported, again and again.
     """
     gc.disable()
     is_worker = hasattr(session.config, "workerinput")
-    with one_first(Path(session.config.option.basetemp).parent / "found") if is_worker else nullcontext():
+    is_first_run = not (Path(__file__).parent / "window" / "__pycache__").exists()  # the last folder
+    mark = Path(session.config.option.basetemp or "").parent / "found"
+    with one_first(mark) if is_worker and is_first_run else nullcontext():
         return (yield)
 
 

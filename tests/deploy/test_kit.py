@@ -5,7 +5,6 @@ import re
 import subprocess
 from pathlib import Path
 
-import kubernetes_validate
 import pytest
 import yaml
 from forked import COMMAND
@@ -68,6 +67,8 @@ def test_what_is_asked_for_is_there(tmp_path: Path) -> None:
 
 def test_kubernetes_takes_the_pods_of_ray() -> None:
     """The kind itself is KubeRay's; what it makes of the templates is of Kubernetes."""
+    import kubernetes_validate  # each worker of the tests imports this file, and one runs it
+
     *others, cluster = yaml.safe_load_all((KIT / "kuberay/raycluster.yaml").read_text())
     groups = [cluster["spec"]["headGroupSpec"], *cluster["spec"]["workerGroupSpecs"]]
     templates = [

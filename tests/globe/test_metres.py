@@ -5,7 +5,6 @@ import pytest
 from globes import random_center
 from hulls import KEYED_HULLS
 from pyproj import Geod
-from scipy.optimize import minimize_scalar
 
 from dynhull import FenceIndex, convex_hull
 from dynhull._ellipsoid import along
@@ -18,6 +17,8 @@ MICROMETRE = 1e-6
 
 def geodesic(place, edge):
     """The distance of a place to a great circle by the geodesics of pyproj: the least one along the edge."""
+    from scipy.optimize import minimize_scalar  # each worker of the tests imports this file, and one runs it
+
     start, end = np.array(edge)
 
     def metres(share):

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from nbclient import NotebookClient
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs/notebooks").glob("*.ipynb"))
 RICHEST_FIRST = ("text/html", "image/svg+xml", "text/plain")
@@ -27,6 +26,8 @@ def results(notebook: nbformat.NotebookNode) -> Iterator[str]:
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_gives_the_results_it_shows(path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from nbclient import NotebookClient  # each worker of the tests imports this file, and one runs it
+
     monkeypatch.setitem(os.environ, "DYNHULL_ADDRESS", address)
     shown = nbformat.read(path, as_version=4)
     run = nbformat.read(path, as_version=4)
