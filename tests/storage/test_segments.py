@@ -5,6 +5,8 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from filed_fleet import BEGIN, KEYS, SECOND, SETTINGS, Fleet, move, read_back
 from folders import no_progress, same
@@ -36,7 +38,7 @@ from dynhull_server.storage.durability import Durability
 from dynhull_server.storage.port import NEWEST, DamagedError, TakenOverError
 from dynhull_server.storage.rows import filed, filing, past_rows, storage
 from dynhull_server.storage.rows.filed import Filed
-from dynhull_server.storage.segments import archive
+from dynhull_server.storage.segments import archive, parquet
 from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive
 from dynhull_server.storage.segments.columns import columns_of, columns_of_state, contents_of, records_of
 from dynhull_server.storage.segments.parquet import from_parquet, to_parquet
@@ -381,7 +383,9 @@ def test_what_is_before_a_hole_is_read_of_a_key_and_then_the_hole_is_named(fleet
         aside.rename(path)
 
 
-def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():
+@pytest.mark.parametrize("group_rows", [1, 4, parquet.GROUP_ROWS])
+def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit(monkeypatch, group_rows):
+    monkeypatch.setattr(parquet, "GROUP_ROWS", group_rows)
     rng = np.random.default_rng(1)
     hard = np.array([[-0.0, 5e-324], [1.1, 1e308], [0.1 + 0.2, -1 / 3], [2.0**60, 179.9999999]])
     none, some = PackedKeys.pack([]), PackedKeys.pack(["a", "é", "b"])
@@ -427,7 +431,11 @@ def test_every_kind_of_batch_and_every_double_comes_back_bit_for_bit():
             )
             for revision, each in enumerate(rows, 1)
         ]
-        columns, about, _ = from_parquet(to_parquet(columns_of(records, identity), {"hull": "é"}), "a file")
+        file = to_parquet(columns_of(records, identity), {"hull": "é"})
+        schema = pq.read_schema(pa.BufferReader(file))  # as others see it
+        words = {"cause", "kind", "op", "detail", *(() if identity == "int" else ("key",))}
+        assert {name for name in schema.names if schema.field(name).type == pa.string()} == words
+        columns, about, _ = from_parquet(file, "a file")
         found = list(records_of(columns))
         same(found, records)
         assert [each.committed for each in found] == [each.committed for each in records]

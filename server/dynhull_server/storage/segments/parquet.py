@@ -7,6 +7,7 @@ way of one key is one read, and so that numbers differ little from those before 
 
 from __future__ import annotations
 
+from base64 import b64encode
 from bisect import bisect_left
 from functools import cache, partial
 from itertools import pairwise
@@ -42,6 +43,7 @@ NOTHING = dict.fromkeys(("commit", "committed", "clock", "event_time"), NO_TIME)
 VERSION = 1
 ACCURACY = "accuracy"  # a column of files in which some position has an error, the last one
 FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
+SCHEMA = b"ARROW:schema"  # where pyarrow has the types of columns, and what they say of themselves
 MOST_PLACES = 12
 EXACT = 2**53  # below that every whole number is a double
 SAMPLE = 1000
@@ -88,6 +90,8 @@ def load() -> None:
         import pyarrow.parquet
     except ImportError:
         return
+    # Its own memory gives pages back between one segment and the next: to fetch them anew takes as long as the rest.
+    pa.set_memory_pool(pa.system_memory_pool())
     pa.array([0])  # with its first value pyarrow loads pandas, if that is there: a second of who would wait for it
 
 
@@ -102,59 +106,69 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    order, key = _by_key(columns)
-    time = pa.timestamp("us", "UTC")
-    columns_of_table = {
-        "revision": pa.array(columns.revision[order]),
-        "commit": _optional(columns.commit[order], NO_TIME, pa.int64()),
-        "committed": _optional(columns.committed[order], NO_TIME, time),
-        "cause": _words(columns.cause[order], CAUSES),
-        "kind": _words(columns.kind[order], KINDS),
-        "op": _words(columns.op[order], OPS),
-        "key": key,
-        "event_time": _optional(columns.event_time[order], NO_TIME, time),
-        "expire_time": _optional(columns.expire_time[order], FOREVER, time),
-        "detail": _optional_words(columns.detail, order),
-        "clock": _optional(columns.clock[order], NO_TIME, time),
-        "row": pa.array(columns.place[order].astype(np.int32)),
-    }
-    fields = {name: pa.field(name, column.type) for name, column in columns_of_table.items()}
-    points = columns.points[order]
-    there = ~np.isnan(points[:, 0])
     commits = np.count_nonzero(np.diff(columns.committed)) + 1
-    words, split, group_rows = WORDS, SPLIT, GROUP_ROWS
-    if commits * SHARED <= len(columns):
-        words += ("committed",)
-        group_rows = GROUP_ROWS if commits < MANY_COMMITS else LARGE_GROUP_ROWS
-    else:
-        split += ("committed",)
+    shared = commits * SHARED <= len(columns)
+    group_rows = LARGE_GROUP_ROWS if shared and commits >= MANY_COMMITS else GROUP_ROWS
+    order, key = _by_key(columns, group_rows)
+    found = _in_order(columns, order, key)
+    fields = {name: pa.field(name, _seen_as(column.type)) for name, column in found.items()}
+    there = ~np.isnan(columns.points[:, 0])
     for place, name in enumerate("xy"):
-        values, scale = _scaled(np.ascontiguousarray(points[:, place]), there)
+        found[name], scale = _scaled(columns.points[:, place], there, order)
         metadata = None if scale is None else {SCALE: str(scale).encode()}
-        columns_of_table[name] = values
-        fields[name] = pa.field(name, values.type, metadata=metadata)
-    names = list(ORDER)
-    if columns.accuracy.any():
-        names.append(ACCURACY)
-        columns_of_table[ACCURACY] = pa.array(columns.accuracy[order], mask=columns.accuracy[order] == 0)
-        fields[ACCURACY] = pa.field(ACCURACY, pa.float64())
-    told = {f"dynhull.{name}": value for name, value in about.items()}
+        fields[name] = pa.field(name, found[name].type, metadata=metadata)
+    names = [*ORDER, ACCURACY] if ACCURACY in found else list(ORDER)
+    told = {f"dynhull.{name}".encode(): value.encode() for name, value in about.items()}
     head = {FORMAT: str(VERSION).encode(), b"dynhull.identity": columns.identity.encode()} | told
     schema = pa.schema([fields[name] for name in names], {**head, STATE: state} if state else head)
-    table = pa.table([columns_of_table[name] for name in names], schema=schema)
+    table = pa.table([found[name] for name in names], names)
     sink = pa.BufferOutputStream()
-    pq.write_table(
-        table,
+    with pq.ParquetWriter(
         sink,
+        table.schema,
+        store_schema=False,
         compression="zstd",
         compression_level=LEVEL,
-        use_dictionary=list(words),
-        column_encoding=dict.fromkeys(split, "BYTE_STREAM_SPLIT"),
-        row_group_size=group_rows,
+        use_dictionary=[*WORDS, "committed"] if shared else list(WORDS),
+        column_encoding=dict.fromkeys(SPLIT if shared else (*SPLIT, "committed"), "BYTE_STREAM_SPLIT"),
         write_page_checksum=True,
         write_page_index=True,
-    )
+    ) as writer:
+        writer.write_table(table, row_group_size=group_rows)
+        # Others are to see words, and not that they were written as places in a list of them.
+        writer.add_key_value_metadata({**schema.metadata, SCHEMA: b64encode(schema.serialize().to_pybytes())})
     return bytes(sink.getvalue().to_pybytes())
+
+
+def _in_order(columns: SegmentColumns, order: Rows, key: pa.ChunkedArray | pa.Array) -> dict[str, pa.Array]:
+    """All columns but positions, in the order of a file. What is the same in all rows needs no order."""
+    import pyarrow as pa
+
+    time = pa.timestamp("us", "UTC")
+    found = {
+        "revision": pa.array(columns.revision[order]),
+        "commit": _optional(columns.commit, NO_TIME, pa.int64(), order),
+        "committed": _optional(columns.committed, NO_TIME, time, order),
+        "cause": _words(columns.cause, CAUSES, order),
+        "kind": _words(columns.kind, KINDS, order),
+        "op": _words(columns.op, OPS, order),
+        "key": key,
+        "event_time": _optional(columns.event_time, NO_TIME, time, order),
+        "expire_time": _optional(columns.expire_time, FOREVER, time, order),
+        "detail": _optional_words(columns.detail, order),
+        "clock": _optional(columns.clock, NO_TIME, time, order),
+        "row": pa.array(columns.place[order].astype(np.int32)),
+    }
+    if columns.accuracy.any():
+        accuracy = columns.accuracy[order]
+        found[ACCURACY] = pa.array(accuracy, mask=accuracy == 0)
+    return found
+
+
+def _seen_as(kind: pa.DataType) -> pa.DataType:
+    import pyarrow as pa
+
+    return kind.value_type if pa.types.is_dictionary(kind) else kind
 
 
 def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str], bytes]:
@@ -559,17 +573,18 @@ def _exact(count: int) -> npt.NDArray[np.float64]:
     return np.broadcast_to(np.float64(0), count)
 
 
-def _optional(values: Integers, none: int, kind: pa.DataType) -> pa.Array:
+def _optional(values: Integers, none: int, kind: pa.DataType, order: Rows) -> pa.Array:
     """Numbers, of which some are none: as a rule all of them, or no one."""
     import pyarrow as pa
 
     there = np.count_nonzero(values != none)
     if not there:
         return pa.nulls(len(values), kind)
-    return pa.array(values, kind, mask=None if there == len(values) else values == none)
+    some = values[order]
+    return pa.array(some, kind, mask=None if there == len(values) else some == none)
 
 
-def _optional_words(words: list[str | None], order: npt.NDArray[np.intp]) -> pa.Array:
+def _optional_words(words: list[str | None], order: Rows) -> pa.Array:
     import pyarrow as pa
 
     if words.count(None) == len(words):
@@ -577,10 +592,19 @@ def _optional_words(words: list[str | None], order: npt.NDArray[np.intp]) -> pa.
     return pa.array([words[place] for place in order.tolist()], pa.string())
 
 
-def _words(codes: Codes, words: tuple[str, ...]) -> pa.Array:
+def _words(codes: Codes, words: tuple[str, ...], order: Rows) -> pa.DictionaryArray:
+    """Words as places in a list of those that there are."""
     import pyarrow as pa
 
-    return pa.DictionaryArray.from_arrays(pa.array(codes, mask=codes == NONE), pa.array(words)).cast(pa.string())
+    used = np.flatnonzero(np.bincount(codes + 1, minlength=len(words) + 1)[1:])
+    places = np.full(len(words) + 1, NONE, np.int8)
+    places[used] = np.arange(len(used))  # the last one stays: that of no word
+    some = np.zeros(len(codes), np.int8)
+    if len(used) != 1 or int(codes.min()) == NONE:
+        some = places[codes[order]]
+    mask = some == NONE
+    indices = pa.array(some, mask=mask if mask.any() else None)
+    return pa.DictionaryArray.from_arrays(indices, pa.array([words[each] for each in used], pa.string()))
 
 
 def _coded(column: pa.ChunkedArray) -> tuple[npt.NDArray[np.int32], pa.Array]:
@@ -631,7 +655,7 @@ def _filled(values: Any, none: float) -> Any:
     return values.fill_null(none) if values.null_count else values
 
 
-def _by_key(columns: SegmentColumns) -> tuple[npt.NDArray[np.intp], pa.Array]:
+def _by_key(columns: SegmentColumns, group_rows: int) -> tuple[Rows, pa.Array | pa.ChunkedArray]:
     """The rows by key, then revision and place, those without a key last; and their keys in this order."""
     import pyarrow as pa
 
@@ -644,10 +668,24 @@ def _by_key(columns: SegmentColumns) -> tuple[npt.NDArray[np.intp], pa.Array]:
         return np.concatenate([with_key[by_key], rest]), pa.array(integers, mask=none)
     ranks, names = _ranked(columns.keys)
     by_key = np.argsort(ranks, kind="stable")
-    places = np.zeros(len(columns), np.int32)
-    places[: len(with_key)] = ranks[by_key]
-    key = pa.DictionaryArray.from_arrays(pa.array(places, mask=none), names).cast(pa.string())
-    return np.concatenate([with_key[by_key], rest]), key
+    return np.concatenate([with_key[by_key], rest]), _keys_of_groups(ranks[by_key], names, len(columns), group_rows)
+
+
+def _keys_of_groups(ranks: npt.NDArray[Any], names: pa.Array, count: int, group_rows: int) -> pa.ChunkedArray:
+    """Keys in order, those of each group of rows as places in a list of its own; the rows after these have none."""
+    import pyarrow as pa
+
+    chunks = []
+    for first in range(0, count, group_rows):
+        places = np.full(min(group_rows, count - first), NONE, np.int32)
+        some = ranks[first : first + group_rows]
+        least = int(some[0]) if len(some) else 0
+        places[: len(some)] = some
+        places[: len(some)] -= least
+        mask = places == NONE if len(some) < len(places) else None
+        own = names.slice(least, int(some[-1]) - least + 1 if len(some) else 0)
+        chunks.append(pa.DictionaryArray.from_arrays(pa.array(places, mask=mask), own))
+    return pa.chunked_array(chunks, pa.dictionary(pa.int32(), pa.string()))
 
 
 def _ranked(keys: PackedKeys) -> tuple[npt.NDArray[Any], pa.Array]:
@@ -689,17 +727,21 @@ def _packed(words: list[pa.Array], codes: npt.NDArray[np.int32], identity: Ident
     return PackedKeys(lengths, b"" if data is None else data.to_pybytes()[ends[0] : ends[-1]])
 
 
-def _scaled(values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_]) -> tuple[pa.Array, int | None]:
-    """Coordinates as whole numbers, and what to divide them by; as doubles, and None, if some would differ."""
+def _scaled(values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_], order: Rows) -> tuple[pa.Array, int | None]:
+    """Coordinates in an order as whole numbers, and what to divide them by; as doubles, if some would differ."""
     import pyarrow as pa
 
-    some = values[there]
+    every = bool(there.all())
+    some = np.ascontiguousarray(values) if every else values[there]
+    mask = None if every else ~there[order]
     for scale in (10**places for places in range(MOST_PLACES + 1)):
         if _as_whole(some[:SAMPLE], scale) is not None and (whole := _as_whole(some, scale)) is not None:
-            column = np.zeros(len(values), np.int64)
-            column[there] = whole
-            return pa.array(column, mask=~there), scale
-    return pa.array(values, mask=~there), None
+            if not every:
+                column = np.zeros(len(values), np.int64)
+                column[there] = whole
+                whole = column
+            return pa.array(whole[order], mask=mask), scale
+    return pa.array(values[order], mask=mask), None
 
 
 def _as_whole(values: npt.NDArray[np.float64], scale: int) -> Integers | None:
