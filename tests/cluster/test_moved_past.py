@@ -9,7 +9,7 @@ from cases import with_all_cases
 from command_line import dynhull
 from patience import wait_until
 from postgresql import PostgreSQL, query
-from server_process import Server, server_process
+from server_process import Server, run, server_process
 
 from dynhull_client import HullClient
 
@@ -113,6 +113,22 @@ def test_a_partition_that_moves_again_and_again_while_segments_close_keeps_the_p
         last = write(other, other.history(NAMES[0]).batches + 1)
         check(client, last)
         check(other, last)
+
+
+@pytest.mark.parametrize("shape", [(), ("--cluster", "--partitions", "1")], ids=["alone", "cluster"])
+@pytest.mark.one_process("a cluster has a shape of its own")
+def test_a_copy_of_a_database_is_refused_where_the_past_of_the_original_is(
+    postgres: PostgreSQL, tmp_path: Path, shape: tuple[str, ...]
+) -> None:
+    url = postgres.new_database()
+    options = *shape, "--history-dir", str(tmp_path / "past")
+    for _ in range(2):
+        with server_process(*options, "--journal", url, *QUIET) as server, HullClient(server.address) as client:
+            client.create_hull("fleet", keyed="str", history=True, exist_ok=True)
+    copy = postgres.restored_copy(url, tmp_path)
+    done = run("serve", "--port", "0", "--journal", copy, *options)
+    assert done.returncode != 0
+    assert "has the past of another database, " in done.stderr
 
 
 @with_all_cases

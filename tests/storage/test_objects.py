@@ -15,6 +15,7 @@ from dynhull_server.state.records import Delete
 from dynhull_server.storage.port import DamagedError, StorageError
 from dynhull_server.storage.rows.storage import LOOK
 from dynhull_server.storage.segments.objects import ORPHAN_SECONDS, ObjectArchive
+from dynhull_server.storage.segments.owner import Claimant, OccupiedError
 from dynhull_server.storage.sqlite import copies
 
 DAY = 2 * ORPHAN_SECONDS
@@ -71,6 +72,24 @@ def test_the_past_is_in_objects_each_written_once(fleet):
     fleet.storage.commit([Delete(1)])
     fleet.file()
     assert objects(fleet) == []
+
+
+def test_a_place_is_claimed_once_it_can_be_seen_that_nobody_else_has_it(fleet):
+    fleet.archive.owner = Claimant("first", "the first one")
+    fleet.proxy.server = ""
+    fleet.proxy.cut()
+    with pytest.raises(OSError, match=r"(?i)store|AWS|connect"):
+        fleet.archive.claim()
+    fleet.proxy.server = fleet.address
+    fleet.fill(2)
+    assert len(objects(fleet)) > 0
+    other = ObjectArchive(place(fleet.address, fleet.folder.name))
+    other.owner = Claimant("other", "the other one")
+    before = objects(fleet)
+    for change in (other.claim, lambda: other.remove("uid/name"), lambda: other.write("uid/name", b"content")):
+        with pytest.raises(OccupiedError, match=r"another database, the first one: .* remove dynhull\.owners/first"):
+            change()
+    assert objects(fleet) == before
 
 
 @pytest.mark.parametrize("fault", ["silent", "refusing", pytest.param("away", marks=with_all_objects)])

@@ -23,10 +23,11 @@ from prometheus_client.registry import Collector
 from dynhull_server.app import Server, end_process
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
-from dynhull_server.history_folder import archive_of
+from dynhull_server.history_folder import archive_of, claim_history
 from dynhull_server.settings import Settings
 from dynhull_server.state.errors import words
 from dynhull_server.storage.port import LockedError, StorageError, TakenOverError
+from dynhull_server.storage.segments.owner import Claimant, owner_of_database
 
 from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
@@ -119,6 +120,7 @@ class Member:
         """
         settings = self._settings
         self._join(await asyncio.to_thread(join, self._database, partitions_of_new(settings)))
+        await asyncio.to_thread(claim_history, settings, self._owner())
         await asyncio.to_thread(
             admit, self._database, self._worker, self._host, settings.max_clock_difference, self._leases
         )
@@ -300,7 +302,7 @@ class Member:
             partitions=self._cluster.partitions,
             worker=self._worker,
             leases=self._leases,
-            archive=archive_of(self._settings),
+            archive=archive_of(self._settings, owner=self._owner()),
         )
         return Served(Server(own_settings(self._settings), storage, entrance, divisions), storage, entrance)
 
@@ -349,6 +351,9 @@ class Member:
         only = "" if settings.cluster else server_of(self._worker)
         self._addresses = Addresses(cluster.secret, settings.cluster_ca, settings.peer_ping_interval, only)
         self._peers = Peers(self._addresses)
+
+    def _owner(self) -> Claimant:
+        return owner_of_database(self._cluster.secret, str(self._database))
 
     async def _let_go(self, number: int, worker: str) -> None:
         """Stop to serve a partition, so that another worker can take it."""

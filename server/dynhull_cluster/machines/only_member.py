@@ -5,9 +5,10 @@ import asyncio
 from dynhull_server.app import Server, end_process
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
-from dynhull_server.history_folder import archive_of
+from dynhull_server.history_folder import archive_of, claim_history
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import Progress
+from dynhull_server.storage.segments.owner import owner_of_database
 
 from ..divisions.divisions import ServedDivisions
 from ..postgres.database import Database
@@ -36,13 +37,14 @@ class OnlyMember:
         self._leases = Leases()
         self._supervisor = Supervisor(Clock(), self._turn_health, end_process)
         self._board = Board(database, self._look, self._leases, self._worker)
+        self._archive = archive_of(settings)
         storage = PostgresStorage(
             database,
             end_process,
             settings.durability,
             worker=self._worker,
             leases=self._leases,
-            archive=archive_of(settings),
+            archive=self._archive,
         )
         self._server = Server(settings, storage, divisions=ServedDivisions(settings))
         self._joined = False
@@ -72,6 +74,10 @@ class OnlyMember:
         cluster = await asyncio.to_thread(join, self._database, 1)
         if cluster.partitions != 1:
             raise divided_otherwise(self._database, cluster.partitions)
+        owner = owner_of_database(cluster.secret, str(self._database))
+        if self._archive is not None:
+            self._archive.owner = owner
+        await asyncio.to_thread(claim_history, self._settings, owner)
         await asyncio.to_thread(admit, self._database, self._worker, "", limit, self._leases)
         self._joined = True
         self._supervisor.every(0.0, "board", self._board.run)

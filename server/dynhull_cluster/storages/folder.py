@@ -8,12 +8,14 @@ from functools import partial
 from pathlib import Path
 
 from dynhull_server.app import Server
-from dynhull_server.history_folder import archive_of
+from dynhull_server.history_folder import archive_of, claim_history
 from dynhull_server.process import Alone
 from dynhull_server.settings import Settings
 from dynhull_server.storage.port import LockedError
+from dynhull_server.storage.segments.owner import Claimant
 from dynhull_server.storage.sqlite.disk import Disk
 from dynhull_server.storage.sqlite.folder import Folder
+from dynhull_server.storage.sqlite.owner import owner_of_folder
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
 from dynhull_server.storage.worker_folders import (
     begin_anew_if_copied,
@@ -45,8 +47,17 @@ class FolderKind:
     def alone(self) -> Alone:
         """The server. Raises StorageError if the folder is divided among workers."""
         require_one_process(self._data)
-        storage = SQLiteStorage(self._data, self._settings.durability, archive=archive_of(self._settings, self._data))
+        archive = archive_of(self._settings, self._data, self._owner())
+        storage = SQLiteStorage(self._data, self._settings.durability, archive=archive)
         return Server(self._settings, storage, divisions=ServedDivisions(self._settings))
+
+    def _owner(self) -> Claimant | None:
+        """Who has its past in the place that the settings name, once nobody else has; None if they name none."""
+        if self._settings.history_dir is None:
+            return None
+        owner = owner_of_folder(self._data)
+        claim_history(self._settings, owner)
+        return owner
 
     @contextmanager
     def shared(self) -> Iterator[Shared]:
@@ -62,6 +73,7 @@ class FolderKind:
             for number in range(workers):
                 with _locked(worker_folder(self._data, number)):
                     pass
+            self._owner()
             for note in begin_anew_if_copied(self._data, workers):
                 log.warning("lost", extra={"what": note})
             with socket_folder(self._data) as sockets:
@@ -72,7 +84,9 @@ class FolderKind:
         from ..worker import worker_server
 
         data = worker_folder(self._data, number)
-        storage = SQLiteStorage(data, self._settings.durability, archive=archive_of(self._settings, data))
+        owner = None if self._settings.history_dir is None else owner_of_folder(self._data)
+        archive = archive_of(self._settings, data, owner)
+        storage = SQLiteStorage(data, self._settings.durability, archive=archive)
         return worker_server(self._settings, number, Sockets(Path(begin["sockets"])), storage)
 
     async def gateway(self, begin: Begin) -> Serving:

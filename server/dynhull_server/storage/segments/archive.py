@@ -16,6 +16,7 @@ import numpy as np
 
 from ..durable import TEMPORARY, make_durable, write_durably
 from ..port import DamagedError, StorageError
+from .owner import CLAIMS, Claimant, OccupiedError
 
 BATCHES, STATE = ".batches.parquet", ".state.parquet"
 HISTORY = "history"  # the folder within a data folder, unless another one is named
@@ -74,7 +75,11 @@ class Archive:
 
     Attributes:
         path, most_bytes, most_age: the same.
+        owner: the database that has its past here and nobody else; None where that is nobody's concern, as within a
+            data folder.
     """
+
+    owner: Claimant | None = None
 
     takes_late = False  # whether what was given up may be there later
     has_parts = True  # whether to read a part of a file takes less than to read all of it
@@ -83,6 +88,32 @@ class Archive:
         self.path = path
         self.most_bytes = most_bytes
         self.most_age = most_age
+        self._claimed: Claimant | None = None
+
+    def claim(self) -> None:
+        """Have this place for the owner alone. Nothing is written or removed before.
+
+        Raises:
+            OccupiedError: another database has it.
+            OSError: that cannot be known at present.
+        """
+        owner = self.owner
+        if owner is None or self._claimed == owner:
+            return
+        claims = self._claims()
+        if not claims:
+            self._put(f"{CLAIMS}/{owner.id}", owner.about.encode())
+            claims = self._claims()
+            if claims - {owner.id}:  # it came at the same moment, and may have gone
+                self._drop(f"{CLAIMS}/{owner.id}")
+        if others := sorted(claims - {owner.id}):
+            about = self.content(f"{CLAIMS}/{others[0]}").decode(errors="replace")
+            raise OccupiedError(
+                f"{self.path} has the past of another database, {about}: each of the two would remove what the other "
+                "one needs. Give this one a --history-dir of its own, with a copy of the files if it has a past; or, "
+                f"if the other is never served again, remove {CLAIMS}/{others[0]} there"
+            )
+        self._claimed = owner
 
     def name(self, uid: str, first: int, last: int, epoch: int = 0) -> str:
         """A name for the files of a segment that no other one has; `epoch` is that of the owner of the hull."""
@@ -93,14 +124,29 @@ class Archive:
 
         Raises:
             OSError: the disk is full, or fails.
+            OccupiedError: the past of another database is here.
         """
+        self.claim()
+        self._put(file, content)
+        return written(content)
+
+    def _put(self, file: str, content: bytes) -> None:
         path = self.path / file
         for folder in (self.path, path.parent):
             if not folder.is_dir():
                 folder.mkdir(parents=True, exist_ok=True)
                 make_durable(folder.parent)
         write_durably(path, content)
-        return written(content)
+
+    def _drop(self, file: str) -> None:
+        (self.path / file).unlink(missing_ok=True)
+
+    def _claims(self) -> set[str]:
+        """The names of those who claim this place."""
+        folder = self.path / CLAIMS
+        return (
+            {each.name for each in folder.iterdir() if not each.name.endswith(TEMPORARY)} if folder.is_dir() else set()
+        )
 
     def read(self, file: str, wrote: Written) -> bytes:
         """All bytes of a file.
@@ -165,7 +211,9 @@ class Archive:
 
         Raises:
             OSError: one cannot be removed.
+            OccupiedError: the past of another database is here.
         """
+        self.claim()
         path = self.path / file
         for end in (BATCHES, STATE):
             for name in (path.name + end, path.name + end + TEMPORARY):

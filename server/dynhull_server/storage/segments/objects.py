@@ -21,12 +21,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from .archive import BATCHES, STATE, Archive, Written, written
+from .owner import CLAIMS
 from .place import is_store, require_store
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from pyarrow.fs import FileSystem
+    from pyarrow.fs import FileInfo, FileSystem
 
 Result = TypeVar("Result")
 
@@ -72,17 +73,36 @@ class ObjectArchive(Archive):
 
         Raises:
             OSError: the store refuses it, does not answer, or keeps something else.
+            OccupiedError: the past of another database is here.
         """
-        key = self._key(file)
-
-        def put() -> None:
-            with self._store().open_output_stream(key) as stream:
-                stream.write(content)
-
-        self._ask(file, put, len(content))
+        self.claim()
+        self._put(file, content)
         if self.content(file, len(content)) != content:
             raise OSError(errno.EIO, "the object store does not keep what it is sent", file)
         return written(content)
+
+    def _put(self, file: str, content: bytes) -> None:
+        def put() -> None:
+            with self._store().open_output_stream(self._key(file)) as stream:
+                stream.write(content)
+
+        self._ask(file, put, len(content))
+
+    def _drop(self, file: str) -> None:
+        self._ask(file, partial(self._removed, self._key(file)))
+
+    def _claims(self) -> set[str]:
+        return {each.base_name for each in self._listed(CLAIMS)}
+
+    def _listed(self, folder: str) -> list[FileInfo]:
+        """The objects directly in a folder."""
+        from pyarrow.fs import FileSelector, FileType
+
+        def look() -> list[FileInfo]:
+            found = self._store().get_file_info(FileSelector(self._key(folder), allow_not_found=True))
+            return [each for each in found if each.type == FileType.File]
+
+        return self._ask(folder, look)
 
     def content(self, file: str, size: int = 0) -> bytes:
         """All bytes of an object, whatever they are; no more than one byte more than a size, if that is not 0.
@@ -106,8 +126,9 @@ class ObjectArchive(Archive):
         Raises:
             OSError: one cannot be removed.
         """
+        self.claim()
         for end in (BATCHES, STATE):
-            self._ask(file, partial(self._removed, self._key(file + end)))
+            self._drop(file + end)
 
     def files(self, file: str) -> Iterator[str]:
         """The names of the objects of a segment that are there."""
@@ -123,21 +144,13 @@ class ObjectArchive(Archive):
         Raises:
             OSError: the store refuses, or does not answer.
         """
-        from pyarrow.fs import FileSelector, FileType
-
-        folder = f"{self.path}/{uid}"
         before = time() - ORPHAN_SECONDS
-
-        def look() -> set[str]:
-            found = self._store().get_file_info(FileSelector(folder, allow_not_found=True))
-            return {
-                each.base_name.partition(".")[0]
-                for each in found
-                if each.type == FileType.File and each.mtime is not None and each.mtime.timestamp() < before
-            }
-
-        found = sorted(f"{uid}/{name}" for name in self._ask(uid, look))
-        return [file for file in found if _epoch(file) < epoch]
+        found = {
+            f"{uid}/{each.base_name.partition('.')[0]}"
+            for each in self._listed(uid)
+            if each.mtime is not None and each.mtime.timestamp() < before
+        }
+        return [file for file in sorted(found) if _epoch(file) < epoch]
 
     def sync(self) -> None:
         """Nothing is left to do: a store that has taken an object keeps it."""
