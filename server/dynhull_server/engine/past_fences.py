@@ -367,7 +367,22 @@ class PastFences:
         return await self._pasts.moment(self._hulls.of(hull), *when, f"{field}_")
 
     async def _as_of(self, hull: Hull, moment: Moment) -> _ReadHull:
-        return _ReadHull(hull.row, *await self._pasts.own(hull, moment.revision))
+        found = _ReadHull(hull.row, *await self._pasts.own(hull, moment.revision))
+        if hull.row.settings.geographic and found.state.center is None:
+            await self._pasts.ask(hull.name, partial(self._stand_at_first_center, found, hull.counts.revision))
+        return found
+
+    def _stand_at_first_center(self, hull: _ReadHull, until: int) -> None:
+        """Have a hull without points the centre that its first ones choose: a fence keeps its projection."""
+        after = hull.state.counts.revision
+        while after < until:
+            records = self._past.batches(hull.row.number, after, until)
+            center = next((record.center for record in records if record.center is not None), None)
+            if center is not None:
+                hull.state.stand_at(center)
+                hull.counts = hull.state.counts
+                return
+            after = records[-1].revision
 
 
 def _oldest_of_many(times: list[int], whole: list[bool]) -> int:

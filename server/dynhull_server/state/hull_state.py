@@ -282,6 +282,13 @@ class HullState:
             records.append(Record(self.counts.revision, rows, clock=clock, center=center, cause="recenter"))
         return hull_changed
 
+    def stand_at(self, center: Center) -> None:
+        """Have a centre that no revision has given: of a hull that has neither points nor a centre so far."""
+        self.contents.recenter(center)
+        self._follow_center()
+        cause = self.counts.cause
+        self.counts = self._counted(self.counts.revision, len(self.hull), cause, center, self.counts.outlined)
+
     def _follow_center(self) -> bool:
         """Take over the centre of the hull. Returns whether it is a new one."""
         globe = self.contents.globe

@@ -244,6 +244,30 @@ def test_a_prefix_has_the_events_of_its_hulls_and_of_those_that_came_later(clien
         client.delete_hull(name)
 
 
+@pytest.mark.parametrize("subjects", ["auto/hull", Prefix("auto/hull")], ids=["hull", "prefix"])
+def test_a_hull_on_the_globe_gets_its_centre_after_the_start(client, subjects):
+    """Its events are those of a fence at a hull that had this centre from the beginning."""
+    rng = random.Random(9)
+    client.create_hull("auto/hull", keyed="str", geographic=True)
+    client.remove("auto/hull", ["nobody"], missing="count")
+    batches = [(rng.sample(KEYS, 4), [(rng.uniform(12, 15), rng.uniform(51, 54)) for _ in range(4)]) for _ in range(20)]
+    for keys, points in batches:
+        client.put("auto/hull", keys, points)
+    client.create_hull("auto/twin", keyed="str", geographic=True, center=client.get_hull("auto/hull").info.center)
+    fence = {"area": [[13, 52], [13.8, 52], [13.8, 53]], "margin": 20_000, "crosses": True}
+    client.create_fence("auto/fence", subjects="auto/twin", **fence)
+    client.remove("auto/twin", ["nobody"], missing="count")
+    for keys, points in batches:
+        client.put("auto/twin", keys, points)
+    past = [plain(each) for each in client.fence_events_between(subjects=subjects, **fence, timeout=PATIENCE)]
+    live = [replace(plain(each), hull=each.hull and "auto/hull") for each in live_events(client, "auto/fence")]
+    assert past == live
+    assert len(past) > 10
+    client.delete_fence("auto/fence")
+    for name in ("auto/hull", "auto/twin"):
+        client.delete_hull(name)
+
+
 @pytest.fixture(scope="module")
 def many(client):
     """A hull with more events than a connection holds."""
