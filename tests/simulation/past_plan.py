@@ -159,6 +159,21 @@ def written_until_filed(
     return scene
 
 
+def written_and_erased(draw: random.Random, name: str) -> list[Operation]:
+    """A key is put and removed, perhaps filed, and erased."""
+    put = _writes(name)[1]
+    rest: Operation = {"do": "rest", "name": name, "seconds": draw.choice((0.01, ROUND))}
+    erase: Operation = {"do": "erase", "name": name, "at": 0.0}
+    gone = put | {"keys": [draw.randrange(4)], "removes": [ERASED]}
+    return [put | {"keys": [ERASED, 0]}, *[rest] * draw.randint(0, 2), gone, *[rest] * draw.randint(0, 1), erase]
+
+
+def changes_history(draw: random.Random, name: str) -> Operation:
+    """Another part of the past is to be kept."""
+    history, most_bytes = draw.choice(HISTORIES)
+    return {"do": "keep_past", "name": name, "at": 0.0, "history": history, "history_bytes": most_bytes}
+
+
 def written_beyond_its_age(name: str) -> list[Operation]:
     """A hull is written to until its first segments are too old, each for a while only in part."""
     write, put = _writes(name)

@@ -121,7 +121,7 @@ def _live(
 ) -> list[Client]:
     """One life. The clients of a life that begins with a restore are those of the life before."""
     schedule.clear()
-    schedule.patient = life.get("patient", False)
+    schedule.patient, schedule.slow = life.get("patient", False), life.get("slow", "")
     storage.calm = True
     if life.get("restored"):
         storage.restore()

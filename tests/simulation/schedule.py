@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 # Turns after which a life that goes on without end is given up.
 LONGEST = 20_000
+# How often a slow actor comes, where the others come at most once, and at least a hundredth of that.
+SLOWEST = 1e-3
 # The actor that lets time pass.
 TIME = b"time"
 
@@ -18,6 +20,7 @@ class Schedule:
         trace: a hash of all turns and of what was noted in them.
         brisk: whether the event loop mostly carries out all that is ready in a turn, as asyncio does, and how the past
             is looked at in the end is drawn.
+        slow: the name of an actor that is slower than all others: what it does is done for many at once.
         patient: whether time passes only when nothing else is left to do; else much may pass while a slow actor does
             little, and most turns are those of periodic work.
     """
@@ -27,12 +30,14 @@ class Schedule:
         self.turns = 0
         self.trace = 0
         self.brisk = False
+        self.slow = ""
         self.patient = False
         self._actors: list[tuple[Callable[[], object], float, Callable[[], None], bytes]] = []
 
     def actor(self, name: str, ready: Callable[[], object], act: Callable[[], None]) -> None:
         """Add an actor, which takes a turn by `act` when it is `ready`."""
-        self._actors.append((ready, 10 ** self.random.uniform(-2, 0), act, name.encode()))
+        speed = 10 ** self.random.uniform(-2, 0)
+        self._actors.append((ready, SLOWEST if name == self.slow else speed, act, name.encode()))
 
     def clear(self) -> None:
         """Remove all actors."""

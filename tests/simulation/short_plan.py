@@ -16,10 +16,12 @@ from .past_plan import (
     SERVER_BYTES,
     STEP_FAULTS,
     WITH_CONSUMERS,
+    changes_history,
     consumes,
     fault_of_past,
     kept,
     of_past,
+    written_and_erased,
     written_beyond_its_age,
     written_until_filed,
 )
@@ -47,6 +49,10 @@ BESIDE = {
 # of the lives that end at any time, in which the clock is another one, and which are looked at as a whole.
 IN_STORE, WITH_QUARANTINE, WITH_RESTORES = 0.35, 0.2, 0.1
 CUT_SHORT, OTHER_CLOCK, LOOKED_AT = 0.4, 0.3, 0.3
+
+# The share of the lives in which commits are slow, so that what several ask for is one commit; and of the plans with
+# keys in which one is erased.
+SLOW_COMMITS, WITH_ERASURES = 0.15, 0.3
 
 # The share of the plans in which commits fail, files and steps of the past, and commits of consumers.
 COMMITS_FAIL, PAST_FAILS, CONSUMERS_FAIL = 0.25, 0.75, 0.5
@@ -98,6 +104,8 @@ def _life(draw: random.Random, names: tuple[str, ...]) -> dict[str, Any]:
         "patient": draw.random() < 0.8,
         "looked_at": draw.random() < LOOKED_AT,
     }
+    if life["patient"] and draw.random() < SLOW_COMMITS:
+        life["slow"] = "commits"
     if draw.random() < CUT_SHORT:
         life["after"] = int(draw.expovariate(1 / 150))
     return life
@@ -133,6 +141,10 @@ def _add_more(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
             for op in client:
                 if op["do"] == "create" and op["name"] in held and draw.random() < 0.8:
                     op["quarantine"] = random_rules(draw)
+    erased = [client for life in lives for client in life["clients"][:1] if client[0]["name"] in held]
+    if erased and draw.random() < WITH_ERASURES:
+        client = draw.choice(erased)
+        client += written_and_erased(draw, client[0]["name"])
     if plan["segment_rows"] is None and draw.random() < BEYOND_ITS_AGE:
         draw.choice(lives)["clients"].append(written_beyond_its_age(draw.choice(names)))
 
@@ -145,6 +157,10 @@ def _add_faults(draw: random.Random, plan: Plan) -> None:
         faults.append({"at": "commit", "nth": nth, "kind": draw.choice(COMMIT_FAULTS), "calls": draw.choice((1, 2, 5))})
     if draw.random() < PAST_FAILS:
         faults += [fault_of_past(draw, in_store=plan["store"]) for _ in range(draw.choice((1, 1, 2, 3)))]
+    if any(fault["at"] == "settings" for fault in faults):
+        for life in plan["lives"]:
+            client = life["clients"][0]
+            client.insert(draw.randint(1, len(client)), changes_history(draw, client[0]["name"]))
     consumed = any(op["do"] == "consume" for life in plan["lives"] for client in life["clients"] for op in client)
     if consumed and draw.random() < CONSUMERS_FAIL:
         faults.append({"at": "consumer", "nth": draw.randint(1, 6), "kind": draw.choice(STEP_FAULTS), "calls": 1})
