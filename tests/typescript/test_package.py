@@ -176,6 +176,13 @@ def test_a_writer_and_a_watch_outlive_servers(way: str, server: MortalServer, ga
 
 
 @pytest.mark.parametrize("way", ["gateway", "grpc"])
+def test_what_is_aborted_ends_with_the_reason(way: str, server: MortalServer, gateway: Gateway) -> None:
+    """At whichever turn it is aborted; and no promise is left that rejects unseen."""
+    url = gateway.url if way == "gateway" else f"grpc://{server.address}"
+    assert node(str(HERE / "aborted.mjs"), url, f"typescript/aborted/{way}") == "[]\n"
+
+
+@pytest.mark.parametrize("way", ["gateway", "grpc"])
 def test_batches_under_way_outlive_servers_and_gateways(way: str, server: MortalServer) -> None:
     """Each is applied once, in its turn, whatever is killed while several of them are under way."""
     name, port = f"typescript/pipelined/{way}", free_port()

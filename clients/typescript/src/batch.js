@@ -36,6 +36,8 @@ import { isoTime, micros } from "./json.js"
  */
 
 const LARGEST = (1n << 64n) - 1n
+/** The instants that a text of a time can say. */
+const [FIRST, LAST] = ["0001-01-01T00:00:00Z", "9999-12-31T23:59:59.999999Z"].map(micros)
 /** Of a number, a time or an integer in a message. */
 const WORD_BYTES = 8
 
@@ -64,6 +66,7 @@ export function rowsOf(op, columns, conditions = {}) {
   checked.forEach((key, row) => {
     if ((typeof key === "string") !== named) throw invalid("keys", row, key, `must be ${named ? "a string" : "an integer"}, as the first one`)
   })
+  conditionsOf(conditions)
   const kind = [op, named, !!columns.times, !!columns.expireTimes, !!columns.accuracies, JSON.stringify(conditions)].join()
   return { op, count, kind, conditions, keys: checked, points, destinations, times: stamps, expireTimes: ends, accuracies }
 }
@@ -87,13 +90,25 @@ function keyOf(field, row, key) {
   return key <= Number.MAX_SAFE_INTEGER ? Number(key) : key
 }
 
-/** @param {string} field @param {number} row @param {Time} time @returns {bigint} */
-function instantOf(field, row, time) {
+/** @param {Conditions} conditions */
+function conditionsOf({ only, ttl, missing }) {
+  if (only && only !== "absent" && only !== "present") throw invalid("only", null, only, "must be absent or present")
+  if (missing && missing !== "raise" && missing !== "count") throw invalid("missing", null, missing, "must be raise or count")
+  if (ttl !== undefined && !(Number.isFinite(ttl) && ttl > 0)) throw invalid("ttl", null, ttl, "must be seconds, more than 0")
+}
+
+/** Microseconds since 1970. @param {string} field @param {number | null} row @param {any} time @returns {bigint} */
+export function instantOf(field, row, time) {
+  let instant = null
   try {
-    return typeof time === "bigint" ? time : micros(isoTime(time))
+    instant = typeof time === "bigint" ? time : micros(isoTime(time))
   } catch {
-    throw invalid(field, row, time, "must be a time with its zone")
+    // neither a text with a zone, nor a Date that is one
   }
+  if (typeof instant !== "bigint" || instant < FIRST || instant > LAST) {
+    throw invalid(field, row, time, "must be a time with its zone: a text, a Date, or a bigint of microseconds since 1970")
+  }
+  return instant
 }
 
 /**

@@ -53,9 +53,17 @@ class Subscription {
     return { path: this.target, ...(this.place && { last_event_id: this.place }) }
   }
 
-  /** @param {boolean} now */
+  /** What its owner's function throws ends this stream, and no other. @param {boolean} now */
   tell(now) {
-    if (now !== this.#lost) this.onLost((this.#lost = now))
+    if (now === this.#lost) return
+    this.#lost = now
+    try {
+      this.onLost(now)
+    } catch (error) {
+      this.reconnect = false
+      this.error = error
+      this.wake()
+    }
   }
 
   wake = () => this.#wake()

@@ -164,3 +164,30 @@ test("a stream in which nothing is followed any more is closed, also if its last
   assert.deepEqual(await streams.follow("/ended", {}, {}).next(), { done: true, value: undefined })
   await closed[2]
 })
+
+test("what onLost throws ends its own stream, and no other", async (t) => {
+  const streams = await joined(t, {
+    open(response, given, count) {
+      const events = Object.keys(given).map((name) => `event: e\nid: ${name} h:${count}\ndata: ${count}\n\n`)
+      begin(response, events.join(""))
+      if (count === 0) setTimeout(() => response.destroy(), 20)
+    },
+  })
+  const wrong = new Error("wrong")
+  const throws = (/** @type {boolean} */ lost) => {
+    if (lost) throw wrong
+  }
+  const failing = (async () => {
+    for await (const _ of streams.follow("/x", {}, { onLost: throws }));
+  })()
+  const seen = []
+  const other = (async () => {
+    for await (const { data } of streams.follow("/y", {}, {})) {
+      seen.push(data)
+      if (data === 1) break
+    }
+  })()
+  await assert.rejects(failing, wrong)
+  await other
+  assert.deepEqual(seen, [0, 1])
+})

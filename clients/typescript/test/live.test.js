@@ -291,6 +291,11 @@ live("a writer gathers, waits for room, and stops where the server refuses", asy
   const bad = { reason: "INVALID_FIELD", field: "times", row: 1, value: '"yesterday"' }
   await assert.rejects(writer.put([1, 2], [[1, 1], [2, 2]], [new Date(), "yesterday"]), bad)
   await assert.rejects(writer.put([1, -2], [[1, 1], [2, 2]]), { field: "keys", row: 1, value: "-2" })
+  const refused = { ttl: -1, only: "new", times: [1n, 10n ** 20n], expireTimes: [1n, Date.now()] }
+  for (const [option, value] of Object.entries(refused)) {
+    const field = option.replace("T", "_t")
+    await assert.rejects(writer.put([1, 2], [[1, 1], [2, 2]], /** @type {any} */ ({ [option]: value })), { reason: "INVALID_FIELD", field })
+  }
   await assert.rejects(writer.put([1, 2], [[1, 1], [2, NaN]]), { field: "points", row: 1 })
   const { applied } = await writer.put([2], [[2, 2]])
   await writer.flush() // nothing of what was bad was added

@@ -49,6 +49,7 @@ export async function carryOverGrpc(channel, name, batches, { producer, inFlight
     await call.ended
   } finally {
     batches.onMore = () => {}
+    if (!closed) call.cancel()
   }
   if (!closed) throw new DynhullError({ reason: "UNREACHABLE", detail: "the server ended the stream" })
 }

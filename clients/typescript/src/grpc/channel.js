@@ -102,7 +102,7 @@ export class Channel {
     })
     const done = () => signal?.removeEventListener("abort", abort)
     ended.then(done, done)
-    return { write: (request) => call.write(request), end: () => call.end(), ended }
+    return { write: (request) => call.write(request), end: () => call.end(), cancel: abort, ended }
   }
 
   /**
@@ -133,6 +133,7 @@ export class Channel {
  * @typedef {object} Duplex
  * @property {(request: object) => void} write
  * @property {() => void} end say that there is no more to write
+ * @property {() => void} cancel
  * @property {Promise<void>} ended rejects with what ended it otherwise
  */
 

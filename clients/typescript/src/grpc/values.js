@@ -1,7 +1,7 @@
 // Values of the contract as they are in JavaScript, and back.
 
+import { instantOf } from "../batch.js"
 import { invalid } from "../errors.js"
-import { isoTime, micros } from "../json.js"
 
 /** @typedef {import("../hull-copy.js").Key} Key */
 
@@ -62,23 +62,14 @@ export function packTimes(field, times) {
   if (times == null) return null
   requireList(field, times)
   const packed = new DataView(new ArrayBuffer(8 * times.length))
-  times.forEach((time, row) => packed.setBigInt64(8 * row, instant(field, row, time), true))
+  times.forEach((time, row) => packed.setBigInt64(8 * row, instantOf(field, row, time), true))
   return { packed: Buffer.from(packed.buffer) }
-}
-
-/** @param {string} field @param {number | null} row @param {any} time */
-function instant(field, row, time) {
-  try {
-    return typeof time === "bigint" ? time : micros(isoTime(time))
-  } catch {
-    throw invalid(field, row, time, "must be a time with its zone")
-  }
 }
 
 /** @param {any} time a text, or microseconds @param {string} [field] */
 export function timestamp(time, field = "time") {
   if (time == null) return null
-  const whole = instant(field, null, time)
+  const whole = instantOf(field, null, time)
   const rest = ((whole % 1_000_000n) + 1_000_000n) % 1_000_000n
   return { seconds: String((whole - rest) / 1_000_000n), nanos: Number(rest) * 1000 }
 }
