@@ -1,16 +1,19 @@
 """Reads: many in a message, one a call, and none at all: `python benchmarks/reads.py`.
 
 One process of server and one of clients, on the same cores; medians of rounds. The hull has 10,000 points, a read is a
-Locate of one point. `h2load` (Debian's nghttp2-client) makes unary calls where it is installed: to this server and, in
-turn, to one whose handlers do nothing.
+Locate of one point. `h2load` (Debian's nghttp2-client) makes unary calls where it is installed, over 8 connections: to
+this server and, in turn, to one whose handlers do nothing. The shares are the medians of those of the rounds, of the
+rate and of the processor time of a call, which other work on the machine changes less.
 """
 
 import argparse
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
+from pathlib import Path
 from statistics import median
 
 import grpc
@@ -19,11 +22,15 @@ import numpy as np
 from dynhull import DynamicHull
 from dynhull_client import HullClient, HullCopy
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from server import DYNHULL, EMPTY, SERVICE, running
+from server import DYNHULL, EMPTY, SERVICE, serving
+
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
+from processor import processor_time
 
 READS_A_MESSAGE = 64
 RANDOM = np.random.default_rng(19)
 POINTS = RANDOM.normal(size=(10_000, 2))
+OURS, EMPTIES = "h2load: Locate", "h2load: an empty handler"
 ONE = RANDOM.normal(size=(1, 2))
 
 
@@ -58,8 +65,8 @@ def unary(client, reads):
     return reads / (time.perf_counter() - begun)
 
 
-def h2load(address, requests, connections=4):
-    """Unary calls a second, 128 at a time: over 4 connections with 32 streams each, or over more with fewer."""
+def h2load(address, requests, connections=8):
+    """Unary calls a second, 128 at a time: over 8 connections with 16 streams each, or over more with fewer."""
     message = pb.LocateRequest(name="a", points={"packed": ONE.tobytes()}).SerializeToString()
     with tempfile.NamedTemporaryFile() as body:
         body.write(b"\0" + len(message).to_bytes(4, "big") + message)
@@ -71,6 +78,18 @@ def h2load(address, requests, connections=4):
         done = subprocess.run([*command, *headers, url], capture_output=True, text=True, check=True)
     assert f"{requests} succeeded" in done.stdout, done.stdout
     return float(re.search(r"([\d.]+) req/s", done.stdout)[1])
+
+
+def spending(times, pid, work, number):
+    """The result of some work that makes `number` calls; the processor time of one is added to `times`."""
+    before = processor_time(pid)
+    result = work()
+    times.append((processor_time(pid) - before) / number)
+    return result
+
+
+def shares(values, of):
+    return [a / b for a, b in zip(values, of, strict=True)]
 
 
 def nanoseconds(function, argument, times):
@@ -99,7 +118,11 @@ def rounds(repeat, scale):
         "Support": pb.Read(support=pb.SupportRequest(name="a", directions=points)),
         "GetHull, counts alone": pb.Read(get_hull=pb.GetHullRequest(name="a", view=pb.HULL_VIEW_BASIC)),
     }
-    with running(DYNHULL) as address, running(EMPTY) as empty, HullClient(address) as client:
+    with (
+        serving(DYNHULL) as (address, pid),
+        serving(EMPTY) as (empty, empty_pid),
+        HullClient(address) as client,
+    ):
         client.create_hull("a")
         client.apply("a", insert=POINTS)
         works = {
@@ -108,9 +131,10 @@ def rounds(repeat, scale):
         }
         works["SDK: pipeline"] = lambda: pipeline(client, scale)
         works["SDK: one call a read"] = lambda: unary(client, scale // 20)
+        spent = {OURS: [], EMPTIES: []}
         if shutil.which("h2load"):
-            works["h2load: Locate"] = lambda: h2load(address, scale // 5)
-            works["h2load: an empty handler"] = lambda: h2load(empty, scale // 5)
+            works[OURS] = lambda: spending(spent[OURS], pid, lambda: h2load(address, scale // 5), scale // 5)
+            works[EMPTIES] = lambda: spending(spent[EMPTIES], empty_pid, lambda: h2load(empty, scale // 5), scale // 5)
         for work in works.values():
             work()
         found = {name: [] for name in works}
@@ -118,6 +142,9 @@ def rounds(repeat, scale):
             for name, work in works.items():
                 found[name].append(work())
         yield from ((name, values, "/s") for name, values in found.items())
+        if OURS in found:
+            yield "share of the rate of an empty handler", shares(found[OURS], found[EMPTIES]), ""
+            yield "an empty handler's processor time, of ours", shares(spent[EMPTIES], spent[OURS])[1:], ""
         yield from ((name, values, "ns") for name, values in copies(client))
 
 
@@ -127,7 +154,10 @@ def main():
     parser.add_argument("--reads", type=int, default=50_000, help="of each kind in a round")
     arguments = parser.parse_args()
     for name, values, unit in rounds(arguments.repeat, arguments.reads):
-        print(f"{name:45}{median(values):12,.1f} {unit}   ({min(values):,.1f} to {max(values):,.1f})")
+        digits = 1 if unit else 3
+        print(
+            f"{name:45}{median(values):12,.{digits}f} {unit}   ({min(values):,.{digits}f} to {max(values):,.{digits}f})"
+        )
 
 
 if __name__ == "__main__":

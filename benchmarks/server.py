@@ -33,12 +33,19 @@ WATCHERS, RATE, UPDATES_PER_SECOND = 200, 10.0, 100_000
 
 
 @contextmanager
-def running(command):
+def serving(command):
+    """The address and the process of a server."""
     with subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, text=True) as process:
         try:
-            yield process.stdout.readline().split()[-1]
+            yield process.stdout.readline().split()[-1], process.pid
         finally:
             process.terminate()
+
+
+@contextmanager
+def running(command):
+    with serving(command) as (address, _):
+        yield address
 
 
 def packed(xy):

@@ -13,11 +13,10 @@ import argparse
 import asyncio
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
 
@@ -25,7 +24,7 @@ import numpy as np
 from reads import POINTS, h2load
 
 from dynhull_client import HullClient, UnavailableError
-from server import CYCLE, DYNHULL, EMPTY, cycle, stream
+from server import CYCLE, DYNHULL, EMPTY, cycle, serving, stream
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))
 from cluster import processes
@@ -45,16 +44,6 @@ DURABLE = ("max_wal_size=4GB", "shared_buffers=128MB")
 CONNECTIONS = 16
 LARGE = 10_000
 MILLION = 1_000_000
-
-
-@contextmanager
-def serving(command):
-    """The address and the process of a server."""
-    with subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[-1], process.pid
-        finally:
-            process.terminate()
 
 
 def restart(place):

@@ -1,5 +1,5 @@
 """
-Events of fences and batches of the past in C++, with the same results as in Python.
+Events of fences, batches of the past and messages in C++, with the same results as in Python.
 """
 
 
@@ -53,6 +53,14 @@ def plain_batches(payloads: list[bytes], first: int, kind: int, wanted: list[byt
     """
     The batches in payloads of the journal as columns, up to the first payload that has one of another kind; of keys, in UTF-8 or as eight bytes, only those that are wanted.
     """
+
+def points_message(data: bytes) -> tuple[bytes, bool, int] | None:
+    """
+    The name in a StreamRequest, whether its points are inserts, and where they begin; None if it has anything else, or none.
+    """
+
+def acknowledged(sequence: int, revision: int, inserted: int, deleted: int, missing: int, hull_changed: bool, points: int) -> bytes:
+    """The StreamResponse to a batch with this result."""
 
 def key_codes(lengths: bytes, data: bytes) -> bytes:
     """

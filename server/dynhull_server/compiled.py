@@ -1,4 +1,4 @@
-"""What the server does for each event of a fence, and each batch of the past, in C++ if that is built.
+"""What the server does for each event of a fence, batch of the past and short message, in C++ if that is built.
 
 What calls it does the same without.
 
@@ -92,6 +92,21 @@ class Native(Protocol):
         columns: "tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]",
     ) -> None:
         """`Tallies.take` in state/fences."""
+
+    def points_message(self, data: bytes) -> "tuple[bytes, bool, int] | None":
+        """What `rpc/short_batches.py` makes of a message; None for one that goes the whole way."""
+
+    def acknowledged(
+        self,
+        sequence: int,
+        revision: int,
+        inserted: int,
+        deleted: int,
+        missing: int,
+        hull_changed: bool,
+        points: int,
+    ) -> bytes:
+        """A StreamResponse with a plain result: `acknowledgement` in rpc/short_batches.py."""
 
     def key_codes(self, lengths: bytes, data: bytes) -> bytes:
         """`_codes` in storage/segments/gathered.py."""

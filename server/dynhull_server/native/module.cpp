@@ -1,4 +1,5 @@
-// dynhull_server._native: what the server does for each event of a fence, and each batch of the past, for Python.
+// dynhull_server._native: what the server does for each event of a fence, each batch of the past, and each message that
+// comes often, for Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 
@@ -9,6 +10,7 @@
 #include "batches.hpp"
 #include "encoding.hpp"
 #include "key_codes.hpp"
+#include "messages.hpp"
 #include "numbering.hpp"
 #include "numbers.hpp"
 
@@ -331,11 +333,25 @@ nb::tuple plain_batches(const nb::list& payloads, std::size_t first, std::uint8_
                         bytes(batches.times), bytes(batches.deadlines));
 }
 
+nb::object points_of_message(const nb::bytes& data) {
+  const std::string_view all(data.c_str(), data.size());
+  const auto found = points_message(all);
+  if (!found) return nb::none();
+  return nb::make_tuple(nb::bytes(found->name.data(), found->name.size()), found->inserts,
+                        found->points.data() - all.data());
+}
+
+nb::bytes acknowledged(std::uint64_t sequence, std::uint64_t revision, std::uint64_t inserted, std::uint64_t deleted,
+                       std::uint64_t missing, bool hull_changed, std::uint64_t points) {
+  const std::string data = acknowledgement(sequence, {revision, inserted, deleted, missing, hull_changed, points});
+  return nb::bytes(data.data(), data.size());
+}
+
 }  // namespace
 }  // namespace dynhull_server
 
 NB_MODULE(_native, module) {
-  module.doc() = "Events of fences and batches of the past in C++, with the same results as in Python.";
+  module.doc() = "Events of fences, batches of the past and messages in C++, with the same results as in Python.";
   using dynhull_server::Numbers;
   nb::class_<Numbers>(module, "Numbers", "A dictionary of integers, those of fences, without an object for each.")
       .def(nb::init<>())
@@ -379,6 +395,12 @@ NB_MODULE(_native, module) {
               "-> tuple[bytes, ...]"),
       "The batches in payloads of the journal as columns, up to the first payload that has one of another kind; of "
       "keys, in UTF-8 or as eight bytes, only those that are wanted.");
+  module.def("points_message", &dynhull_server::points_of_message, "data"_a,
+             nb::sig("def points_message(data: bytes) -> tuple[bytes, bool, int] | None"),
+             "The name in a StreamRequest, whether its points are inserts, and where they begin; None if it has "
+             "anything else, or none.");
+  module.def("acknowledged", &dynhull_server::acknowledged, "sequence"_a, "revision"_a, "inserted"_a, "deleted"_a,
+             "missing"_a, "hull_changed"_a, "points"_a, "The StreamResponse to a batch with this result.");
   module.def(
       "key_codes", &dynhull_server::key_codes, "lengths"_a, "data"_a,
       nb::sig("def key_codes(lengths: bytes, data: bytes) -> bytes"),

@@ -32,8 +32,8 @@ from .status import ANSWERED, DrainingError, StartingError, error_status
 
 Context = grpc.aio.ServicerContext[Any, Any]
 Work = Callable[["Call"], Awaitable[Any]]
-# A message and its size in bytes, or the error that it is invalid.
-Received = tuple[Message, int] | Exception
+# A message, or what has been read of one, and its size in bytes; or the error that it is invalid.
+Received = tuple[Any, int] | Exception
 
 # The name of the metrics page in the counts of calls.
 METRICS_PAGE = "metrics"

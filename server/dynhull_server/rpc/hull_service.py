@@ -23,7 +23,6 @@ from ..engine.steps import FEW_ROWS, Run, at_once
 from ..engine.views import Event, ResumedView
 from ..engine.watch import watch
 from ..engine.watch_many import ManyPart, watch_many
-from ..state.batch import Applied
 from ..state.errors import (
     HullEmptyError,
     HullFencedError,
@@ -48,6 +47,7 @@ from .places import Places
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .replays import Replays
+from .short_batches import PointsMessage, acknowledgement
 from .short_locates import ShortLocates
 from .status import ANSWERED
 from .tracks import Tracks
@@ -256,14 +256,13 @@ class HullService:
                     response = pb.StreamResponse()
                     for sequence, applied in streamed.applied():
                         call.batches += 1
-                        _acknowledge(sequence, applied, response.results.add())
+                        result = response.results.add(sequence=sequence)
+                        encode.encode_applied(applied, result.result)
                     await call.write(response)
                     continue
                 for sequence, applied in streamed.applied():
                     call.batches += 1
-                    response = pb.StreamResponse()
-                    _acknowledge(sequence, applied, response)
-                    await call.write(response)
+                    await call.write(acknowledgement(sequence, applied))
 
     async def GetProducer(self, request: pb.GetProducerRequest, call: Call) -> pb.GetProducerResponse:
         name = decode.decode_name(request.name)
@@ -669,6 +668,8 @@ class HullService:
             raise decode.InvalidFieldError(
                 "name", "", "the first message must name the hull, but the call has no message"
             )
+        if type(first) is PointsMessage:
+            first = first.whole()
         name = self._written(call, first.name)
         if first.uid and self._hulls.has(name):
             await require_present(self._hulls.get(name), first.producer, first.uid)
@@ -688,12 +689,6 @@ def _naming_fences(call: Call) -> Iterator[None]:
         if error.fence is None or call.access.may_read(error.fence):
             raise
         raise HullFencedError(error.name, what=error.what) from None
-
-
-def _acknowledge(sequence: int, applied: Applied, response: pb.StreamResponse | pb.NumberedResult) -> None:
-    if sequence:
-        response.sequence = sequence
-    encode.encode_applied(applied, response.result)
 
 
 def _parts(contents: Contents) -> Iterator[slice]:

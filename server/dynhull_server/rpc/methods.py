@@ -18,6 +18,7 @@ from grpc_reflection.v1alpha import reflection, reflection_pb2
 from dynhull_proto.v1 import alarm_service_pb2, fence_service_pb2, hull_service_pb2
 
 from ..state.errors import LimitExceededError
+from . import short_batches
 from .access import Access
 from .alarm_service import AlarmService
 from .calls import Call, Calls, Context, Received, Work
@@ -184,7 +185,11 @@ def _handlers(
         make: Callable[..., Any] = grpc.stream_unary_rpc_method_handler
         if method.server_streaming:
             make = grpc.stream_stream_rpc_method_handler
-        received = bytes if method.name in short else _received(GetMessageClass(method.input_type), max_bytes)
+        received: Callable[[bytes], Any] = _received(GetMessageClass(method.input_type), max_bytes)
+        if method.name in short:
+            received = bytes
+        elif method.input_type is hull_service_pb2.StreamRequest.DESCRIPTOR:
+            received = short_batches.received(received)
         handle = calls.handler(prefix + method.name, admit, works[method.name])
         handlers[method.name] = make(handle, request_deserializer=received)
     return grpc.method_handlers_generic_handler(service.full_name, handlers)

@@ -19,6 +19,7 @@ from . import decode
 from .calls import Call
 from .decode_batch import decode_batch
 from .metrics import Metrics
+from .short_batches import PointsMessage
 
 # While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
 MOST_ROWS = 131_072
@@ -113,6 +114,7 @@ class StreamedBatches:
     ) -> None:
         self._call = call
         self.name = name
+        self._own_names = b"", name.encode()
         self._producer = decode.decode_producer(first.producer)
         self._may_skip = decode.decode_may_skip(self._producer, first.may_skip)
         self._may_be_several = isinstance(first, hull_service_pb2.StreamRequest)
@@ -167,6 +169,13 @@ class StreamedBatches:
 
     async def take(self, message: Any) -> None:
         """Send the batches of a message; those before an invalid one, too."""
+        if type(message) is PointsMessage:
+            batch = message.batch() if not self._producer and message.name in self._own_names else None
+            if batch is not None:
+                rows = self._call.message_bytes // decode.BYTES_PER_POINT
+                self._send([Write(self.name, batch, self._driver.time(), rows, "", 0, self._call.owner)])
+                return
+            message = message.whole()
         name, producer = message.name, message.producer
         if name and name != self.name:
             raise decode.InvalidFieldError("name", name, f"this call writes to {self.name!r}")
