@@ -2,8 +2,9 @@
 
 A fleet of keyed vehicles makes small steps. Parts, all of them unless `--parts` names some:
 
-* writers: batches of one move that are acknowledged, with a history on and off, in turn; each server is new, and has
-  been there for a while. Rates and processor times are ratios of pairs, with 95 percent intervals.
+* writers: batches of one move that are acknowledged, by servers with a history and without one, which take their turns
+  in many blocks, each until nothing is left to do. Segments are a quarter of what they are by default, and so come
+  more often. Rates and processor times are ratios of pairs, with 95 percent intervals.
 * bytes: what a move takes in segments, one and a thousand a batch, of positions with seven decimals and of full
   doubles; the states beside the segments are apart.
 * as-of: a hull with a million points as it was a million batches of one move after the last state, from the journal and
@@ -27,7 +28,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -49,7 +50,10 @@ MANY, DAY, VEHICLES, REPORTED = 10**6, 8640, 5000, 10**8
 LOADED = 8192
 NEAR = 1000
 SEGMENT_SECONDS = 20  # after which another segment would have come
-MOVES = 2**18  # of a run of writers, and of what is weighed
+MOVES = 2**18  # of what is weighed
+BLOCK, PAIRS = 2**17, 4  # batches of one turn of writers, and turns of each server in a round
+SEGMENTS = 2  # in a turn
+STEP, SETTLED, IDLE = 0.25, 2.5, 0.1  # seconds, and the share of a processor that is no work
 PACE = 250_000  # moves a second
 BEHIND = 5 * 10**6  # moves that segments may lack: those after the last snapshot but one are not due
 SNAPSHOT = 250_000  # points of batches between snapshots, as by default
@@ -149,26 +153,41 @@ def write_until_filed(served: Served, name: str, moves: int, messages: list[byte
 
 
 def writers(folder: Path, scale: float, repeat: int) -> Iterator[str]:
-    """With a history of, of without one."""
-    messages = Fleet(VEHICLES).some(int(MOVES * scale))
-    pairs: list[tuple[float, float]] = []
-    options = "--snapshot-points", str(max(VEHICLES, len(messages) // 10))  # segments are written meanwhile
-    off = []
-    for number in range(repeat):
-        found: dict[bool, tuple[float, float]] = {}
-        for history in (True, False) if number % 2 else (False, True):
-            with serving(folder / f"writers {number} {history}", *options) as served:
-                create(served, "fleet", history=history)
-                time.sleep(2)  # what writes segments is loaded
-                before = served.processor
-                found[history] = write(served, "fleet", messages), served.processor - before
-        rates = f"{found[True][0]:,.0f} batches/s with a history, {found[False][0]:,.0f} without"
-        told(f"writers: {rates}", (number + 1) / repeat)
-        pairs.append((found[True][0] / found[False][0], found[True][1] / found[False][1]))
-        off.append(found[False][0])
-    rate, processor = (ratio_of(column) for column in zip(*pairs, strict=True))
-    yield f"writers with a history, of {median(off):,.0f} batches/s without | >= 0.97 | {rate}"
+    """With a history, of without one."""
+    messages = Fleet(VEHICLES).some(int(BLOCK * scale))
+    options = "--snapshot-points", str(max(VEHICLES, len(messages) // SEGMENTS))
+    found: dict[bool, list[tuple[float, float]]] = {True: [], False: []}
+    with ExitStack() as stack:
+        kinds = (True, False)
+        servers = {each: stack.enter_context(serving(folder / f"writers {each}", *options)) for each in kinds}
+        for history, served in servers.items():
+            create(served, "fleet", history=history)
+            settle(served)
+        for number in range(-1, PAIRS * repeat):  # the first is not counted: what writes segments is loaded
+            for history in kinds if number % 2 else kinds[::-1]:
+                before = servers[history].processor
+                rate = write(servers[history], "fleet", messages)
+                settle(servers[history])
+                if number >= 0:
+                    found[history].append((rate, servers[history].processor - before))
+            rates = " and ".join(f"{each[-1][0]:,.0f}" for each in found.values() if each)
+            told(f"writers: {rates or 'no'} batches/s counted with and without", (number + 1) / (PAIRS * repeat))
+        filed = servers[True].stub.GetHistory(pb.GetHistoryRequest(name="fleet")).moves
+    pairs = zip(found[True], found[False], strict=True)
+    ratios = zip(*([mine / none for mine, none in zip(*pair, strict=True)] for pair in pairs), strict=True)
+    rate, processor = map(ratio_of, ratios)
+    off = median(rate for rate, _ in found[False])
+    yield f"writers with a history ({filed:,} moves in segments), of {off:,.0f} batches/s without | >= 0.97 | {rate}"
     yield f"processor time of the server with a history, of that without | | {processor}"
+
+
+def settle(served: Served) -> None:
+    """Wait until a server has nothing left to do: snapshots and segments come once a second."""
+    idle = 0.0
+    while idle < SETTLED:
+        before = served.processor
+        time.sleep(STEP)
+        idle = idle + STEP if served.processor - before < STEP * IDLE else 0.0
 
 
 def ratio_of(ratios: Sequence[float]) -> str:
