@@ -136,7 +136,8 @@ class SharedPast:
     """The rows and the store of a site.
 
     Args:
-        faults: how calls of the store fail, for each owner.
+        faults: how calls of the store fail, for each owner; or it stands still before one, until a fate, or the end,
+            lets it go on.
         clock: the time in microseconds.
 
     Attributes:
@@ -161,6 +162,10 @@ class SharedPast:
         def at(place: str) -> str | None:
             process.give_way()
             kind = None if self.calm else faulty._fault(place)
+            if kind == "still":
+                process.stopped = True
+                process.give_way()
+                return None
             if kind in ERRORS:
                 raise ERRORS[kind](f"the store fails at {place}, as planned")
             return kind

@@ -45,6 +45,10 @@ IN_STORE = 0.3
 # The share of the cluster's plans with a past in which an owner cannot reach the database for a while.
 IN_THE_DARK = 0.5
 
+# The share of the cluster's plans with a past in which an owner stands still when it is to send a file, and others
+# come.
+STANDS_STILL = 0.3
+
 # How the files of the past fail, where they are read too; how calls of a store do; and commits of steps of filing.
 FILE_FAULTS = ("os", "disk full", "memory", "kill", "kill", "kill")
 READ_FAULTS = ("os", "memory", "kill", *DAMAGE)
@@ -101,6 +105,13 @@ def add_past_to_cluster(draw: random.Random, plan: Plan, names: tuple[str, ...])
                 draw.randint(0, len(client)), draw.choice((write, write, {"do": "past", "name": write["name"]}))
             )
     plan["clients"][0][:0] = creates
+    still = random.Random(f"still {plan['seed']}")  # the other plans stay as they were
+    if still.random() < STANDS_STILL:
+        plan["faults"] = [{"at": "send", "nth": still.randint(1, 3), "kind": "still", "calls": 1}]
+        plan["clients"] = [[op for op in client if op["do"] != "delete"] for client in plan["clients"]]
+        # One owner files, and the next one has time to remove what it finds.
+        starts = [_fate(still, "start", 0) | {"after": still.randint(300, 2_000)} for _ in range(3)]
+        plan["fates"] = [*starts, *plan["fates"][: still.randint(0, 3)], _fate(still, "start", 0)]
     if draw.random() < IN_THE_DARK:
         who, place = draw.randrange(2), draw.randint(0, len(plan["fates"]))
         plan["fates"][place:place] = [_fate(draw, "dark", who), _fate(draw, "light", who)]

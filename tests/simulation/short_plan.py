@@ -141,12 +141,23 @@ def _add_more(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
             for op in client:
                 if op["do"] == "create" and op["name"] in held and draw.random() < 0.8:
                     op["quarantine"] = random_rules(draw)
-    erased = [client for life in lives for client in life["clients"][:1] if client[0]["name"] in held]
-    if erased and draw.random() < WITH_ERASURES:
-        client = draw.choice(erased)
-        client += written_and_erased(draw, client[0]["name"])
+    if lives[0]["clients"][0][0]["name"] in held and draw.random() < WITH_ERASURES:
+        _erase(draw, plan)
     if plan["segment_rows"] is None and draw.random() < BEYOND_ITS_AGE:
         draw.choice(lives)["clients"].append(written_beyond_its_age(draw.choice(names)))
+
+
+def _erase(draw: random.Random, plan: Plan) -> None:
+    """A key is erased in the first life, which is looked at, and perhaps a commit of that fails without a kill."""
+    life = plan["lives"][0]
+    client = life["clients"][0]
+    for _ in range(draw.choice((1, 1, 2))):
+        client += written_and_erased(draw, client[0]["name"])
+    life["looked_at"] = True
+    life.pop("after", None)
+    if draw.random() < 0.5:
+        kind = draw.choice(("full", "lost", "ghost", "memory"))
+        plan["faults"].append({"at": "step", "nth": draw.randint(2, 12), "kind": kind, "calls": 1})
 
 
 def _add_faults(draw: random.Random, plan: Plan) -> None:
