@@ -23,7 +23,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties long robustness robustness-cluster torture cluster upgrade ray kafka languages objects simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs pages stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties long robustness robustness-cluster torture cluster upgrade ray kafka languages objects simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -69,7 +69,7 @@ properties: .venv/.test  ## other and many more random examples for the tests of
 	$(BIN)/pytest $(WORKERS) -m hypothesis --hypothesis-profile properties --timeout 0 tests
 
 long: .venv/.test  ## all cases of the tests of which `make test` runs every third to seventh
-	LONG_CASES=all $(BIN)/pytest $(WORKERS) -m every tests
+	LONG_CASES=all $(BIN)/pytest $(WORKERS) -m "every or only_with" tests
 
 coverage: .venv/.test .venv/.peers  ## run all tests and print the share of lines that they run, server processes included
 	COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(WORKERS) --cov --cov-report=term
@@ -80,7 +80,7 @@ format: .venv/.check  ## format the Python, C++ and proto files
 	$(BIN)/clang-format -i $(filter %.cpp %.hpp,$(KERNEL)) tests/kernel/*.cpp
 	$(BIN)/buf format --write
 
-check: docs  ## format, lint, types, import rules, proto rules, documentation, deploy/
+check: pages  ## format, lint, types, import rules, proto rules, documentation, deploy/
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/clang-format --dry-run --Werror $(filter %.cpp %.hpp,$(KERNEL)) $(wildcard tests/kernel/*.cpp tests/kernel/*.hpp)
@@ -110,6 +110,9 @@ check: docs  ## format, lint, types, import rules, proto rules, documentation, d
 
 docs: .venv/.check  ## the documentation as a site, build/site/index.html; broken links are errors
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
+
+pages: docs  ## what the pages of the site show is so: programs and commands as readers copy them, links, the reference
+	SITE_CASES=all $(BIN)/pytest -n 2 --dist loadfile -m only_with tests/docs
 
 TSC = clients/typescript/node_modules/.bin/tsc
 STUB = mkdir -p build && $(BIN)/python -m nanobind.stubgen -q -m
@@ -192,7 +195,7 @@ CONTRACT = tests/client
 upgrade: .venv/.test  ## from BASE, an earlier commit: a cluster is upgraded beside callers, and the tests of the client run across the two versions
 	$(BIN)/python tests/robustness/cluster/earlier.py $(BASE) -- $(CONTRACT)
 
-ray: .venv/.test .venv/.peers  ## all tests of Ray: Datasets, and as a launcher of servers, with a torture; `make test` runs the cheap ones
+ray: .venv/.test .venv/.peers  ## all tests of Ray: Datasets, and as a launcher of servers, with a torture
 	RAY_CASES=all $(BIN)/pytest tests/ray
 	$(BIN)/python tests/robustness/cluster/ray_torture.py --faults 11
 

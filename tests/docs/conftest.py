@@ -13,9 +13,19 @@ from blocks import blocks
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What needs the site is run by `make pages`, which builds it, and so by `make check`."""
+    for item in items:
+        if "site" in getattr(item, "fixturenames", ()) and item.get_closest_marker("only_with") is None:
+            item.add_marker(pytest.mark.only_with("SITE_CASES"))
+
+
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """The folder of the site, built as `make docs` builds it: once, for all workers of a run."""
+    """The folder of the site, as `make docs` builds it: by `make pages` before, else once for all workers of a run."""
+    if os.environ.get("SITE_CASES") == "all":
+        return ROOT / "build" / "site"
     if worker_id == "master":
         return build(tmp_path_factory.mktemp("site"))
     shared = tmp_path_factory.getbasetemp().parent

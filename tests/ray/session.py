@@ -1,6 +1,6 @@
 """Hulls of Ray Datasets, in a process of its own: prints what it found as JSON. Ray ends with the process.
 
-python tests/ray/session.py FOLDER few|all
+python tests/ray/session.py FOLDER
 """
 
 import json
@@ -14,7 +14,7 @@ import numpy as np
 import dynhull
 
 
-def main(folder: Path, cases: str) -> None:
+def main(folder: Path) -> None:
     # Ray counts its users unless asked not to, and without a token puts one into the home folder.
     os.environ |= {"RAY_USAGE_STATS_ENABLED": "0", "RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(16)}
     import pyarrow as pa
@@ -39,26 +39,25 @@ def main(folder: Path, cases: str) -> None:
     wrong = pa.table({"lon": bad[:, 0], "lat": bad[:, 1]})
     # As Ray reads a file of this name, for which it starts more processes.
     found["block"] = refused(from_arrow(wrong.append_column("path", [["bad.parquet"] * len(bad)])))
-    if cases == "all":
-        files = folder / "points"
-        files.mkdir()
-        for number, table in enumerate(tables):
-            pq.write_table(table, files / f"{number}.parquet", row_group_size=500)
-        points = read_parquet(str(files))
-        found["files"] = np.array_equal(dynhull.ray.convex_hull(points), expected)
-        pq.write_table(wrong, folder / "bad.parquet")
-        found["file"] = refused(read_parquet(str(folder / "bad.parquet"), include_paths=True))
-        swapped = dynhull.convex_hull(np.concatenate(clouds)[:, ::-1])
-        found["turned"] = np.array_equal(dynhull.ray.convex_hull(points, ("lat", "lon")), swapped)
-        found["integers"] = dynhull.ray.convex_hull(from_items([{"x": x, "y": x % 3} for x in range(10)])).tolist()
-        found["unnamed"] = refused(from_items([{"a": 1, "b": 2, "c": 3}]))
-        found["absent"] = refused(points, ("lon", "height"))
-        found["array"] = refused(np.zeros((3, 2)))
-        rows = [{"x": 1.0, "y": 2.0}, {"x": 3.0, "y": float("nan")}]
-        found["not finite"] = refused(from_items(rows, override_num_blocks=1))
-        found["missing"] = refused(from_items([{"x": 2**60, "y": 1}, {"x": 1, "y": None}], override_num_blocks=1))
-        found["inexact"] = refused(from_items([{"x": 2**60 + 1, "y": 1}], override_num_blocks=1))
-        found["words"] = refused(from_items([{"x": "one", "y": 1}], override_num_blocks=1))
+    files = folder / "points"
+    files.mkdir()
+    for number, table in enumerate(tables):
+        pq.write_table(table, files / f"{number}.parquet", row_group_size=500)
+    points = read_parquet(str(files))
+    found["files"] = np.array_equal(dynhull.ray.convex_hull(points), expected)
+    pq.write_table(wrong, folder / "bad.parquet")
+    found["file"] = refused(read_parquet(str(folder / "bad.parquet"), include_paths=True))
+    swapped = dynhull.convex_hull(np.concatenate(clouds)[:, ::-1])
+    found["turned"] = np.array_equal(dynhull.ray.convex_hull(points, ("lat", "lon")), swapped)
+    found["integers"] = dynhull.ray.convex_hull(from_items([{"x": x, "y": x % 3} for x in range(10)])).tolist()
+    found["unnamed"] = refused(from_items([{"a": 1, "b": 2, "c": 3}]))
+    found["absent"] = refused(points, ("lon", "height"))
+    found["array"] = refused(np.zeros((3, 2)))
+    rows = [{"x": 1.0, "y": 2.0}, {"x": 3.0, "y": float("nan")}]
+    found["not finite"] = refused(from_items(rows, override_num_blocks=1))
+    found["missing"] = refused(from_items([{"x": 2**60, "y": 1}, {"x": 1, "y": None}], override_num_blocks=1))
+    found["inexact"] = refused(from_items([{"x": 2**60 + 1, "y": 1}], override_num_blocks=1))
+    found["words"] = refused(from_items([{"x": "one", "y": 1}], override_num_blocks=1))
     json.dump(found, sys.stdout)
     ray.shutdown()
 
@@ -72,4 +71,4 @@ def refused(dataset: object, columns: object = None) -> list[str]:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2])
+    main(Path(sys.argv[1]))

@@ -1,10 +1,6 @@
-"""Hulls of Ray Datasets. One session of Ray for all of it, in a process of its own: Ray takes seconds to start.
-
-Two of its cases here, each of which takes another second, and all with `make ray`.
-"""
+"""Hulls of Ray Datasets. One session of Ray for all of it, in a process of its own: Ray takes seconds to start."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,23 +9,19 @@ from tempfile import TemporaryDirectory
 import pytest
 from patience import PATIENCE
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.only_with("RAY_CASES")]
 
-CASES = os.environ.get("RAY_CASES", "few")
 PROBLEMS = {
     "block": ("ValueError", "bad.parquet, row 1234 is (inf, 0.0)"),
+    "file": ("ValueError", "bad.parquet, row 1234 is (inf, 0.0)"),
+    "unnamed": ("ValueError", "dataset has the columns a, b, c: name two, x first"),
+    "absent": ("ValueError", "columns has 'height', but dataset has the columns lat, name, lon"),
+    "array": ("TypeError", "dataset must be a ray.data.Dataset, got ndarray"),
+    "not finite": ("ValueError", "block of 2 rows, row 1 is (3.0, nan): coordinates must be finite"),
+    "missing": ("ValueError", "columns x and y, block of 2 rows, row 1: y is missing"),
+    "inexact": ("ValueError", "row 0 is 1152921504606846977: no double has this value"),
+    "words": ("TypeError", "row 0: coordinates must be real numbers, got 'one'"),
 }
-if CASES == "all":
-    PROBLEMS |= {
-        "file": ("ValueError", "bad.parquet, row 1234 is (inf, 0.0)"),
-        "unnamed": ("ValueError", "dataset has the columns a, b, c: name two, x first"),
-        "absent": ("ValueError", "columns has 'height', but dataset has the columns lat, name, lon"),
-        "array": ("TypeError", "dataset must be a ray.data.Dataset, got ndarray"),
-        "not finite": ("ValueError", "block of 2 rows, row 1 is (3.0, nan): coordinates must be finite"),
-        "missing": ("ValueError", "columns x and y, block of 2 rows, row 1: y is missing"),
-        "inexact": ("ValueError", "row 0 is 1152921504606846977: no double has this value"),
-        "words": ("TypeError", "row 0: coordinates must be real numbers, got 'one'"),
-    }
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +29,7 @@ def found():
     script = Path(__file__).with_name("session.py")
     # Not a folder of pytest's: the names of Ray's sockets would be too long.
     with TemporaryDirectory(dir="/tmp", ignore_cleanup_errors=True) as folder:
-        command = [sys.executable, script, folder, CASES]
+        command = [sys.executable, script, folder]
         run = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout)
@@ -55,7 +47,6 @@ def test_errors_say_what_is_wrong_and_where(found, problem):
     assert words in found[problem][1]
 
 
-@pytest.mark.only_with("RAY_CASES")
 def test_files_other_columns_and_integers(found):
     assert found["files"]
     assert found["turned"]

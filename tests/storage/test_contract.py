@@ -112,7 +112,11 @@ def never(reason):
     raise AssertionError(reason)
 
 
-STORAGES = ["memory", "simulated", "postgresql", *Durability]
+# They differ in when a folder is synced; what becomes of commits that fail is tested of each in test_faults.py.
+LESS_OFTEN = [
+    pytest.param(each, marks=pytest.mark.only_with("LONG_CASES")) for each in Durability if each != Durability.SYNC
+]
+STORAGES = ["memory", "simulated", "postgresql", Durability.SYNC, *LESS_OFTEN]
 
 
 @pytest.fixture(params=STORAGES)

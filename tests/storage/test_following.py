@@ -177,6 +177,7 @@ def loaded(contents: Any) -> list[int]:
     return [row.number for row in contents.hulls if row.settings.shard is None]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_read_ahead_is_what_is_there(url, seed, tmp_path):
     fenced = seed % 2 == 1

@@ -138,7 +138,7 @@ class Lives:
 @pytest.mark.parametrize("seed", [1])
 def test_all_events_of_a_commit_are_there_or_none(tmp_path, seed):
     lives = Lives(tmp_path, seed)
-    for _ in range(25):
+    for _ in range(15):
         lives.step()
         lives.compare()
     assert lives.in_pieces > 5
