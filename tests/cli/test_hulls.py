@@ -111,6 +111,7 @@ def test_addresses_as_people_write_them(served, name):
         assert "Write HOST or HOST:PORT" in done.stderr
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "command", ["--help", "load --help", "--version", "list", "query {name}", "watch {name} --json", "top --looks 99"]
 )
