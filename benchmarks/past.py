@@ -9,9 +9,9 @@ A fleet of keyed vehicles makes small steps. Parts, all of them unless `--parts`
   doubles; the states beside the segments are apart.
 * as-of: a hull with a million points as it was a million batches of one move after the last state, from the journal and
   later from segments, each time the first read of this hull since the start; and again 200 batches later, five times.
-* memory: the resident memory of a server while 100 million moves become the past, no faster than segments are written:
-  the most in the second half, beside the most in the first quarter; and the slope in the second half, which
-  `--scale 0.1` gives for a tenth of the moves.
+* memory: the resident memory of a server before its first hull and with its first segments; and from then on, while
+  100 million moves become the past, no faster than segments are written: the most in the second half, beside the most
+  in the first quarter; and the slope in the second half, which `--scale 0.1` gives for a tenth of the moves.
 * day: a day of 5,000 vehicles that report every ten seconds: a replay of it as fast as it is read, the way of one
   vehicle, and the events of a fence after the fact; beside what pyarrow takes to read the same files, unchecked.
 
@@ -36,6 +36,7 @@ from statistics import median
 import grpc
 import numpy as np
 import pyarrow.parquet as pq
+from scipy.stats import linregress
 from scipy.stats import t as student
 
 import server
@@ -265,28 +266,42 @@ def revision_of(served: Served, name: str) -> int:
 
 
 def memory(folder: Path, scale: float, _: int) -> Iterator[str]:
-    """Megabytes by which a server has grown."""
+    """Megabytes by which a server has grown: at once, with the first segments, and from then on."""
     fleet = Fleet(VEHICLES)
     messages = [message for _ in range(20) for message in fleet.all(VEHICLES)]
-    rounds = max(16, int(REPORTED * scale) // (VEHICLES * len(messages)))
+    each = VEHICLES * len(messages)
+    rounds = max(16, int(REPORTED * scale) // each)
     used = []
     with serving(folder / "memory") as served:
+        empty, moves = served.megabytes, 0
         create(served, "fleet")
-        begun = time.monotonic()
+        while served.stub.GetHistory(pb.GetHistoryRequest(name="fleet")).moves < 2 * SNAPSHOT:
+            write(served, "fleet", messages)
+            moves += each
+            settle(served)
+        loaded = served.megabytes
+        yield f"memory with the first segments (what writes them is loaded), of {empty:.0f} MB, MB | | {loaded:.0f}"
+        begun, first = time.monotonic(), moves
         for number in range(rounds):
             write(served, "fleet", messages)
+            moves += each
             used.append(served.megabytes)
-            moves = (number + 1) * len(messages) * VEHICLES
             while (filed := served.stub.GetHistory(pb.GetHistoryRequest(name="fleet")).moves) < moves - BEHIND:
                 time.sleep(1)
             if number % 20 == 19:
                 told(f"memory: {moves:,} moves, {filed:,} in segments, {used[-1]:.0f} MB", (number + 1) / rounds)
-            time.sleep(max(0.0, begun + moves / PACE - time.monotonic()))
+            time.sleep(max(0.0, begun + (moves - first) / PACE - time.monotonic()))
     early, late = max(used[: max(2, rounds // 4)]), max(used[rounds // 2 :])
     half = used[rounds // 2 :]
-    slope = np.polyfit(np.arange(len(half)) * len(messages) * VEHICLES / 10**8, half, 1)[0]
+    slope, spread = (found * 10**8 for found in _slope(np.arange(len(half)) * float(each), np.array(half)))
     yield f"memory after {moves:,} moves, of {early:.0f} MB after a quarter, MB | +- 50 | {late - early:+.0f}"
-    yield f"memory by which it grows in 10^8 moves, as in the second half, MB | +- 50 | {slope:+.0f}"
+    yield f"memory by which it grows in 10^8 moves, as in the second half, MB | +- 50 | {slope:+.0f} +- {spread:.0f}"
+
+
+def _slope(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """The slope of a line through points, and half of its 95 percent interval, as if these did not depend on others."""
+    found = linregress(x, y)
+    return float(found.slope), float(student.ppf(0.975, len(x) - 2) * found.stderr)
 
 
 def day(folder: Path, scale: float, repeat: int) -> Iterator[str]:
