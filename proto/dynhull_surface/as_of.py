@@ -3,6 +3,8 @@
 from functools import partial
 from typing import Any
 
+from .iso_times import from_iso
+
 
 class Present:
     """The reading methods of a client for one hull, without its name.
@@ -20,6 +22,23 @@ class Present:
         return partial(getattr(self._client, method), self._name)
 
 
-def moment_of(text: str) -> int | str:
-    """A revision, which is all digits; or the text of a time."""
-    return int(text) if text.isdecimal() and text.isascii() else text
+def moment_of(text: str | None, name: str) -> int | str | None:
+    """A revision, which is all digits; or the text of a time with a time zone; None for None.
+
+    Raises:
+        ValueError: it is neither; the message has the name.
+    """
+    if text is None:
+        return None
+    if text.isdecimal() and text.isascii():
+        return int(text)
+    try:
+        zone = from_iso(text).tzinfo
+    except ValueError:
+        zone = None
+    if zone is None:
+        raise ValueError(
+            f"{name} {text!r} is no moment: write a revision, all digits, or a time with a time zone, such as "
+            "2026-11-24T16:00Z"
+        )
+    return text

@@ -22,7 +22,7 @@ def as_of(client: "HullClient", name: str, at: str | None) -> Any:
     """What reads a hull: as it is, or as it was; a line says if it may lack keys that were erased."""
     if at is None:
         return Present(client, name)
-    past = client.at(name, moment_of(at))
+    past = client.at(name, moment_of(at, "--at"))
     if past.erased:
         typer.echo(f"{name} at revision {past.revision:,}: keys that were erased from its past are missing", err=True)
     return past

@@ -69,8 +69,8 @@ def replay(
         name,
         Shown(max_rate=max_rate, keys=keys, layer=layer, max_vertices=max_vertices),
         played=Played(
-            None if begin is None else moment_of(begin),
-            None if end is None else moment_of(end),
+            moment_of(begin, "--from"),
+            moment_of(end, "--to"),
             speed,
             None if every is None else more_than_0(every, "--every"),
         ),

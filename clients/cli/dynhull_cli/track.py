@@ -55,8 +55,8 @@ def track(
     found = client.track(
         name,
         keys_for(client, name, given_keys(keys)),
-        None if begin is None else moment_of(begin),
-        None if end is None else moment_of(end),
+        moment_of(begin, "--from"),
+        moment_of(end, "--to"),
         every=None if every is None else more_than_0(every, "--every"),
     )
     if as_geojson:

@@ -49,7 +49,7 @@ async def as_of(client: AsyncHullClient, name: str, at: AskedAt | None) -> Any:
     """What reads a hull: as it is, or as it was."""
     if at is None:
         return Present(client, name)
-    past = await client.at(name, moment_of(at.moment))
+    past = await client.at(name, moment_of(at.moment, "at"))
     if at.uid not in ("", past.uid):
         problem = f"the hull {name!r} was created again, or restored from a backup: its uid is now {past.uid}"
         metadata = {"field": "at_uid", "value": name, "uid": past.uid}

@@ -53,8 +53,8 @@ async def tracks(
     found = await client.track(
         name,
         await _as_the_hull_has_them(client, name, keys),
-        None if start is None else moment_of(start),
-        None if end is None else moment_of(end),
+        moment_of(start, "from"),
+        moment_of(end, "to"),
         every=every,
     )
     vary = {"Vary": "Accept"}

@@ -334,6 +334,30 @@ def test_the_asyncio_client_and_the_command_line_read_the_past(served):
         assert (json.loads(result.stdout)["area"], json.loads(result.stdout)["revision"]) == (area, revision)
 
 
+NO_MOMENT = "is no moment: write a revision, all digits, or a time with a time zone, such as 2026-11-24T16:00Z"
+
+
+def test_a_text_that_is_no_moment_is_refused_with_the_name_that_it_was_given_by(served):
+    address, _ = served
+
+    async def streamed(path):
+        async with AsyncHullClient(address) as client:
+            return await called(application(client, Settings()), path)
+
+    for text in ("yesterday", "2026-11-24", "-1", ""):
+        for command in (
+            ("measure", "keyed", "--at"),
+            ("track", "keyed", "a", "--from"),
+            ("replay", "keyed", "--to"),
+            ("fences", "between", "--area", "keyed", "--subjects", "keyed", "--from"),
+        ):
+            done = dynhull(*command, text, "--address", address)
+            assert (done.exit_code, done.stderr) == (2, f"error: {command[-1]} {text!r} {NO_MOMENT}\n")
+        for path, name in (("?at=", "at"), ("/tracks?key=a&to=", "to"), ("/replay?from=", "from")):
+            status, body = asyncio.run(streamed(f"/hulls/keyed{path}{text}"))
+            assert (status, json.loads(body)["detail"]) == (400, f"{name} {text!r} {NO_MOMENT}")
+
+
 def test_faces_of_a_replay(served):
     address, seen = served
     last = max(seen["keyed"])

@@ -51,7 +51,7 @@ def between(
     from ..closed_pipe import when_pipe_closes
     from .shown import event_cells, event_members
 
-    chosen |= {name: None if when is None else moment_of(when) for name, when in (("start", start), ("end", end))}
+    chosen |= {"start": moment_of(start, "--from"), "end": moment_of(end, "--to")}
     with client.fence_events_between(**with_keys(client, chosen)) as stream:
         if not sys.stdout.isatty():
             when_pipe_closes(stream.close)

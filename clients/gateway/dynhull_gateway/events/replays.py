@@ -80,8 +80,8 @@ async def replay(
     begin = start if place is None else str(place[1])
     played = client.replay(
         name,
-        None if begin is None else moment_of(begin),
-        None if end is None else moment_of(end),
+        moment_of(begin, "from"),
+        moment_of(end, "to"),
         speed=speed,
         every=every,
         copy=texts.copy,

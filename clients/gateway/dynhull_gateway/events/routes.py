@@ -280,7 +280,7 @@ async def fence_events_between(
     admit(request)
     state = request.app.state
     given = arguments_of(fence)
-    given |= {name: None if given[name] is None else moment_of(given[name]) for name in ("start", "end")}
+    given |= {name: moment_of(given[name], name) for name in ("start", "end")}
     past = PastEvents(client.fence_events_between(**given))
     await past.begin(PATIENCE_SECONDS)
     return EventStream(past.texts(state.settings.keepalive_seconds), state.health, state.figures)
