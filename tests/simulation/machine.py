@@ -7,8 +7,9 @@ timer. A thread runs until it waits, or gives way where it would for a disk.
 
 import asyncio
 import heapq
+import sys
 from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import AsyncGenerator, Callable, Coroutine
 from concurrent.futures import Future
 from contextlib import suppress
 from contextvars import Context
@@ -56,13 +57,21 @@ class Loop(asyncio.AbstractEventLoop):
     def _run(self) -> None:
         all_of_them = self._schedule.brisk and len(self._ready) > 1 and self._schedule.random.random() < ALL_AT_ONCE
         asyncio._set_running_loop(self)
+        hooks = sys.get_asyncgen_hooks()
+        sys.set_asyncgen_hooks(finalizer=self._dropped)
         try:
             for _ in range(len(self._ready) if all_of_them else 1):
                 handle = self._ready.popleft()
                 if not handle.cancelled():
                     handle._run()
         finally:
+            sys.set_asyncgen_hooks(*hooks)
             asyncio._set_running_loop(None)
+
+    def _dropped(self, generator: AsyncGenerator[Any, Any]) -> None:
+        """What nobody reads any more ends, as in asyncio; nothing of a killed process does."""
+        if not self.dead:
+            self.create_task(generator.aclose())
 
     def _may_pass(self) -> object:
         """Whether time may pass to the next timer."""

@@ -310,6 +310,12 @@ class Model:
         """The hull with a number, as the storage has kept it."""
         return self._hulls[number]
 
+    def truth_of_uid(self, uid: str) -> Truth:
+        """The hull with a uid, as the storage has kept it."""
+        if uid not in self._uids:
+            raise self.finds(f"there never was a hull {uid}")
+        return self._uids[uid]
+
     def _append(self, truth: Truth, record: Record) -> int | None:
         """Take a revision into the truth, and into its past."""
         attempt = self._revised(truth, record)

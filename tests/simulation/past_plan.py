@@ -15,6 +15,7 @@ from .past_archive import DAMAGE, FILE_PLACES, LATE, STORE_PLACES
 from .past_model import ERASED
 
 # What clients ask of the past.
+OF_PREFIXES = ("consume_many", "unconsume_many")
 OF_PAST = ("as_of", "feed", "replay", "track", "keep_past", "erase", "consume", "unconsume")
 READS = ("as_of", "as_of", "as_of", "feed", "replay", "track")
 
@@ -38,6 +39,8 @@ AGE = 3_000_000
 
 # The share of the plans in which feeds have consumers.
 WITH_CONSUMERS = 0.4
+# The share of what consumers do in the feeds of all hulls with a prefix.
+OF_MANY = 0.35
 
 # The share of the plans without backups in which the past is in an object store.
 IN_STORE = 0.3
@@ -141,9 +144,11 @@ def _add_consumers(draw: random.Random, life: dict[str, Any], name: str) -> None
 
 
 def consumes(draw: random.Random, name: str) -> Operation:
-    """A consumer of the feed of a hull reads on, or is deleted."""
+    """A consumer of the feed of a hull, or of a prefix, reads on, or is deleted."""
     do = draw.choice(("consume",) * 9 + ("unconsume",))
     op: Operation = {"do": do, "name": name, "consumer": draw.randrange(2), "most": draw.choice((1, 1, 3, 100))}
+    if draw.random() < OF_MANY:
+        op |= {"do": f"{do}_many", "name": draw.choice(("", name[0], name))}
     if draw.random() < 0.15:
         op["leave"] = int(draw.expovariate(1 / 5))
     return op

@@ -20,6 +20,7 @@ from dynhull_server.state.errors import (
     MomentForgottenError,
     RevisionForgottenError,
 )
+from dynhull_server.state.feed_consumers import ConsumerId
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Keys
 from dynhull_server.state.tracks import Moves
@@ -91,7 +92,7 @@ class PastReader:
             case "consume":
                 await self._consume(live, truth, op["consumer"], op["most"])
             case "unconsume":
-                await self._unconsume(live, op["consumer"])
+                await self.unconsume(consumer_of(live.name, op["consumer"]))
             case "replay":
                 await self._replay(live, truth, first, last)
             case "track":
@@ -178,7 +179,7 @@ class PastReader:
                     after = part.revision
                 for record in part.records:
                     after += 1
-                    self._fed(truth, after, record)
+                    self.fed(truth, after, record)
                 if part.revision != after:
                     raise self._model.finds(f"the feed of {live.name} has come to {part.revision}, and has {after}")
                 most -= 1
@@ -210,9 +211,8 @@ class PastReader:
         if after > live.counts.revision:
             raise self._model.finds(f"a consumer of {live.name} goes on after {after} of {live.counts.revision}")
 
-    async def _unconsume(self, live: LiveHull, number: int) -> None:
+    async def unconsume(self, ident: ConsumerId) -> None:
         """Delete a consumer."""
-        ident = consumer_of(live.name, number)
         asked = self._model.consumers.ask(ident)
         try:
             await self._engine.hulls.feed_consumers.delete(ident)
@@ -223,7 +223,8 @@ class PastReader:
         if None not in self._model.consumers.since(ident, asked):
             raise self._model.finds(f"{ident} is said to be deleted")
 
-    def _fed(self, truth: Truth, revision: int, record: Any) -> None:
+    def fed(self, truth: Truth, revision: int, record: Any) -> None:
+        """Compare a batch of a feed with what was committed."""
         time = truth.past.times[revision]
         if record.revision != revision or record.committed is None or record.committed.time != time:
             raise self._model.finds(

@@ -32,8 +32,9 @@ from .core_life import compare
 from .fence_model import PREFIX
 from .machine import Loop, SimulatedClock, SimulatedThreads, simulated_machine
 from .model import Finding, Model
-from .past_plan import OF_PAST
+from .past_plan import OF_PAST, OF_PREFIXES
 from .past_reader import PastReader
+from .prefix_reader import PrefixReader
 from .queries import Queries
 from .schedule import Schedule
 from .store import FaultyStorage, KilledError
@@ -242,6 +243,10 @@ class ShellServer:
             return
         if op["do"] in OF_PAST:
             await PastReader(self._engine, self.model, self.schedule).ask(client, op)
+            return
+        if op["do"] in OF_PREFIXES:
+            past = PastReader(self._engine, self.model, self.schedule)
+            await PrefixReader(self._engine, self.model, past).ask(client, op)
             return
         if op["do"] == "query":
             await Queries(self._engine, self.model).ask(client, op)

@@ -172,6 +172,8 @@ def _add_faults(draw: random.Random, plan: Plan) -> None:
         for life in plan["lives"]:
             client = life["clients"][0]
             client.insert(draw.randint(1, len(client)), changes_history(draw, client[0]["name"]))
-    consumed = any(op["do"] == "consume" for life in plan["lives"] for client in life["clients"] for op in client)
+    consumed = any(
+        op["do"].startswith("consume") for life in plan["lives"] for client in life["clients"] for op in client
+    )
     if consumed and draw.random() < CONSUMERS_FAIL:
         faults.append({"at": "consumer", "nth": draw.randint(1, 6), "kind": draw.choice(STEP_FAULTS), "calls": 1})

@@ -117,16 +117,32 @@ class HullFeeds:
         """
         if not commit.number:
             return 0, False
-        time = commit.time
-        while (found := await self._ask(hull, partial(_moment, self._past, time))) is not None:
-            if found.committed is None or found.committed.number <= commit.number:
-                return found.revision, False
-            time = found.committed.time - 1
+        found: Moment | None = await self._ask(hull, partial(_moment, self._past, commit.time))
+        later = None if found is None else found.committed
+        if found is not None and (later is None or later.number <= commit.number):
+            return found.revision, False
         oldest = await self.oldest(hull)
+        if found is not None and later is not None:  # some of the same time are later: the clock has been set back
+            before: Moment | None = await self._ask(hull, partial(_moment, self._past, later.time - 1))
+            least = oldest.revision if before is None else before.revision
+            sent = await self._last_of(hull, least, found.revision, commit.number)
+            if before is not None or sent > least:
+                return sent, False
         timed: Moment = await self._ask(hull, partial(self._past.oldest_moment, timed=True))
         if timed.revision > oldest.revision:  # formats before 11 have written those before it
             return timed.revision - 1, False
         return oldest.revision, oldest.revision > 0
+
+    async def _last_of(self, hull: LiveHull, sent: int, later: int, number: int) -> int:
+        """The last revision between two whose commit has no greater number; `sent` if there is none."""
+        while later - sent > 1:
+            middle = (sent + later) // 2
+            (record,) = await self._ask(hull, partial(_batches, self._past, middle - 1, middle))
+            if record.committed is None or record.committed.number <= number:
+                sent = middle
+            else:
+                later = middle
+        return sent
 
     async def next(self, hull: LiveHull, after: int) -> FeedPart:
         """What follows a revision that the hull has passed. Of a divided hull nothing is kept that can be sent."""
