@@ -55,6 +55,58 @@ def test_a_page_has_one_stream_whatever_it_shows(browser: Browser, url: str, cli
         assert [len(each) for each in opened_streams.values()] == [1, 1, 1]
 
 
+# A page with a map alone, from the files of the dashboard, which counts the events of each kind.
+MAP = """async ([page, hulls, fences]) => {
+    const html = new DOMParser().parseFromString(await (await fetch(page)).text(), "text/html")
+    const script = document.createElement("script")
+    Object.assign(script, {type: "importmap", textContent: html.querySelector("[type=importmap]").textContent})
+    document.head.append(script)
+    await import(html.querySelector("[type=module]").src.replace("page.js", "dynhull/map/index.js"))
+    globalThis.seen = {}
+    addEventListener("dynhull-event", ({detail: {kind, event}}) => {
+        const of = kind == "fence" ? `${event.fence} ${event.type}` : kind
+        seen[of] = (seen[of] ?? 0) + 1
+    })
+    const map = document.createElement("dynhull-map")
+    map.setAttribute("hull", hulls.join(" "))
+    map.setAttribute("fence", fences.join(" "))
+    document.body.append(map)
+}"""
+# From where on a fence is followed is known once its settings have come.
+ASKED = """count => {
+    const come = performance.getEntriesByType("resource").filter(({responseEnd}) => responseEnd)
+    return new Set(come.map(({name}) => name).filter(name => /fences\\/[^/]+$/.test(name))).size == count
+}"""
+TWELVE = 12
+
+
+def test_twelve_hulls_and_twelve_fences_in_three_tabs(
+    browser: Browser, url: str, client: HullClient, name: str
+) -> None:
+    """More than a dashboard shows by name; the origin still answers other requests of these tabs at once."""
+    hulls, fences = [f"{name}/{row}" for row in range(TWELVE)], [f"{name}/f{row}" for row in range(TWELVE)]
+    for hull, fence in zip(hulls, fences, strict=True):
+        client.create_hull(hull, keyed="str")
+        client.put(hull, ["a", "b", "c", "d"], SQUARE)
+        client.create_fence(fence, area=SQUARE, subjects=hull)
+    with browser.new_context() as context:
+        tabs = [context.new_page() for _ in range(3)]
+        streams: list[str] = []
+        for tab in tabs:
+            tab.on("request", lambda request: is_stream(request) and streams.append(request.url))
+            tab.goto(f"{url}/dashboard/version")
+            tab.evaluate(MAP, [f"{url}/dashboard", hulls, fences])
+        for tab in tabs:
+            tab.wait_for_function("all => seen.hull >= all", arg=TWELVE)
+            tab.wait_for_function(ASKED, arg=TWELVE)
+        for hull in hulls:
+            client.put(hull, ["c"], [[9, 4]])
+        for tab in tabs:
+            tab.wait_for_function("fences => fences.every(each => seen[`${each} exit`] == 1)", arg=fences)
+            assert tab.evaluate("fetch('/dashboard/version').then(answer => answer.status)") == 200
+        assert len(streams) == len(tabs)
+
+
 def test_a_gateway_asks_for_a_token_and_keeps_it_in_memory(browser: Browser, tmp_path: Path) -> None:
     tokens = tmp_path / "tokens.toml"
     made = run("token", "--name", "eye", "--read", "fleet", "--write", "fleet")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from dashboard_process import PARTS, dashboard_process, opened, wait_for_vertices
+from patience import wait_until
 from playwright.sync_api import Browser, Locator, Page, expect
 from server_process import Server, run, server_process
 
@@ -145,6 +146,8 @@ def test_a_page_that_is_loaded_again(browser: Browser, url: str, client: HullCli
         client.put(fleet, ["c"], [[8, 4]])
         client.apply(forgetful, insert=[[9, 9]])
         wait_for_vertices(page, fleet, corners(4))
+        # The server keeps a row each ten seconds.
+        wait_until(lambda: all(len(client.series(each).times) > 1 for each in (fleet, forgetful)))
         page.reload()
         page.evaluate(PARTS)
         wait_for_vertices(page, fleet, corners(4))

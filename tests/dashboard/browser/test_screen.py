@@ -265,6 +265,7 @@ def test_a_kiosk_turns_and_shows_alarms(browser: Browser, url: str, client: Hull
 def test_a_crowd_is_painted_in_pieces_and_thinned(browser: Browser, url: str) -> None:
     with opened(browser, url, "none") as page:
         page.wait_for_function("() => picture.hulls.has('none')")  # the page has shown what it was asked for
+        expect(page.locator(".alarms tbody tr")).to_have_count(2)  # later they would move the map below the pointer
         assert page.evaluate(CROWD), "it was painted at once, while whoever pointed at something waited"
         painted = "() => picture.many.crowd.front && !picture.many.crowd.job"
         page.evaluate("""() => {

@@ -74,10 +74,7 @@ class PageSettings:
     @property
     def area_heading(self) -> str:
         """The units of areas in a plane and on the globe."""
-        known = self.x_unit or self.y_unit
-        return (
-            "km²" if self.area_unit == "km²" else f"{self.area_unit}; km² on the globe" if known else "km² on the globe"
-        )
+        return "km²" if self.area_unit == "km²" else f"{self.area_unit}; km² on the globe"
 
 
 @dataclass(frozen=True)

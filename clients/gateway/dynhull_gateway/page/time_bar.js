@@ -9,6 +9,7 @@ export class TimeBar {
   constructor(recorder, form) {
     this.recorder = recorder
     this.hulls = []  // what is kept of each, with its colour
+    this.known = false  // whether that is known of all
     this.holes = []  // moments at which something was missing
     this.wanted = undefined  // the moment of the link, until it is known what the server has kept
     this.missed = ""
@@ -36,9 +37,10 @@ export class TimeBar {
   // What the server has kept of the hulls on the page.
   keep(hulls) {
     this.hulls = hulls
+    this.known = hulls.every(({known}) => known)
     this.recorder.kept = hulls.reduce((least, {first}) => first == null ? least : Math.min(least ?? Infinity, first), undefined)
     this.form.classList.toggle("kept", this.recorder.kept != undefined)
-    if (this.wanted != undefined && hulls.length && hulls.every(({known}) => known)) this.reach(this.wanted)
+    if (this.wanted != undefined && hulls.length && this.known) this.reach(this.wanted)
     this.update()
   }
   // Shows the moment of the link, if it is kept.
@@ -77,7 +79,7 @@ export class TimeBar {
   reach_words() {
     const {kept, began, recorded} = this.recorder
     if (kept != undefined) return `Kept since ${moment_format.format(kept)}`
-    if (!this.hulls.every(({known}) => known)) return ""
+    if (!this.known) return ""
     const reach = recorded == began ? `to ${clock_format.format(began)}, when this page was opened` : "for five minutes"
     return `Back ${reach}: what it shows keeps no past`
   }

@@ -2,7 +2,7 @@
 import { FONT } from "./dynhull/map/boxes.js"
 import { FONT_PIXELS, MOST_RATIO, compact, ticks } from "./dynhull/map/picture.js"
 const SHOWN_MILLISECONDS = 60 * 60_000, OPENING_MILLISECONDS = 10_000, LINE_LEFT = 46, LINE_TOP = 8, LINE_BOTTOM = 20, ROOM_ABOVE = 1.15
-const TIME_STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600].map(seconds => 1000 * seconds), WHOLE_SERVER = ""
+const TIME_STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600].map(seconds => 1000 * seconds), WHOLE_SERVER = ""
 export class TimeLines {
   constructor(plots, neutral, percentile_dash) {
     this.plots = plots.map(element => ({element, columns: element.dataset.columns.split(" ")}))

@@ -86,12 +86,19 @@ export class HullFeed extends HullState {
       this.lines.push(live ? [Date.now(), this.points, this.vertices, this.shown_area, this.rate] : [Date.now(), NaN, NaN, NaN, NaN])
     }
   }
+  // Once there is the hull, and again while the server has no answer, however long that takes: a page that is loaded when all are busy
+  // is to have the last hour, too.
   async begin_lines(signal) {
-    for (let tries = 0; tries < 20 && !this.followed && !signal.aborted; tries++) await rest(TICK / 10, signal)
-    if (!this.followed) return
-    try {
-      this.lines.push(...past_rows(await this.source.asker.series(this.name, {last: LONGEST_SECONDS, signal}), Date.now()))
-    } catch { /* the server is away or of an earlier version, or the hull is not there */ }
+    while (!signal.aborted) {
+      if (this.followed)
+        try {
+          return this.lines.push(...past_rows(await this.source.asker.series(this.name, {last: LONGEST_SECONDS, signal}), Date.now()))
+        } catch (error) {
+          if (error.status == 501) return  // of an earlier version
+          await rest(RETRY, signal)
+        }
+      await rest(TICK / 10, signal)
+    }
   }
   async ask_sample(signal) {
     if (!this.followed || this.sample.revision == this.revision) return
