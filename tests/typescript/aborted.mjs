@@ -59,7 +59,7 @@ for (const [what, step] of Object.entries(steps)) {
     for (let turns = 0; turns < TURNS; turns++) {
       now = `${what}, turn ${turns}`
       const [stop, reason] = [new AbortController(), new Error("aborted")]
-      const ended = step(stop.signal).catch((error) => error)
+      const ended = step(stop.signal).then(() => undefined, (error) => error) // some end before
       for (let turn = 0; turn < turns; turn++) await wait()
       stop.abort(reason)
       const late = new Promise((resolve) => setTimeout(resolve, PATIENCE, "it goes on").unref())

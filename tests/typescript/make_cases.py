@@ -119,7 +119,7 @@ class Gathered:
 def writers(dice: Random) -> list[dict[str, object]]:
     """Calls of writers that gather all, the revision of the batch with the last row of each, and what is kept."""
     found: list[dict[str, object]] = []
-    for place in range(24):
+    for place in range(8):
         coalesce, timed = ("last", None)[place % 2], place % 4 < 2
         gathered, kept, latest = Gathered(coalesce == "last"), dict[str, list[float]](), dict[str, int]()
         calls, revisions = list[dict[str, object]](), list[int]()
