@@ -15,7 +15,7 @@ from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Clock
 from dynhull_server.entrance import PublicEntrance, grpc_server
 from dynhull_server.rpc.access import LOOK_SECONDS
-from dynhull_server.rpc.calls import Calls, Work
+from dynhull_server.rpc.calls import Calls, UnaryHandler, Work
 from dynhull_server.rpc.health import Health
 from dynhull_server.rpc.many import ManyQuotas
 from dynhull_server.rpc.methods import (
@@ -163,13 +163,13 @@ class Gateway:
     def _handlers(self, service: ServiceDescriptor) -> grpc.GenericRpcHandler:
         handlers = {}
         for method in service.methods:
-            make: Any = grpc.stream_unary_rpc_method_handler
+            handle = self._calls.handler(method.name, self._calls.admit, self._work(service, method))
+            received = within(self._settings.max_message_bytes)
             if method.client_streaming or method.server_streaming:  # the relay writes what the worker answers
-                make = grpc.stream_stream_rpc_method_handler
-            handlers[method.name] = make(
-                self._calls.handler(method.name, self._calls.admit, self._work(service, method)),
-                request_deserializer=within(self._settings.max_message_bytes),
-            )
+                made: Any = grpc.stream_stream_rpc_method_handler(handle, request_deserializer=received)
+            else:
+                made = grpc.stream_unary_rpc_method_handler(UnaryHandler(handle), request_deserializer=received)
+            handlers[method.name] = made
         return grpc.method_handlers_generic_handler(service.full_name, handlers)
 
     def _work(self, service: ServiceDescriptor, method: MethodDescriptor) -> Work:

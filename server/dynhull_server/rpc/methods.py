@@ -21,7 +21,7 @@ from ..state.errors import LimitExceededError
 from . import short_batches
 from .access import Access
 from .alarm_service import AlarmService
-from .calls import Call, Calls, Context, Received, Work
+from .calls import Call, Calls, Context, Received, UnaryHandler, Work
 from .fence_service import FenceService
 from .health import MAX_BYTES, Health
 from .hull_service import HullService
@@ -190,7 +190,9 @@ def _handlers(
             received = bytes
         elif method.input_type is hull_service_pb2.StreamRequest.DESCRIPTOR:
             received = short_batches.received(received)
-        handle = calls.handler(prefix + method.name, admit, works[method.name])
+        handle: Any = calls.handler(prefix + method.name, admit, works[method.name])
+        if not method.server_streaming:
+            handle = UnaryHandler(handle)
         handlers[method.name] = make(handle, request_deserializer=received)
     return grpc.method_handlers_generic_handler(service.full_name, handlers)
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import hashlib
+import inspect
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ from server_process import server_process
 from dynhull_client import HullClient
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.rpc.access import EVERYTHING, Access
+from dynhull_server.rpc.calls import UnaryHandler
 from dynhull_server.rpc.short_locates import MOST_KNOWN, MOST_POINTS, ShortLocates
 
 LOCATE = "/dynhull.v1.HullService/Locate"
@@ -202,3 +204,16 @@ def test_which_way() -> None:
             assert len(short) == known == MOST_POINTS
 
     asyncio.run(check())
+
+
+def test_grpc_need_not_ask_what_a_handler_is() -> None:
+    """Of each handler of one response it asks twice a call whether it is awaitable, and then more if it is not."""
+
+    async def handle(request: object, _: object) -> object:
+        return request
+
+    handler = UnaryHandler(handle)
+    assert inspect.isawaitable(handler)
+    assert asyncio.run(handler("request", None)) == "request"  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="has to be called"):
+        handler.__await__()
