@@ -62,6 +62,21 @@ def points_message(data: bytes) -> tuple[bytes, bool, int] | None:
 def acknowledged(sequence: int, revision: int, inserted: int, deleted: int, missing: int, hull_changed: bool, points: int) -> bytes:
     """The StreamResponse to a batch with this result."""
 
+class LastPlaces:
+    """Of each key the last place that batches of the journal give it."""
+
+    def __init__(self, kind: int) -> None: ...
+
+    def add(self, payloads: list[bytes], batches: list[int]) -> int:
+        """
+        Add payloads with so many batches each, up to the first that cannot be; the number of those that are.
+        """
+
+    def taken(self) -> tuple[int, int, bytes, bytes, bytes, bytes, bytes, bytes, bytes]:
+        """
+        The clock and the cause of the last batch; keys that are put, and removed, as lengths and text; and the points, times and deadlines of those that are put.
+        """
+
 def key_codes(lengths: bytes, data: bytes) -> bytes:
     """
     The number of each key, as int32: equal ones have the same, each that is new one more than those before.

@@ -30,10 +30,24 @@ class Numbers(Protocol):
         """Remove an integer, and return its value; KeyError if it is not there."""
 
 
+class LastPlaces(Protocol):
+    """Of each key the last place that batches of the journal give it."""
+
+    def add(self, payloads: list[bytes], batches: list[int]) -> int:
+        """Add payloads with so many batches each, up to the first that cannot be; the number of those that are."""
+
+    def taken(self) -> tuple[int, int, bytes, bytes, bytes, bytes, bytes, bytes, bytes]:
+        """The clock and the cause of the last batch, keys that are put, and keys that are removed.
+
+        Keys are their lengths and their text. After them are the points, times and deadlines of those that are put.
+        """
+
+
 class Native(Protocol):
     """The module `dynhull_server._native`. mypy compares it with the module's stub."""
 
     Numbers: "type[Any]"
+    LastPlaces: "type[Any]"
 
     def numbered(
         self,

@@ -2,6 +2,7 @@
 
 import dataclasses
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,15 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynhull.keys import PackedKeys
+from dynhull_server.compiled import native
 from dynhull_server.state.batch import Batch, KeyedBatch, Write
 from dynhull_server.state.errors import MisfitError, RefusedError
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import CommitStamp, HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.state.records import CommitStamp, HullRow, HullSettings, Kept, QuarantineRules, Window
 from dynhull_server.storage.of_keys import changes_of_keys
-from dynhull_server.storage.rows import batch_columns
+from dynhull_server.storage.rows import batch_columns, past_rows
 from dynhull_server.storage.rows.batch_columns import columns_of_rows
-from dynhull_server.storage.rows.encoding import encode
+from dynhull_server.storage.rows.encoding import STRINGS, encode
+from dynhull_server.storage.rows.past_rows import gathered_after
 from dynhull_server.storage.segments import gathered as gathering
 from dynhull_server.storage.segments.archive import Parts
 from dynhull_server.storage.segments.columns import Batches, columns_of
@@ -166,6 +169,54 @@ def test_rows_of_keys_that_are_wanted_say_the_same_of_these(kind, steps, wanted)
     assert np.unique(found.revision).tolist() == [each.revision for each in records]
     file = Parts(memoryview(to_parquet(columns_of(records, hull.identity), {})))
     same(changes_of_keys(keys_from_parquet(file, "a file", keys)[0], keys), expected)
+
+
+@pytest.mark.skipif(native is None, reason="C++ is not built")
+@pytest.mark.parametrize("kind", KINDS)
+@given(steps=STEPS, together=st.integers(1, 4), after=st.integers(0, 10), less=st.integers(0, 3))
+@settings(max_examples=15, deadline=None)
+def test_last_places_lead_to_the_same_state(kind, steps, together, after, less):
+    """From any revision to any other one, whatever the journal has in one row."""
+    hull = KINDS[kind]
+    records = lived(hull, steps)
+    until = max(len(records) - less, 0)
+    after = min(after, until)
+    rows = []
+    for first in range(0, len(records), together):
+        some = records[first : first + together]
+        for each in some:
+            each.committed = CommitStamp(first, 10 * first)
+        rows.append((some[0].revision, some[-1].revision, 0, encode(some), first, 10 * first))
+    of_hull = SimpleNamespace(
+        row=HullRow(1, "hull", "uid", 0.0, hull),
+        oldest=0,
+        last=len(records),
+        between=lambda after, until: [row for row in rows if row[1] > after and row[0] <= until],
+    )
+    one, other = (HullState(LIMITS, hull, Kept(records=records[:after]), 0.0) for _ in range(2))
+    for each in records[after:until]:
+        one.catch_up([each], 0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(past_rows, "batch_rows", lambda _, places: iter(places))
+        patch.setattr(past_rows, "whole_rows", lambda _, rows: rows)
+        patch.setattr(past_rows, "LEAST_BYTES", 1)
+        while after < until:
+            found = gathered_after(None, of_hull, after, until)
+            other.catch_up(found, 0.0)
+            after = found[-1].revision
+    same(seen(other), seen(one))
+
+
+@pytest.mark.skipif(native is None, reason="C++ is not built")
+def test_a_thousand_moves_of_a_few_keys_are_a_few_rows_in_c_too():
+    hull = KINDS["keyed"]
+    records = lived(hull, [("put", 1 << place % 8, place % 7, 0) for place in range(100)])
+    places = native.LastPlaces(STRINGS)
+    assert places.add([encode(records)], [100]) == 1
+    assert len(places.taken()[2]) == 8
+    assert places.add([encode(records)], [99]) == 0  # one of them is missing
+    assert places.add([encode(records)[:-1]], [100]) == 0
+    assert len(places.taken()[2]) == 8
 
 
 def test_a_payload_that_is_cut_anywhere_is_no_batch():

@@ -43,8 +43,9 @@ Place = Callable[[], AbstractContextManager[None]]
 OUTLINED_ROWS, OUTLINED_BYTES = 2**15, 2**20
 # Rebuilt hulls that are kept for further reads, and the batches that are always applied to one rather than begin anew.
 MOST_KEPT, NEAR = 4, 1024
-# Reads of batches while a stored state is built: to build one of a million keys takes about as long.
-AHEAD = 4
+# Reads of batches while a stored state is built, and the rows after which there is no further one: to build one of a
+# million keys takes about as long.
+AHEAD, AHEAD_ROWS = 4, 2**19
 
 
 @dataclass(slots=True, eq=False)
@@ -342,11 +343,11 @@ class PastHulls:
         def read() -> list[Record]:
             found: list[Record] = []
             after = kept.revision
-            for _ in range(AHEAD if after < revision else 0):
+            for _ in range(AHEAD):
+                if after >= revision or sum(len(each.rows) for each in found) >= AHEAD_ROWS:
+                    break
                 found += self._gathered(number, after, revision, erasures)
                 after = found[-1].revision
-                if after >= revision:
-                    break
             return found
 
         works = [self.ask(hull.name, build), self.ask(hull.name, read)]

@@ -18,7 +18,8 @@ namespace dynhull_server {
 static_assert(std::endian::native == std::endian::little);  // as the records are
 
 // What storage/rows/encoding.py writes.
-constexpr std::uint8_t HAS_TIMES = 2, HAS_DEADLINES = 4, HAS_CLOCK = 8, KINDS = 48, OF_POINTS = 0, OF_STRINGS = 16;
+constexpr std::uint8_t HAS_TIMES = 2, HAS_DEADLINES = 4, HAS_CLOCK = 8, KINDS = 48, OF_POINTS = 0, OF_STRINGS = 16,
+                       OF_INTEGERS = 32;
 constexpr std::uint8_t PLAIN_FLAGS = HAS_TIMES | HAS_DEADLINES | HAS_CLOCK | KINDS, MAY_SKIP = 2, HAS_CAUSE = 32;
 constexpr std::int64_t FOREVER = std::numeric_limits<std::int64_t>::max();
 // The places in OPS of storage/segments/columns.py: insert, delete, put, remove; and none.

@@ -10,6 +10,7 @@
 #include "batches.hpp"
 #include "encoding.hpp"
 #include "key_codes.hpp"
+#include "last_places.hpp"
 #include "messages.hpp"
 #include "numbering.hpp"
 #include "numbers.hpp"
@@ -347,6 +348,36 @@ nb::bytes acknowledged(std::uint64_t sequence, std::uint64_t revision, std::uint
   return nb::bytes(data.data(), data.size());
 }
 
+nb::bytes bytes(const std::string& text) { return nb::bytes(text.data(), text.size()); }
+
+LastPlaces* last_places(std::uint8_t kind) {
+  if (kind != OF_STRINGS && kind != OF_INTEGERS) throw nb::value_error("no kind of keys");
+  return new LastPlaces(kind);
+}
+
+// Adds the batches of payloads up to the first that cannot be added; the number of those that are.
+std::size_t add_batches(LastPlaces& places, const nb::list& payloads, const nb::list& expected) {
+  std::vector<View<char>> views;
+  std::vector<std::size_t> counts;
+  for (const nb::handle payload : payloads) views.emplace_back(payload);
+  for (const nb::handle count : expected) counts.push_back(nb::cast<std::size_t>(count));
+  if (views.size() != counts.size()) throw nb::value_error("as many payloads as numbers of batches");
+  const nb::gil_scoped_release release;
+  std::size_t added = 0;
+  while (added < views.size() && places.add(views[added].text(), counts[added])) ++added;
+  return added;
+}
+
+nb::tuple taken(const LastPlaces& places) {
+  const LastPlaces::Taken found = [&] {
+    const nb::gil_scoped_release release;
+    return places.taken();
+  }();
+  return nb::make_tuple(places.clock, places.cause, bytes(found.put.lengths), bytes(found.put.text),
+                        bytes(found.removed.lengths), bytes(found.removed.text), bytes(found.points),
+                        bytes(found.times), bytes(found.deadlines));
+}
+
 }  // namespace
 }  // namespace dynhull_server
 
@@ -401,6 +432,16 @@ NB_MODULE(_native, module) {
              "anything else, or none.");
   module.def("acknowledged", &dynhull_server::acknowledged, "sequence"_a, "revision"_a, "inserted"_a, "deleted"_a,
              "missing"_a, "hull_changed"_a, "points"_a, "The StreamResponse to a batch with this result.");
+  using dynhull_server::LastPlaces;
+  nb::class_<LastPlaces>(module, "LastPlaces", "Of each key the last place that batches of the journal give it.")
+      .def(nb::new_(&dynhull_server::last_places), "kind"_a)
+      .def("add", &dynhull_server::add_batches, "payloads"_a, "batches"_a,
+           nb::sig("def add(self, payloads: list[bytes], batches: list[int]) -> int"),
+           "Add payloads with so many batches each, up to the first that cannot be; the number of those that are.")
+      .def("taken", &dynhull_server::taken,
+           nb::sig("def taken(self) -> tuple[int, int, bytes, bytes, bytes, bytes, bytes, bytes, bytes]"),
+           "The clock and the cause of the last batch; keys that are put, and removed, as lengths and text; and the "
+           "points, times and deadlines of those that are put.");
   module.def(
       "key_codes", &dynhull_server::key_codes, "lengths"_a, "data"_a,
       nb::sig("def key_codes(lengths: bytes, data: bytes) -> bytes"),

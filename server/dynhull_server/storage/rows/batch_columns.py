@@ -67,7 +67,7 @@ def _plain(
         np.full(len(ops), ROWS, np.int8),
         ops,
         (ops != NONE) & (identity != "multiset"),
-        _keys(found[5], found[6], identity),
+        keys_of(found[5], found[6], identity),
         _column(found[7], np.float64).reshape(-1, 2),
         _column(found[8], np.int64),
         _column(found[9], np.int64),
@@ -83,7 +83,8 @@ def _words(keys: Keys) -> list[bytes]:
     return [int(key).to_bytes(8, "little") for key in keys]
 
 
-def _keys(lengths: bytes, data: bytes, identity: Identity) -> Keys:
+def keys_of(lengths: bytes, data: bytes, identity: Identity) -> Keys:
+    """Keys from C++, where those that are integers have no lengths."""
     return _column(data, np.uint64) if identity == "int" else PackedKeys(lengths, data)
 
 

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ...state.records import CommitStamp, Kept, Keys, Record
+from ...compiled import Native, native
+from ...state.records import NO_TIME, CommitStamp, HullSettings, Kept, KeyRows, Keys, Record
 from ..past import Moment, created
 from ..port import DamagedError
-from ..segments.columns import Batches, SegmentColumns, joined
+from ..segments.columns import CAUSES, NONE, Batches, SegmentColumns, joined
 from ..segments.gathered import gathered
-from .batch_columns import columns_of_rows
+from .batch_columns import KINDS, BatchRow, columns_of_rows, keys_of
 from .batch_rows import is_whole
 from .ledger import HullRows
 from .reading import as_damage, batch_rows, commit_of, newest_snapshot, whole_records, whole_rows
@@ -25,6 +26,8 @@ STEP_BYTES = 2**21
 WANTED_BYTES = 2**24
 # Those of one that gathers them.
 GATHERED_ROWS = 2**17
+# The bytes of payloads that C++ gathers in one, at most and at least.
+MOST_BYTES, LEAST_BYTES = 2**26, 2**16
 
 
 def oldest_moment(reader: Reader, hull: HullRows, *, timed: bool) -> Moment:
@@ -97,13 +100,72 @@ def batches_after(reader: Reader, hull: HullRows, after: int, until: int) -> lis
 
 
 def gathered_after(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:
-    """What the batches after a revision come to, as many as are read and applied in a tenth of a second."""
+    """What the batches after a revision come to, as many as are read and applied in some tenths of a second."""
     require_kept(hull, after)
     last = min(until, hull.last)
     if after >= last:
         return []
+    if native is not None and _last_places_count(hull.row.settings):
+        found = _last_places(native, reader, hull, after, last)
+        if found is not None:
+            return [found]
     columns = columns_between(reader, hull, after, last, GATHERED_ROWS)
     return list(gathered(Batches(columns), hull.row.settings, after, last))
+
+
+def _last_places_count(settings: HullSettings) -> bool:
+    """Whether of batches that put and remove keys the last place of each key is all that counts."""
+    recent = settings.window is not None and settings.window.max_points > 0  # who is among them depends on each batch
+    return settings.identity != "multiset" and not settings.by_event_time and not recent
+
+
+def _last_places(native: Native, reader: Reader, hull: HullRows, after: int, until: int) -> Record | None:
+    """What batches after a revision come to as one, without a column for each; None for `gathered` to do it.
+
+    Only whole rows of batches, none of which does more than put and remove.
+    """
+    places, end, size = native.LastPlaces(KINDS[hull.row.settings.identity]), after, 0
+    last: BatchRow = ()
+    with as_damage(hull):
+        for rows in _few_bytes(whole_rows(hull, batch_rows(reader, hull.between(after, until)))):
+            whole = _whole_between(rows, end, until)
+            added = places.add([row[3] for row in whole], [row[1] - row[0] + 1 for row in whole])
+            if added:
+                last = whole[added - 1]
+                end = last[1]
+            size += sum(len(row[3]) for row in whole[:added])
+            if added < len(rows) or size >= MOST_BYTES:
+                break
+    if end < until and size < LEAST_BYTES:
+        return None
+    clock, cause, *keys, points, times, deadlines = places.taken()
+    if not points:  # whether those that have left again had times is not known
+        return None
+    identity = hull.row.settings.identity
+    return Record(
+        end,
+        KeyRows(
+            keys_of(keys[0], keys[1], identity),
+            np.frombuffer(points).reshape(-1, 2),
+            keys_of(keys[2], keys[3], identity),
+            np.frombuffer(times, np.int64) if times else None,
+            np.frombuffer(deadlines, np.int64) if deadlines else None,
+        ),
+        clock=None if clock == NO_TIME else clock,
+        cause=None if cause == NONE else CAUSES[cause],
+        committed=None if None in last[4:] else CommitStamp(*last[4:]),
+    )
+
+
+def _whole_between(rows: list[BatchRow], after: int, until: int) -> list[BatchRow]:
+    """The rows that follow a revision without a gap, up to the first that has one after another revision."""
+    found: list[BatchRow] = []
+    for row in rows:
+        if row[0] != after + 1 or row[1] > until:
+            break
+        found.append(row)
+        after = row[1]
+    return found
 
 
 def columns_between(
