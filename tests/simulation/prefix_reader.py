@@ -115,16 +115,19 @@ class PrefixReader:
         return read.position
 
     def _part(self, prefix: str, read: _Read, part: ManyFeedPart) -> None:
-        for gap in part.gaps:
-            self._lost(read, gap)
+        for gap in part.gaps:  # each may be between batches of this part
+            self._require_lost(gap)
         for gone in part.gone:
             if not self._truth(prefix, gone).deleted:
                 raise self._model.finds(f"{gone} is said to be gone")
         for batch in part.batches:
             truth, record = self._truth(prefix, batch.hull), batch.record
-            after = read.at.get(batch.hull.uid, read.before(truth))
-            if batch.hull.uid in read.at or read.start.number == 0:
+            gaps = [gap for gap in part.gaps if gap.hull == batch.hull]
+            after = _passed(gaps, read.at.get(batch.hull.uid, read.before(truth)))
+            if batch.hull.uid in read.at or read.start.number == 0 or any(gap.first == 1 for gap in gaps):
                 follows = record.revision == after + 1
+            elif gaps:  # where it begins is not known exactly
+                follows = record.revision <= after + 1
             else:  # of the time of the start there may be more commits
                 known = record.revision == 1 or truth.past.times[record.revision - 1] <= read.start.time
                 follows = known and record.revision <= after + 1
@@ -136,6 +139,8 @@ class PrefixReader:
                 )
             self._past.fed(truth, record.revision, record)
             read.at[batch.hull.uid], read.number, read.more = record.revision, number, batch.more
+        for gap in part.gaps:
+            read.at[gap.hull.uid] = max(read.at.get(gap.hull.uid, 0), gap.last)
         if part.position:
             (read.position,) = decode_standings(part.position)
             if part.there is None:
@@ -147,11 +152,10 @@ class PrefixReader:
             raise self._model.finds(f"{hull} comes in the feed of {prefix}*, and is {truth.row}")
         return truth
 
-    def _lost(self, read: _Read, gap: Gap) -> None:
+    def _require_lost(self, gap: Gap) -> None:
         truth = self._model.truth_of_uid(gap.hull.uid)
         if truth.past.whole and not truth.deleted:
             raise self._model.finds(f"the past of {gap.hull} was to be kept for ever: {gap}")
-        read.at[gap.hull.uid] = gap.last
 
     def _complete(self, prefix: str, read: _Read) -> None:
         """Nothing is missing that was committed before the time of a position."""
@@ -160,3 +164,11 @@ class PrefixReader:
                 least = sum(time < read.position.time for time in truth.past.times[1:])
                 if max(read.at.get(truth.row.uid, 0), read.before(truth)) < least:
                     raise self._model.finds(f"of {name} comes {read.at}, and not all to {least}: {read.position}")
+
+
+def _passed(gaps: list[Gap], after: int) -> int:
+    """The last revision of the gap that follows a revision, and of those that follow that; else the same."""
+    for gap in sorted(gaps, key=lambda each: each.first):
+        if gap.first <= after + 1:
+            after = max(after, gap.last)
+    return after

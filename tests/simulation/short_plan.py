@@ -55,8 +55,9 @@ CUT_SHORT, OTHER_CLOCK, LOOKED_AT = 0.4, 0.3, 0.3
 SLOW_COMMITS, WITH_ERASURES = 0.15, 0.3
 
 # The share of the plans in which commits fail, files and steps of the past, and commits of consumers.
-COMMITS_FAIL, PAST_FAILS, CONSUMERS_FAIL = 0.25, 0.75, 0.5
+COMMITS_FAIL, PAST_FAILS, CONSUMERS_FAIL = 0.25, 0.75, 0.9
 COMMIT_FAULTS = ("full", "lost", "ghost", "memory", "ghost memory")
+OF_CONSUMERS = (*STEP_FAULTS, "lost", "ghost", "ghost memory")
 
 
 def random_short_plan(seed: int) -> Plan:
@@ -131,7 +132,7 @@ def _add_more(draw: random.Random, plan: Plan, names: tuple[str, ...]) -> None:
     if draw.random() < WITH_CONSUMERS:
         for life in lives:
             client = life["clients"][0]  # whose hull is there after its first request
-            for _ in range(draw.choice((2, 3, 4))):
+            for _ in range(draw.choice((3, 4, 6))):
                 client.insert(draw.randint(1, len(client)), consumes(draw, client[0]["name"]))
     held = [name for name in names if name in ("k", "kk", "l")]
     if held and draw.random() < WITH_QUARANTINE:
@@ -176,4 +177,4 @@ def _add_faults(draw: random.Random, plan: Plan) -> None:
         op["do"].startswith("consume") for life in plan["lives"] for client in life["clients"] for op in client
     )
     if consumed and draw.random() < CONSUMERS_FAIL:
-        faults.append({"at": "consumer", "nth": draw.randint(1, 6), "kind": draw.choice(STEP_FAULTS), "calls": 1})
+        faults.append({"at": "consumer", "nth": draw.randint(1, 6), "kind": draw.choice(OF_CONSUMERS), "calls": 1})
