@@ -93,7 +93,7 @@ def test_twelve_hulls_and_twelve_fences_in_three_tabs(
         tabs = [context.new_page() for _ in range(3)]
         streams: list[str] = []
         for tab in tabs:
-            tab.on("request", lambda request: is_stream(request) and streams.append(request.url))
+            tab.on("request", lambda request: streams.append(request.url) if is_stream(request) else None)
             tab.goto(f"{url}/dashboard/version")
             tab.evaluate(MAP, [f"{url}/dashboard", hulls, fences])
         for tab in tabs:
