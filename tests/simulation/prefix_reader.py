@@ -123,8 +123,9 @@ class PrefixReader:
         for batch in part.batches:
             truth, record = self._truth(prefix, batch.hull), batch.record
             gaps = [gap for gap in part.gaps if gap.hull == batch.hull]
-            after = _passed(gaps, read.at.get(batch.hull.uid, read.before(truth)))
-            if batch.hull.uid in read.at or read.start.number == 0 or any(gap.first == 1 for gap in gaps):
+            exactly = batch.hull.uid in read.at or read.start.number == 0 or any(gap.first == 1 for gap in gaps)
+            after = _passed(gaps, read.at.get(batch.hull.uid, 0 if exactly else read.before(truth)))
+            if exactly:
                 follows = record.revision == after + 1
             elif gaps:  # where it begins is not known exactly
                 follows = record.revision <= after + 1
