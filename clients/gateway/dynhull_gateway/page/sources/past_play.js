@@ -50,7 +50,7 @@ class PastHull extends HullState {
   }
   // Whether its past is kept, but cannot be read.
   get is_hole() {
-    return this.failure?.reason == "STORAGE_FAILED"
+    return ["PAST_DAMAGED", "STORAGE_FAILED"].includes(this.failure?.reason)
   }
   // Again where it ends: the hull may have moved on meanwhile, or a hole lies behind.
   async #run(signal) {
