@@ -162,6 +162,7 @@ REASONS: Mapping[str, Reason] = {
         Code.DATA_LOSS,
         "PastDamagedError",
         "A part of the past is missing or damaged; the message names its revisions.",
+        http=500,  # not of a gateway between: nobody is to repeat it
     ),
     "PERMISSION_DENIED": Reason(Code.PERMISSION_DENIED, "PermissionDeniedError", "The token does not allow the call."),
     "POINT_MISSING": Reason(

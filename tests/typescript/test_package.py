@@ -23,7 +23,7 @@ from peers import program, typescript
 from playwright.sync_api import Browser, Page, expect
 from ports import free_port
 from run_in import run
-from server_process import PATIENCE
+from server_process import PATIENCE, server_process
 
 from dynhull import DynamicHull
 from dynhull_client import HullClient, HullCopy, Snapshot
@@ -180,6 +180,21 @@ def test_what_is_aborted_ends_with_the_reason(way: str, server: MortalServer, ga
     """At whichever turn it is aborted; and no promise is left that rejects unseen."""
     url = gateway.url if way == "gateway" else f"grpc://{server.address}"
     assert node(str(HERE / "aborted.mjs"), url, f"typescript/aborted/{way}") == "[]\n"
+
+
+@pytest.mark.parametrize("way", ["gateway", "grpc"])
+def test_what_reads_a_damaged_past_ends_with_the_reason(way: str, tmp_path: Path) -> None:
+    """Who began anew at each end would do so for ever."""
+    with server_process("--data", str(tmp_path)) as server, HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="str", history=True)
+        client.put("fleet", ["a", "b"], [(0, 0), (1, 1)])
+        client.remove("fleet", ["b"])
+        client.erase_history("fleet", ["b"])  # which makes segments of what the journal has
+        for file in tmp_path.rglob("*.batches.parquet"):
+            file.unlink()
+        with gateway_process(server.address) as gateway:
+            url = gateway.url if way == "gateway" else f"grpc://{server.address}"
+            assert json.loads(node(str(HERE / "damaged.mjs"), url, "fleet")) == ["PAST_DAMAGED"] * 3
 
 
 @pytest.mark.parametrize("way", ["gateway", "grpc"])

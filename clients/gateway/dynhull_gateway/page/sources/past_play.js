@@ -64,7 +64,7 @@ class PastHull extends HullState {
         this.failure = error
       }
       this.ready = true
-      if (!this.clock.speed && !this.failure?.unknown) return
+      if (!this.clock.speed && !this.failure?.unknown && !this.is_hole) return
       await rest(RETRY, signal)
     }
   }
