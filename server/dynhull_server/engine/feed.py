@@ -117,6 +117,8 @@ class HullFeeds:
         """
         if not commit.number:
             return 0, False
+        # Before the oldest one: what is dropped meanwhile is not taken for what formats before 11 have written.
+        timed: Moment = await self._ask(hull, partial(self._past.oldest_moment, timed=True))
         found: Moment | None = await self._ask(hull, partial(_moment, self._past, commit.time))
         later = None if found is None else found.committed
         if found is not None and (later is None or later.number <= commit.number):
@@ -125,10 +127,15 @@ class HullFeeds:
         if found is not None and later is not None:  # some of the same time are later: the clock has been set back
             before: Moment | None = await self._ask(hull, partial(_moment, self._past, later.time - 1))
             least = oldest.revision if before is None else before.revision
-            sent = await self._last_of(hull, least, found.revision, commit.number)
+            try:
+                sent = await self._last_of(hull, least, found.revision, commit.number)
+            except NotStoredError:
+                oldest = await self.oldest(hull)
+                if oldest.revision <= least:
+                    raise
+                return oldest.revision, True
             if before is not None or sent > least:
                 return sent, False
-        timed: Moment = await self._ask(hull, partial(self._past.oldest_moment, timed=True))
         if timed.revision > oldest.revision:  # formats before 11 have written those before it
             return timed.revision - 1, False
         return oldest.revision, oldest.revision > 0
