@@ -120,14 +120,25 @@ def some_of_many(items: list[pytest.Item]) -> set[pytest.Item]:
     """The cases that `make long` adds to those of every run."""
     if os.environ.get("LONG_CASES") == "all":
         return set()
-    seen, left_out = Counter[tuple[Path, str]](), set()
+    tests: dict[tuple[Path, str], list[pytest.Function]] = {}
     for item in items:
-        if marker := item.get_closest_marker("every"):
-            test = item.path, item.name.partition("[")[0]
-            if seen[test] % marker.args[0]:
-                left_out.add(item)
-            seen[test] += 1
-    return left_out
+        if item.get_closest_marker("every") and isinstance(item, pytest.Function):
+            tests.setdefault((item.path, item.originalname), []).append(item)
+    return {item for cases in tests.values() for item in _left_out(cases)}
+
+
+def _left_out(cases: list[pytest.Function]) -> Iterator[pytest.Function]:
+    """All but every n-th case of a test, and those with the first of each value of a parameter that has few."""
+    marker = cases[0].get_closest_marker("every")
+    assert marker is not None
+    values = {value for case in cases for value in case.callspec.indices.items()}
+    many = Counter(parameter for parameter, _ in values)
+    missing = {(parameter, value) for parameter, value in values if many[parameter] * marker.args[0] <= len(cases)}
+    for number, case in enumerate(cases):
+        own = set(case.callspec.indices.items())
+        if number % marker.args[0] and not own & missing:
+            yield case
+        missing -= own
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
