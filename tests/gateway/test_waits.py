@@ -30,6 +30,14 @@ QUOTED = f"/hulls/names?min%5Frevision={LATER}"
 NAMED = {"keys": ["min_revision", "keys_min_revision"], "points": [[1, 1], [2, 2]]}
 
 
+REQUESTS = "dynhull_gateway_requests_total"
+
+
+def counted(address: str, metric: str, label: str) -> float:
+    """The sum of a metric where it has a label."""
+    return sum(each for name, each in scrape(address).items() if name.startswith(metric) and label in name)
+
+
 def ask(gateway: Gateway, method: str, path: str, body: object, headers: str = "") -> socket.socket:
     place = urlsplit(gateway.url)
     assert place.hostname is not None
@@ -51,11 +59,7 @@ def test_reads_end_with_their_callers() -> None:
         client.put("waits", ["a"], [(0, 0)])
 
         def ended() -> float:
-            return sum(
-                each
-                for name, each in scrape(metrics).items()
-                if name.startswith("dynhull_calls_total") and "CANCELLED" in name
-            )
+            return counted(metrics, "dynhull_calls_total", "CANCELLED")
 
         with ExitStack() as stack:
             for read in READS:
@@ -64,13 +68,7 @@ def test_reads_end_with_their_callers() -> None:
                 assert gateway.get("/hulls/waits").status == 200
             assert ended() == 0
         wait_until(lambda: ended() == len(READS))
-        figures = scrape(f"127.0.0.1:{port}")
-        unanswered = [
-            each
-            for name, each in figures.items()
-            if name.startswith("dynhull_gateway_requests_total") and 'status="0"' in name
-        ]
-        assert sum(unanswered) == len(READS)
+        assert counted(f"127.0.0.1:{port}", REQUESTS, 'status="0"') == len(READS)
 
 
 def test_a_write_is_made_whatever_its_keys_are_called() -> None:
@@ -85,8 +83,7 @@ def test_a_write_is_made_whatever_its_keys_are_called() -> None:
         assert gateway.get("/hulls/names").status == 200
 
         def answered(status: int) -> float:
-            found = scrape(f"127.0.0.1:{port}").items()
-            return sum(each for name, each in found if "requests_total" in name and f'status="{status}"' in name)
+            return counted(f"127.0.0.1:{port}", REQUESTS, f'status="{status}"')
 
         before = answered(200)
         server.process.send_signal(signal.SIGSTOP)

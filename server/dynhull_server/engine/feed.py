@@ -117,12 +117,12 @@ class HullFeeds:
         """
         if not commit.number:
             return 0, False
-        # Before the oldest one: what is dropped meanwhile is not taken for what formats before 11 have written.
-        timed: Moment = await self._ask(hull, partial(self._past.oldest_moment, timed=True))
         found: Moment | None = await self._ask(hull, partial(_moment, self._past, commit.time))
         later = None if found is None else found.committed
         if found is not None and (later is None or later.number <= commit.number):
             return found.revision, False
+        # Before the oldest one: what is dropped meanwhile is not taken for what formats before 11 have written.
+        timed: Moment = await self._ask(hull, partial(self._past.oldest_moment, timed=True))
         oldest = await self.oldest(hull)
         if found is not None and later is not None:  # some of the same time are later: the clock has been set back
             before: Moment | None = await self._ask(hull, partial(_moment, self._past, later.time - 1))

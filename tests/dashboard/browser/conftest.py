@@ -19,14 +19,15 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[tuple[Server, str]]:
-    """A server, and the address of its metrics."""
+    """A server, and the address of its metrics; empty for one that has none."""
     with measured() as running:
         yield running
 
 
 @pytest.fixture(scope="module")
 def url(server: tuple[Server, str]) -> Iterator[str]:
-    with dashboard_process(server[0].address, "--metrics", f"http://{server[1]}/metrics") as url:
+    metrics = ["--metrics", f"http://{server[1]}/metrics"] if server[1] else []
+    with dashboard_process(server[0].address, *metrics) as url:
         yield url
 
 

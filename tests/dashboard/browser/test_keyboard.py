@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from dashboard_process import dashboard_process, opened, wait_for_vertices
+from dashboard_process import opened, wait_for_vertices
 from playwright.sync_api import Browser, Page, expect
 from server_process import Server, server_process
 
@@ -32,12 +32,6 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, s
     """A server that keeps the past."""
     with server_process("--data", str(tmp_path_factory.mktemp("keyboard"))) as running:
         yield running, ""
-
-
-@pytest.fixture(scope="module")
-def url(server: tuple[Server, str]) -> Iterator[str]:
-    with dashboard_process(server[0].address) as url:
-        yield url
 
 
 @pytest.fixture

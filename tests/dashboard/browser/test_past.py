@@ -32,12 +32,6 @@ def server(folder: Path) -> Iterator[tuple[Server, str]]:
         yield running, ""
 
 
-@pytest.fixture(scope="module")
-def url(server: tuple[Server, str]) -> Iterator[str]:
-    with dashboard_process(server[0].address) as url:
-        yield url
-
-
 @pytest.fixture
 def fleet(client: HullClient, name: str) -> str:
     """A hull that has kept how its third vehicle went away."""
