@@ -23,7 +23,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs pages stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties long robustness robustness-cluster torture cluster upgrade ray kafka languages objects simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs pages stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties slow long robustness robustness-cluster torture cluster upgrade ray kafka languages objects simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -67,6 +67,9 @@ fuzz-reference: .venv/.test-core  ## every operation checked against a model; a 
 
 properties: .venv/.test  ## other and many more random examples for the tests of properties
 	$(BIN)/pytest $(WORKERS) -m hypothesis --hypothesis-profile properties --timeout 0 tests
+
+slow: .venv/.test .venv/.peers  ## what `make test` leaves to this word: short runs of the tortures and the fuzzers, faults that must be found, notebooks
+	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) SLOW_CASES=all $(BIN)/pytest $(WORKERS) -m only_with tests
 
 long: .venv/.test  ## all cases of the tests of which `make test` runs every third to seventh
 	LONG_CASES=all $(BIN)/pytest $(WORKERS) -m "every or only_with" tests
@@ -187,7 +190,7 @@ torture: .venv/.test .venv/.peers  ## FAULTS from SEED for each kind of server: 
 	$(BIN)/python tests/robustness/server/record.py
 
 cluster: .venv/.test  ## all tests of several processes and machines; `make test` runs the cheaper ones
-	CLUSTER_CASES=all $(BIN)/pytest tests/cluster tests/robustness/cluster -n 4
+	CLUSTER_CASES=all SLOW_CASES=all $(BIN)/pytest tests/cluster tests/robustness/cluster -n 4
 
 BASE ?= HEAD~
 CONTRACT = tests/client
@@ -223,7 +226,7 @@ languages: .venv/.test build/openapi/.tools  ## the programs in Go, Java and Rus
 kafka: .venv/.test build/kafka/.jars  ## an ingest from a real Kafka, and a relay to one that is killed, which Maven brings (Debian: maven, default-jre-headless)
 	KAFKA_CASES=all $(BIN)/pytest tests/bridges/test_kafka.py tests/bridges/test_kafka_target.py
 
-soak: fuzz fuzz-server fuzz-gateway properties long robustness robustness-cluster workers shards cluster ray objects ends simulate  ## all that takes too long for every run, for hours; `make test` has a short run of each
+soak: fuzz fuzz-server fuzz-gateway properties long robustness robustness-cluster workers shards cluster ray objects ends simulate  ## all that takes too long for every run, for hours; `make slow` has a short run of each
 	PYTHONPATH=tests $(BIN)/python -m simulation mutants
 	$(BIN)/python tests/mutants/named.py
 

@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
+from cases import slow
 from gateway_process import Events, Gateway, gateway_process
 from peers import missing
 from server_process import server_process
@@ -110,7 +111,7 @@ def test_every_example_of_the_description_works(gateway: Gateway) -> None:
     assert called > len(operations)
 
 
-@pytest.mark.long
+@slow
 def test_answers_are_as_described(gateway: Gateway, tmp_path: Path) -> None:
     described = gateway.get("/openapi.json").json
     for each in (*examples(described["paths"]["/hulls"]["post"]), {"name": "0"}):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from cases import slow
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs/notebooks").glob("*.ipynb"))
 RICHEST_FIRST = ("text/html", "image/svg+xml", "text/plain")
@@ -24,6 +25,7 @@ def results(notebook: nbformat.NotebookNode) -> Iterator[str]:
                 yield next(output.data[kind] for kind in RICHEST_FIRST if kind in output.data)
 
 
+@slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_gives_the_results_it_shows(path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from nbclient import NotebookClient  # each worker of the tests imports this file, and one runs it

@@ -3,7 +3,7 @@
 import subprocess
 from pathlib import Path
 
-import pytest
+from cases import slow
 
 HERE = Path(__file__).parent
 KEPT = (HERE / "seeds.txt").read_text().split()
@@ -13,7 +13,7 @@ FLAGS = ["-O0", "-ffp-contract=off", "-pthread", "-DDYNHULL_FAIL_ALLOCATIONS"]
 FLAGS += ["-DDYNHULL_LEAF=4", "-DDYNHULL_HASH_SEED=1", "-DDYNHULL_ROWS_A_THREAD=3"]
 
 
-@pytest.mark.long
+@slow
 def test_random_lives(fuzzer):
     """Kept seeds, then random ones."""
     program = fuzzer("fuzz_together.cpp", *FLAGS)

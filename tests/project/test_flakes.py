@@ -6,6 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from cases import slow
+
+pytestmark = slow
 
 METER = Path(__file__).parents[1] / "flakes.py"
 SUITE = {

@@ -1,6 +1,7 @@
 """A short run of the simulation, and that it finds faults of the protocol; `make robustness-cluster` runs far more."""
 
 import pytest
+from cases import slow
 from shards.mutants import MUTANTS, found, mutated
 from shards.simulation import World
 
@@ -33,6 +34,7 @@ def test_faults_can_be_put_in(name):
     mutated(name)
 
 
+@slow
 @pytest.mark.parametrize("name", sorted(QUICK))
 def test_a_fault_is_found(name):
     assert found(name, schedules=100) is not None

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cases import slow
 
 from simulation.mutate import PATCHES, fits, hunt
 from simulation.plan import random_plan
@@ -34,6 +35,7 @@ def test_what_was_found_stays_mended(file):
     assert outcome.finding is None, outcome.where
 
 
+@slow
 def test_a_plan_always_ends_the_same_way():
     command = [sys.executable, "-m", "simulation", "trace", "12"]  # two plans of each layer
     runs = [
@@ -57,6 +59,7 @@ def test_faults_can_be_put_back_in(patch):
     fits(patch)
 
 
+@slow
 @pytest.mark.parametrize("patch", [each for each in PATCHES if each.stem in QUICK], ids=lambda patch: patch.stem)
 def test_a_fault_put_back_in_is_found(patch):
     assert hunt(patch, lives=1000).lives is not None

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import slow
 from chromium import chromium
 from gateway_process import Gateway, gateway_process
 from mortal_server import MortalServer
@@ -66,6 +67,7 @@ def test_its_own_tests(gateway: Gateway, server: MortalServer) -> None:
     assert "\n# skipped 0\n" in said
 
 
+@slow
 def test_it_packs(tmp_path: Path) -> None:
     """What is packed and installed in an empty folder runs, and its types are those that a strict program needs."""
     pack = program("npm"), "pack", "--silent", "--offline", "--pack-destination", str(tmp_path)

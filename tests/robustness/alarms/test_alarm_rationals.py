@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from cases import slow
 
+
+@slow
 def test_every_alarm_is_decided_as_exact_integers_decide() -> None:
     command = [sys.executable, Path(__file__).with_name("alarm_rationals.py"), "--batches", "120"]
     run = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from cases import slow
 
+
+@slow
 def test_every_point_is_there_once() -> None:
     torture = Path(__file__).with_name("ingest_torture.py")
     command = [sys.executable, torture, "--kills", "2"]

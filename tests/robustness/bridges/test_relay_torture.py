@@ -4,10 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from cases import slow
 
 
-@pytest.mark.long
+@slow
 def test_every_event_arrives_whatever_goes_away() -> None:
     torture = Path(__file__).with_name("relay_torture.py")
     command = [sys.executable, torture, "--downs", "1", "--down", "1", "--kills", "2"]
@@ -16,7 +16,7 @@ def test_every_event_arrives_whatever_goes_away() -> None:
     assert "'times without the endpoint': 1" in run.stdout.splitlines()[-1]
 
 
-@pytest.mark.long
+@slow
 def test_there_is_one_raise_between_two_clears() -> None:
     torture = Path(__file__).with_name("alarm_torture.py")
     run = subprocess.run([sys.executable, torture, "--faults", "4"], capture_output=True, text=True, check=False)

@@ -7,10 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from cases import slow
 from postgresql import postgres_program
 
 
-@pytest.mark.long
+@slow
 @pytest.mark.skipif(os.geteuid() != 0, reason="PostgreSQL refuses to run as the root that a namespace makes of others")
 def test_no_promise_is_broken():
     postgres_program("postgres")  # else the test is skipped

@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from cases import slow
 
+
+@slow
 def test_every_event_follows_from_the_positions_and_none_is_missing() -> None:
     torture = Path(__file__).with_name("fence_torture.py")
     command = [sys.executable, torture, "--steps", "2500"]

@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from cases import slow
 
+
+@slow
 def test_every_event_is_there_once_after_kills() -> None:
     torture = Path(__file__).with_name("kill_torture.py")
     command = [sys.executable, torture, "--steps", "1500", "--kills", "2", "--worlds", "1"]

@@ -6,10 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from cases import slow
 
 
-@pytest.mark.long
+@slow
 def test_no_promise_is_broken():
     torture = Path(__file__).with_name("torture.py")
     command = [sys.executable, torture, "--breath", "0.2", "--faults", "10"]
