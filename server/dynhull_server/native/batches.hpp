@@ -28,7 +28,92 @@ constexpr std::int8_t NO_OP = -1, INSERT = 0, DELETE = 1, PUT = 2, REMOVE = 3;
 // Keys; integers as their eight bytes.
 using Wanted = std::unordered_set<std::string_view>;
 
-// Batches that say nothing but what they put and remove; others are left to Python, as is what is no batch.
+// One batch of a payload that says nothing but what it puts and removes; others are left to Python, as is what is no
+// batch. What it has lies in the payload.
+struct PlainBatch {
+  std::uint32_t puts, removes;  // or points that are inserted, and deleted
+  std::int64_t clock;
+  std::int8_t cause;                                                      // a place in CAUSES
+  std::string_view put_lengths, put_keys, removed_lengths, removed_keys;  // integers have no lengths
+  std::string_view points, deleted;
+  std::string_view times, deadlines;  // empty where no point has one
+
+  // Takes a batch from the beginning of `left`; false if it is none of these.
+  bool take(std::string_view& left, std::uint8_t kind) {
+    std::uint64_t sequence;
+    std::uint8_t name, further, flags;
+    std::string_view producer;
+    if (!value(left, puts) || !value(left, removes) || !value(left, sequence) || !value(left, name) ||
+        !value(left, further) || !value(left, flags))
+      return false;
+    if ((further & ~(MAY_SKIP | HAS_CAUSE)) || (flags & ~PLAIN_FLAGS) || (flags & KINDS) != kind) return false;
+    if (!bytes(left, name, producer)) return false;
+    clock = NO_TIME;
+    if ((flags & HAS_CLOCK) && !value(left, clock)) return false;
+    // As many bytes as there are: no room for more rows than these can have.
+    if (std::size_t(puts) + removes > left.size()) return false;
+    put_lengths = put_keys = removed_lengths = removed_keys = deleted = times = deadlines = {};
+    if (kind == OF_POINTS) {
+      if (!bytes(left, puts * POINT, points) || !bytes(left, removes * POINT, deleted)) return false;
+    } else if (!keys(left, kind, puts, put_lengths, put_keys) ||
+               !keys(left, kind, removes, removed_lengths, removed_keys) || !bytes(left, puts * POINT, points)) {
+      return false;
+    }
+    if ((flags & HAS_TIMES) && !column(left, NO_TIME, times)) return false;
+    if ((flags & HAS_DEADLINES) && !column(left, FOREVER, deadlines)) return false;
+    std::int8_t code = 0;
+    if ((further & HAS_CAUSE) && (!value(left, code) || code < 1 || code > MOST_CAUSES)) return false;
+    cause = static_cast<std::int8_t>(code - 1);
+    return true;
+  }
+
+  template <class Value>
+  static Value at(std::string_view values, std::size_t place) {
+    Value value;
+    std::memcpy(&value, values.data() + place * sizeof(Value), sizeof(Value));
+    return value;
+  }
+
+ private:
+  static constexpr std::size_t POINT = 2 * sizeof(double);
+  static constexpr std::int8_t MOST_CAUSES = 6;
+
+  static bool bytes(std::string_view& left, std::size_t size, std::string_view& taken) {
+    if (size > left.size()) return false;
+    taken = left.substr(0, size);
+    left.remove_prefix(size);
+    return true;
+  }
+
+  template <class Value>
+  static bool value(std::string_view& left, Value& value) {
+    std::string_view taken;
+    if (!bytes(left, sizeof(Value), taken)) return false;
+    value = at<Value>(taken, 0);
+    return true;
+  }
+
+  static bool keys(std::string_view& left, std::uint8_t kind, std::size_t count, std::string_view& lengths,
+                   std::string_view& text) {
+    std::size_t size = count * sizeof(std::uint64_t);
+    if (kind == OF_STRINGS) {
+      if (!bytes(left, count, lengths)) return false;
+      size = 0;
+      for (const char length : lengths) size += static_cast<std::uint8_t>(length);
+    }
+    return bytes(left, size, text);
+  }
+
+  // A column of times that has no time says that there is one: `detail` has that, and so Python reads it.
+  bool column(std::string_view& left, std::int64_t none, std::string_view& taken) const {
+    if (!bytes(left, puts * sizeof(std::int64_t), taken)) return false;
+    for (std::size_t row = 0; row < puts; ++row)
+      if (at<std::int64_t>(taken, row) != none) return true;
+    return false;
+  }
+};
+
+// Batches of payloads, one after the other, as columns.
 class PlainBatches {
  public:
   // Without `wanted` every key is.
@@ -69,72 +154,39 @@ class PlainBatches {
     lengths.resize(to.lengths), keys.resize(to.keys);
   }
 
-  bool take(std::size_t size, std::string_view& taken) {
-    if (size > left_.size()) return false;
-    taken = left_.substr(0, size);
-    left_.remove_prefix(size);
-    return true;
-  }
-
-  template <class Value>
-  bool take(Value& value) {
-    std::string_view taken;
-    if (!take(sizeof(Value), taken)) return false;
-    std::memcpy(&value, taken.data(), sizeof(Value));
-    return true;
-  }
-
   bool add_one() {
-    std::uint32_t added, removed;
-    std::uint64_t sequence;
-    std::uint8_t name, further, flags;
-    std::string_view producer;
-    if (!take(added) || !take(removed) || !take(sequence) || !take(name) || !take(further) || !take(flags))
-      return false;
-    if ((further & ~(MAY_SKIP | HAS_CAUSE)) || (flags & ~PLAIN_FLAGS) || (flags & KINDS) != kind_) return false;
-    if (!take(name, producer)) return false;
-    std::int64_t clock = NO_TIME;
-    if ((flags & HAS_CLOCK) && !take(clock)) return false;
-    // As many bytes as there are: no room for more rows than these can have.
-    const std::size_t all = std::size_t(added) + removed;
-    if (all > left_.size()) return false;
-    std::size_t puts = added, takes = removed;
+    PlainBatch batch;
+    if (!batch.take(left_, kind_)) return false;
+    std::size_t puts = batch.puts, removes = batch.removes;
     if (kind_ == OF_POINTS) {
-      if (!take_points(added) || !take_points(removed)) return false;
+      append<2>(batch.points, points);
+      append<2>(batch.deleted, points);
     } else {
-      if (!take_keys(puts, put_) || !take_keys(takes, taken_) || !take_points(added)) return false;
-      fill(points, 2 * takes, NOT_A_NUMBER);
+      take_keys(batch.put_lengths, batch.put_keys, puts, put_);
+      take_keys(batch.removed_lengths, batch.removed_keys, removes, removed_);
+      append<2>(batch.points, points);
+      fill(points, 2 * removes, NOT_A_NUMBER);
     }
-    if (!take_times(flags & HAS_TIMES, added, puts, takes, NO_TIME, times)) return false;
-    if (!take_times(flags & HAS_DEADLINES, added, puts, takes, FOREVER, deadlines)) return false;
-    std::int8_t cause = 0;
-    if ((further & HAS_CAUSE) && (!take(cause) || cause < 1 || cause > MOST_CAUSES)) return false;
+    add_times(batch.times, puts, removes, NO_TIME, times);
+    add_times(batch.deadlines, puts, removes, FOREVER, deadlines);
     fill(ops, puts, kind_ == OF_POINTS ? INSERT : PUT);
-    fill(ops, takes, kind_ == OF_POINTS ? DELETE : REMOVE);
-    if (puts + takes == 0) {  // a row that says so
+    fill(ops, removes, kind_ == OF_POINTS ? DELETE : REMOVE);
+    if (puts + removes == 0) {  // a row that says so
       ops.push_back(NO_OP), times.push_back(NO_TIME), deadlines.push_back(FOREVER);
       fill(points, 2, NOT_A_NUMBER);
     }
-    clocks.push_back(clock);
-    causes.push_back(static_cast<std::int8_t>(cause - 1));
-    rows.push_back(static_cast<std::int32_t>(puts + takes ? puts + takes : 1));
+    clocks.push_back(batch.clock);
+    causes.push_back(batch.cause);
+    rows.push_back(static_cast<std::int32_t>(puts + removes ? puts + removes : 1));
     return true;
   }
 
   // Sets `count` to that of the keys that are wanted, and `chosen` to their places, where not all are.
-  bool take_keys(std::size_t& count, std::vector<std::size_t>& chosen) {
-    std::string_view sizes, taken;
-    std::size_t size = count * sizeof(std::uint64_t);
-    if (kind_ == OF_STRINGS) {
-      if (!take(count, sizes)) return false;
-      size = 0;
-      for (const char length : sizes) size += static_cast<std::uint8_t>(length);
-    }
-    if (!take(size, taken)) return false;
+  void take_keys(std::string_view sizes, std::string_view taken, std::size_t& count, std::vector<std::size_t>& chosen) {
     if (!wanted_) {
       lengths += sizes;
       keys += taken;
-      return true;
+      return;
     }
     chosen.clear();
     for (std::size_t row = 0, at = 0; row < count; ++row) {
@@ -147,31 +199,12 @@ class PlainBatches {
       if (kind_ == OF_STRINGS) lengths += sizes[row];
     }
     count = chosen.size();
-    return true;
   }
 
-  bool take_points(std::size_t count) {
-    std::string_view taken;
-    if (!take(count * 2 * sizeof(double), taken)) return false;
-    append<2>(taken, points);
-    return true;
-  }
-
-  // A column of times that has no time says that there is one: `detail` has that, and so Python reads it.
-  bool take_times(bool there, std::size_t added, std::size_t puts, std::size_t takes, std::int64_t none,
-                  std::vector<std::int64_t>& column) {
-    if (!there) return fill(column, puts + takes, none), true;
-    std::string_view taken;
-    if (!take(added * sizeof(std::int64_t), taken)) return false;
-    bool some = false;
-    for (std::size_t row = 0; row < added && !some; ++row) {
-      std::int64_t time;
-      std::memcpy(&time, taken.data() + row * sizeof(time), sizeof(time));
-      some = time != none;
-    }
-    append<1>(taken, column);
-    fill(column, takes, none);
-    return some;
+  void add_times(std::string_view given, std::size_t puts, std::size_t removes, std::int64_t none,
+                 std::vector<std::int64_t>& column) {
+    given.empty() ? fill(column, puts, none) : append<1>(given, column);
+    fill(column, removes, none);
   }
 
   // Appends the values of the keys that are put, `Each` of one.
@@ -195,11 +228,10 @@ class PlainBatches {
   }
 
   static constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
-  static constexpr std::int8_t MOST_CAUSES = 6;
 
   std::uint8_t kind_;
   const Wanted* wanted_;
-  std::vector<std::size_t> put_, taken_;  // of one batch, the places of the keys that are wanted
+  std::vector<std::size_t> put_, removed_;  // of one batch, the places of the keys that are wanted
   std::string_view left_;
 };
 

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,30 +16,36 @@ namespace dynhull_server {
 
 class LastPlaces {
  public:
-  explicit LastPlaces(std::uint8_t kind) : kind_(kind), table_(16, NONE) {}
+  explicit LastPlaces(std::uint8_t kind) : kind_(kind), table_(16) {}
+  LastPlaces(const LastPlaces&) = delete;
 
   // Adds the batches of a payload that has `expected` ones, or nothing: if one is not plain, or if of all points that
   // are put some would have a time, or a deadline, and others none.
   bool add(std::string_view payload, std::size_t expected) {
-    PlainBatches batches(kind_);
-    if (!batches.add(payload) || batches.rows.size() != expected) return false;
+    moves_.clear(), texts_.clear();
+    PlainBatch batch;
     Said said = said_;
-    for (std::size_t row = 0; row < batches.ops.size(); ++row)
-      if (batches.ops[row] == PUT) said.add(batches.times[row], batches.deadlines[row]);
-    if (said.is_mixed()) return false;
-    said_ = said;
-    clock = batches.clocks.back();
-    cause = batches.causes.back();
-    look_up(batches);
-    std::size_t number = 0;
-    for (std::size_t row = 0; row < batches.ops.size(); ++row) {
-      if (batches.ops[row] == NO_OP) continue;
-      Row& last = row_of(found_[number].key, found_[number].hash);
-      ++number;
-      last.op = batches.ops[row];
-      last.x = batches.points[2 * row], last.y = batches.points[2 * row + 1];
-      last.time = batches.times[row], last.deadline = batches.deadlines[row];
+    std::size_t batches = 0;
+    for (; !payload.empty(); ++batches) {
+      if (!batch.take(payload, kind_)) return false;
+      std::size_t at = 0;
+      for (std::size_t row = 0; row < batch.puts; ++row) {
+        Move& move = moved(PUT, batch.put_lengths, batch.put_keys, row, at);
+        move.x = PlainBatch::at<double>(batch.points, 2 * row),
+        move.y = PlainBatch::at<double>(batch.points, 2 * row + 1);
+        if (!batch.times.empty()) move.time = PlainBatch::at<std::int64_t>(batch.times, row);
+        if (!batch.deadlines.empty()) move.deadline = PlainBatch::at<std::int64_t>(batch.deadlines, row);
+        said.add(move.time, move.deadline);
+      }
+      at = 0;
+      for (std::size_t row = 0; row < batch.removes; ++row)
+        moved(REMOVE, batch.removed_lengths, batch.removed_keys, row, at);
     }
+    if (batches != expected || batches == 0 || said.is_mixed()) return false;
+    said_ = said;
+    clock = batch.clock;
+    cause = batch.cause;
+    apply();
     return true;
   }
 
@@ -52,14 +60,15 @@ class LastPlaces {
 
   Taken taken() const {
     Taken taken;
-    for (const Row& row : rows_) {
-      Keys& keys = row.op == PUT ? taken.put : taken.removed;
+    for (std::size_t number = 0; number < count_; ++number) {
+      const Row& row = row_at(number);
+      Keys& keys = row.last.op == PUT ? taken.put : taken.removed;
       if (kind_ == OF_STRINGS) keys.lengths += static_cast<char>(row.length);
       keys.text += key_of(row);
-      if (row.op != PUT) continue;
-      taken.points.push_back(row.x), taken.points.push_back(row.y);
-      if (said_.dated) taken.times.push_back(row.time);
-      if (said_.ending) taken.deadlines.push_back(row.deadline);
+      if (row.last.op != PUT) continue;
+      taken.points.push_back(row.last.x), taken.points.push_back(row.last.y);
+      if (said_.dated) taken.times.push_back(row.last.time);
+      if (said_.ending) taken.deadlines.push_back(row.last.deadline);
     }
     return taken;
   }
@@ -68,13 +77,24 @@ class LastPlaces {
   std::int8_t cause = -1;
 
  private:
+  struct Move {
+    double x = 0, y = 0;
+    std::int64_t time = NO_TIME, deadline = FOREVER;
+    std::uint32_t hash = 0;
+    std::int8_t op = NO_OP;
+  };
+  // Short keys lie in their row, where they are compared without another wait for memory.
+  static constexpr std::size_t SHORT = 20;
   struct Row {
-    std::size_t start;
-    std::size_t hash;
+    Move last;
     std::uint8_t length;
-    std::int8_t op;
-    double x, y;
-    std::int64_t time, deadline;
+    union {
+      char key[SHORT];
+      std::size_t start;  // of a longer one, in `text_`
+    };
+  };
+  struct Entry {
+    std::uint32_t hash, row = NONE;
   };
   // What points say that are put.
   struct Said {
@@ -87,68 +107,90 @@ class LastPlaces {
     bool is_mixed() const { return (dated && undated) || (ending && endless); }
   };
   static constexpr std::uint32_t NONE = 0xffffffff;
+  static constexpr std::size_t CHUNK = 4096;  // rows, which stay where they are
 
-  // Finds the keys of batches, and fetches what `row_of` needs of them: the waits for memory overlap.
-  void look_up(const PlainBatches& batches) {
-    found_.clear();
-    const std::string_view text = batches.keys;
-    for (std::size_t at = 0; at < text.size();) {
-      const std::size_t length =
-          kind_ == OF_STRINGS ? static_cast<std::uint8_t>(batches.lengths[found_.size()]) : sizeof(std::uint64_t);
-      const std::string_view key = text.substr(at, length);
-      found_.push_back({key, std::hash<std::string_view>{}(key)});
-      at += length;
-      fetch(&table_[found_.back().hash & (table_.size() - 1)]);
-    }
-    for (const Found& each : found_)
-      if (const std::uint32_t row = first(each.hash); row != NONE) fetch(&rows_[row]);
-    for (const Found& each : found_)
-      if (const std::uint32_t row = first(each.hash); row != NONE) fetch(text_.data() + rows_[row].start);
+  // The next row of a batch, whose key begins at `at`.
+  Move& moved(std::int8_t op, std::string_view lengths, std::string_view text, std::size_t row, std::size_t& at) {
+    const std::size_t length = kind_ == OF_STRINGS ? static_cast<std::uint8_t>(lengths[row]) : sizeof(std::uint64_t);
+    const std::string_view key = text.substr(at, length);
+    at += length;
+    const std::size_t hash = std::hash<std::string_view>{}(key);
+    texts_.push_back(key);
+    Move& move = moves_.emplace_back();
+    move.hash = static_cast<std::uint32_t>(hash ^ hash >> 32);
+    move.op = op;
+    return move;
   }
-  std::uint32_t first(std::size_t hash) const { return table_[hash & (table_.size() - 1)]; }
+
+  // Each of the moves, in order, is the last one of its key. What some of them need is fetched before: the waits for
+  // memory overlap.
+  void apply() {
+    for (std::size_t from = 0; from < moves_.size(); from += TOGETHER) {
+      const std::size_t to = std::min(from + TOGETHER, moves_.size());
+      for (std::size_t i = from; i < to; ++i) fetch(&table_[moves_[i].hash & (table_.size() - 1)]);
+      for (std::size_t i = from; i < to; ++i)
+        if (const Entry& entry = table_[moves_[i].hash & (table_.size() - 1)]; entry.row != NONE)
+          fetch(&row_at(entry.row));
+      for (std::size_t i = from; i < to; ++i) row_of(texts_[i], moves_[i].hash).last = moves_[i];
+    }
+  }
+  static constexpr std::size_t TOGETHER = 32;
+
   static void fetch([[maybe_unused]] const void* address) {
 #ifdef __GNUC__
     __builtin_prefetch(address);
+    __builtin_prefetch(static_cast<const char*>(address) + sizeof(Row) - 1);
 #endif
   }
 
-  std::string_view key_of(const Row& row) const { return std::string_view(text_).substr(row.start, row.length); }
+  const Row& row_at(std::size_t number) const { return chunks_[number / CHUNK][number % CHUNK]; }
+  Row& row_at(std::size_t number) { return chunks_[number / CHUNK][number % CHUNK]; }
+
+  std::string_view key_of(const Row& row) const {
+    return {row.length <= SHORT ? row.key : text_.data() + row.start, row.length};
+  }
 
   // The row of a key: open to the next place where one is taken, at most half of them.
-  Row& row_of(std::string_view key, std::size_t hash) {
+  Row& row_of(std::string_view key, std::uint32_t hash) {
     std::size_t at = hash & (table_.size() - 1);
-    for (; table_[at] != NONE; at = (at + 1) & (table_.size() - 1)) {
-      Row& row = rows_[table_[at]];
-      if (row.hash == hash && key_of(row) == key) return row;
+    for (; table_[at].row != NONE; at = (at + 1) & (table_.size() - 1)) {
+      if (table_[at].hash != hash) continue;
+      Row& row = row_at(table_[at].row);
+      if (key_of(row) == key) return row;
     }
-    table_[at] = static_cast<std::uint32_t>(rows_.size());
-    rows_.push_back({text_.size(), hash, static_cast<std::uint8_t>(key.size()), NO_OP, 0, 0, NO_TIME, FOREVER});
-    text_ += key;
-    if (2 * rows_.size() > table_.size()) grow();
-    return rows_.back();
+    if (count_ % CHUNK == 0) chunks_.push_back(std::make_unique_for_overwrite<Row[]>(CHUNK));
+    table_[at] = {hash, static_cast<std::uint32_t>(count_)};
+    Row& row = row_at(count_++);
+    row.length = static_cast<std::uint8_t>(key.size());
+    if (key.size() <= SHORT) {
+      std::memcpy(row.key, key.data(), key.size());
+    } else {
+      row.start = text_.size();
+      text_ += key;
+    }
+    if (2 * count_ > table_.size()) grow();
+    return row;
   }
 
   void grow() {
-    std::vector<std::uint32_t> larger(2 * table_.size(), NONE);
-    for (std::size_t row = 0; row < rows_.size(); ++row) {
-      std::size_t at = rows_[row].hash & (larger.size() - 1);
-      while (larger[at] != NONE) at = (at + 1) & (larger.size() - 1);
-      larger[at] = static_cast<std::uint32_t>(row);
+    std::vector<Entry> larger(2 * table_.size());
+    for (const Entry& entry : table_) {
+      if (entry.row == NONE) continue;
+      std::size_t at = entry.hash & (larger.size() - 1);
+      while (larger[at].row != NONE) at = (at + 1) & (larger.size() - 1);
+      larger[at] = entry;
     }
     table_.swap(larger);
   }
 
-  struct Found {
-    std::string_view key;
-    std::size_t hash;
-  };
-
   std::uint8_t kind_;
   Said said_;
-  std::vector<Found> found_;  // the keys of one payload
-  std::vector<std::uint32_t> table_;
-  std::vector<Row> rows_;
-  std::string text_;  // the keys
+  std::vector<Move> moves_;  // those of one payload, and their keys
+  std::vector<std::string_view> texts_;
+  std::vector<Entry> table_;
+  std::vector<std::unique_ptr<Row[]>> chunks_;
+  std::size_t count_ = 0;
+  std::string text_;  // longer keys
 };
 
 }  // namespace dynhull_server
