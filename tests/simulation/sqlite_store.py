@@ -181,12 +181,24 @@ class SQLiteLives(FaultyStorage):
     def _landed(self) -> None:
         changes, now = self._pending
         self._model.landed(changes, now)
-        for step in changes:
-            hull = self._hulls().get(step.number) if isinstance(step, RetireSegment) else None
-            if hull is None or step.segment not in hull.segments:
+        steps = [each for each in changes if isinstance(each, SetHistory | RetireSegment)]
+        hulls = {number: hull.copy() for number, hull in self._hulls().items()} if steps else {}
+        for step in steps:
+            hull = hulls.get(step.number)
+            if hull is None:
                 continue
-            if not may_go(self._hulls().values(), hull, step.segment, now, self._most_bytes):
+            if isinstance(step, SetHistory):
+                kept = replace(hull.row.settings, history=step.max_age, history_bytes=step.max_bytes)
+                hull.change(replace(hull.row, settings=kept), 0)
+            elif self._has_gone(step) and not may_go(hulls.values(), hull, step.segment, now, self._most_bytes):
                 raise self._model.finds(f"a segment of {hull.row.name} goes, and should stay: {step.segment}")
+
+    def _has_gone(self, step: RetireSegment) -> bool:
+        """Whether a segment was there before the last commit, and is not any more."""
+        if step.segment not in self._hulls()[step.number].segments:
+            return False
+        rows = self._disk.written("SELECT 1 FROM segments WHERE id = ? AND hull = ?", step.segment.id, step.number)
+        return not rows
 
     def _hulls(self) -> dict[int, HullRows]:
         assert isinstance(self._inner, SQLiteStorage)
@@ -242,6 +254,11 @@ class _FaultyDisk(Disk):
         self.kill = kill
         self.writing: sqlite3.Connection | None = None
         self._opened: list[Any] = []
+
+    def written(self, sql: str, *values: Any) -> list[tuple[Any, ...]]:
+        """What who writes sees."""
+        assert self.writing is not None
+        return self.writing.execute(sql, values).fetchall()
 
     def lock(self, file: Path) -> IO[str] | None:
         lock = super().lock(file)

@@ -185,6 +185,44 @@ def test_what_is_too_old_or_too_much_goes_as_a_whole(tmp_path, limit):
     fleet.storage.close()
 
 
+@pytest.mark.parametrize("together", [False, True])
+def test_what_is_to_be_kept_again_stays_although_its_removal_has_begun(fleet, together):
+    """The settings change between two steps, or while a step waits for its commit."""
+    fleet.fill()
+    fleet.storage.commit([fleet.storage.set_history(1, 0, 0)])
+    steps = fleet.storage.file_history(fleet.time)
+    longer = fleet.storage.set_history(1, FOREVER, 0)
+    fleet.storage.commit([next(steps)], fleet.time)  # it removes the first one
+    first = fleet.storage.oldest_moment(1).revision
+    assert first > 0
+    if together:
+        fleet.storage.commit([longer, next(steps)], fleet.time)
+    else:
+        fleet.storage.commit([longer], fleet.time)
+    fleet.carry_out(steps)
+    fleet.file()
+    assert fleet.storage.oldest_moment(1).revision == first
+    same(read_back(fleet.storage, len(fleet.records)), fleet.records[first:])
+
+
+def test_nothing_goes_to_make_room_that_a_deleted_hull_has_left(tmp_path):
+    fleet = Fleet(tmp_path)
+    fleet.storage.commit([Create(HullRow(2, "other", "9876", 12.5, fleet.settings))], fleet.time)
+    for last in (0, 2, 4):
+        fleet.put(4)
+        fleet.snapshot()
+        fleet.storage.commit([Append(2, [move(last + 1), move(last + 2)])], fleet.time)
+        fleet.carry_out(fleet.storage.snapshot(2, Kept(last + 2, Contents(np.empty((0, 2)), PackedKeys.pack([])))))
+    fleet.fill()
+    fleet.archive.most_bytes = fleet.storage.history(1).bytes
+    steps = fleet.storage.file_history(fleet.time)
+    next(steps)  # something of one of them is to go
+    fleet.storage.commit([Delete(2)], fleet.time)
+    fleet.carry_out(steps)
+    same(read_back(fleet.storage, len(fleet.records)), fleet.records)
+    fleet.storage.close()
+
+
 class Watched(Archive):
     """An archive that calls a function before and after each thing that it does."""
 

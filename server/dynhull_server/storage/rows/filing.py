@@ -131,16 +131,21 @@ def past_erasures(hull: HullRows) -> list[StoredErasure]:
     return [each for each in hull.erasures if each.erasure.last < oldest]
 
 
+def excess(hulls: Mapping[int, HullRows], most_bytes: int) -> int:
+    """By how many bytes the segments of all hulls are more than they may be; 0 or less if they are not."""
+    return sum(segment.size for hull in hulls.values() for segment in hull.segments) - most_bytes
+
+
 def oldest_of_all(hulls: Mapping[int, HullRows], most_bytes: int) -> Iterator[tuple[int, StoredSegment]]:
     """The oldest segments of all hulls, so many that the others have at most so many bytes."""
-    excess = sum(segment.size for hull in hulls.values() for segment in hull.segments) - most_bytes
-    left = {number: hull.copy() for number, hull in hulls.items() if hull.segments} if excess > 0 else {}
-    while excess > 0 and left:
+    more = excess(hulls, most_bytes)
+    left = {number: hull.copy() for number, hull in hulls.items() if hull.segments} if more > 0 else {}
+    while more > 0 and left:
         number = min(left, key=lambda each: left[each].segments[0].facts.last_time)
         hull = left[number]
         for segment in hull.segments[: run_from_start(hull, 1)]:
             yield number, segment
-            excess -= segment.size
+            more -= segment.size
             hull.segments.remove(segment)
         if not hull.segments:
             del left[number]

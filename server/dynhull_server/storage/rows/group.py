@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...state.changes import Change
 from ...state.feed_consumers import ConsumerId, DropFeedConsumer, FeedConsumer, PutFeedConsumer
-from ...state.records import Append, CommitStamp, Create, Delete, HullRow
+from ...state.records import Append, CommitStamp, Create, Delete, HullRow, HullSettings
 from ..port import NotCommittedError
 from .batch_rows import batch_checksum
 from .encoding import checksum, encode, weight
@@ -68,7 +68,7 @@ class DropBatches:
 
 @dataclass(frozen=True, slots=True)
 class SetHistory:
-    """Step: how much of the past of a hull is kept from now on. Only one in a group."""
+    """Step: how much of the past of a hull is kept from now on."""
 
     number: int
     max_age: int
@@ -93,10 +93,14 @@ class CloseSegment:
 
 @dataclass(frozen=True, slots=True)
 class RetireSegment:
-    """Step: nobody reads a segment from now on; its files are to be removed."""
+    """Step: nobody reads a segment from now on; its files are to be removed.
+
+    With `settings`, only while the hull has these: when they are changed, it may be to keep the segment.
+    """
 
     number: int
     segment: StoredSegment
+    settings: HullSettings | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +261,7 @@ class Group:
         """A hull after the changes so far, None if it does not exist."""
         now = self._now.get(number)
         if now is None and (rows := self._ledger.hulls.get(number)):
-            now = self._now[number] = _Now(rows, len(rows.ids), rows.sum, rows.last)
+            now = self._now[number] = _Now(rows, rows.row, len(rows.ids), rows.sum, rows.last)
         return None if now is None or now.deleted else now
 
     def _create(self, row: HullRow) -> None:
@@ -265,7 +269,7 @@ class Group:
             raise NotCommittedError(f"hull {row.number} already exists")
         *columns, stored = values(row)
         rows = HullRows(row, stored)
-        self._now[row.number] = _Now(rows, 0, stored, 0)
+        self._now[row.number] = _Now(rows, row, 0, stored, 0)
         next_number = max(self.totals.next_number, row.number + 1)
         self.totals = self.totals.plus(1, 0, stored)._replace(next_number=next_number)
         self.statements.append(Insert("hulls", (*columns, stored)))
@@ -276,7 +280,8 @@ class Group:
         if now is None:
             raise NotCommittedError(f"there is no hull {row.number}")
         *columns, stored = values(row)
-        more = stored - values(now.rows.row)[-1]
+        more = stored - values(now.row)[-1]
+        now.row = row
         now.sum += more
         self.totals = self.totals.plus(0, 0, more)
         self.statements += [Remove("hulls", (row.number,)), Insert("hulls", (*columns, stored))]
@@ -348,7 +353,7 @@ class Group:
         now = self._hull(step.number)
         if now is None:  # deleted meanwhile
             return
-        row = now.rows.row
+        row = now.row
         self._change(replace(row, settings=replace(row.settings, history=step.max_age, history_bytes=step.max_bytes)))
 
     def _close_segment(self, step: CloseSegment) -> None:
@@ -366,7 +371,7 @@ class Group:
 
     def _retire_segment(self, step: RetireSegment) -> None:
         now, segment = self._hull(step.number), step.segment
-        if now is None or segment not in now.rows.segments:
+        if now is None or segment not in now.rows.segments or step.settings not in (None, now.row.settings):
             return
         self._replace_segment(unused_values(segment.id, segment.file))
         self._weigh(now, -segment_weight(segment_values(segment, step.number)))
@@ -477,13 +482,14 @@ class Group:
 
 @dataclass(slots=True)
 class _Now:
-    """A hull after a part of the changes; `rows` is its present state in the ledger.
+    """A hull after a part of the changes; `rows` is its present state in the ledger, and `row` its row.
 
     `gone` are the snapshots that were dropped, and `trimmed` is whether batches were: who trims a hull after a snapshot
     and who does so after a segment may come to the same rows in one group.
     """
 
     rows: HullRows
+    row: HullRow
     batches: int
     sum: int
     last: int

@@ -32,7 +32,7 @@ from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
 from .filed import Filed, holes
-from .filing import oldest_of_all, outdated, past_erasures, read_due
+from .filing import excess, oldest_of_all, outdated, past_erasures, read_due
 from .group import (
     Chunk,
     CloseSegment,
@@ -439,6 +439,10 @@ class RowStorage(ABC):
             with self._visible:
                 gone = list(oldest_of_all(self._settled().hulls, archive.most_bytes))
             for number, segment in gone:
+                with self._visible:
+                    enough = excess(self._settled().hulls, archive.most_bytes) <= 0
+                if enough and segment.begins:  # hulls were deleted meanwhile
+                    break
                 log.warning(
                     "the past of all hulls is more than --max-history-bytes: the oldest goes",
                     extra={"hull": number, "first": segment.first, "last": segment.last, "bytes": segment.size},
@@ -455,8 +459,9 @@ class RowStorage(ABC):
         while (hull := self._ledger.hulls.get(number)) and hull.due > hull.filed:
             yield from self._close_segment(number, archive)
         yield from self._trim(number)
+        settings = hull.row.settings if hull else None
         for segment in outdated(hull, now, archive) if hull else ():
-            yield RetireSegment(number, segment)
+            yield RetireSegment(number, segment, settings)
         for stored in past_erasures(hull) if hull else ():
             yield DropErasure(number, stored)
 
