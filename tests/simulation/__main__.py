@@ -17,7 +17,7 @@ LAYERS = "core", "shell", "sqlite", "past", "cluster", "links"
 FINDINGS = Path(__file__).parent / "findings"
 
 # Plans from one collection of garbage to the next, and seconds from one line of progress to the next.
-COLLECT, REPORT = 500, 300.0
+COLLECT, REPORT = 500, 60.0
 # A run draws its plans' seeds from here on: room for any number of plans.
 ROOM = 10**9
 

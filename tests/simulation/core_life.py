@@ -89,7 +89,7 @@ from .fence_model import PREFIX, FenceTruth
 from .globe import points
 from .model import SKIPS, Model, Truth
 from .quarantine_model import waiting_of
-from .schedule import Schedule
+from .schedule import LONGEST, Schedule
 
 DAY = 90_000.0
 MICROSECOND = 1e-6
@@ -511,8 +511,9 @@ class CoreServer:
                 condition = probe.send(None)
             except StopIteration:
                 return
+            bound = self.schedule.turns + LONGEST
             while not condition():
-                if not self.schedule.turn():
+                if not self.schedule.turn() or self.schedule.turns > bound:
                     raise self.model.finds("a probe waits for ever")
 
     def check(self) -> None:

@@ -15,6 +15,7 @@ from .clients import Client, probe, probe_fence
 from .cluster_life import World
 from .cluster_plan import Plan
 from .core_life import CoreServer
+from .limit import SECONDS, EndlessError, bounded
 from .link_life import LinkedServer
 from .model import Finding, Model
 from .past_plan import small_segments
@@ -44,27 +45,27 @@ class Outcome:
         return "".join(letter for letter in self.finding or "" if not letter.isdigit())[:40]
 
 
-def play(plan: Plan) -> Outcome:
-    """Play a plan to its end, or to the first broken promise. Nothing is logged."""
+def play(plan: Plan, seconds: float = SECONDS) -> Outcome:
+    """Play a plan to its end, to the first broken promise, or for so much processor time. Nothing is logged."""
     logs = [logging.getLogger(each.__name__) for each in (dynhull_server, dynhull_cluster)]
     levels = [log.level for log in logs]
     for log in logs:
         log.setLevel(logging.CRITICAL + 1)
     try:
-        return _play(plan)
+        return _play(plan, seconds)
     finally:
         for log, level in zip(logs, levels, strict=True):
             log.setLevel(level)
 
 
-def _play(plan: Plan) -> Outcome:
+def _play(plan: Plan, seconds: float) -> Outcome:
     if plan["layer"] == "cluster":
-        return _play_cluster(plan)
+        return _play_cluster(plan, seconds)
     with small_segments(plan.get("segment_rows")):
-        return _play_lives(plan)
+        return _play_lives(plan, seconds)
 
 
-def _play_lives(plan: Plan) -> Outcome:
+def _play_lives(plan: Plan, seconds: float) -> Outcome:
     limits = Limits(**plan["limits"], fences=FenceLimits(**plan.get("fences", {})))
     model, schedule = Model(limits), Schedule(plan["seed"])
     model.immediate = plan["storage"] == "immediate"
@@ -75,13 +76,14 @@ def _play_lives(plan: Plan) -> Outcome:
     where = ""
     try:
         clients: list[Client] = []
-        for life in plan["lives"]:
-            lives += 1
-            clients = _live(plan["layer"], life, limits, model, schedule, storage, clients)
-        _live(plan["layer"], {"clients": [], "end": "kill"}, limits, model, schedule, storage, [])
+        with bounded(seconds):
+            for life in plan["lives"]:
+                lives += 1
+                clients = _live(plan["layer"], life, limits, model, schedule, storage, clients)
+            _live(plan["layer"], {"clients": [], "end": "kill"}, limits, model, schedule, storage, [])
     except Finding:
         where = traceback.format_exc()
-    except Exception as error:  # the server's own code has failed
+    except (Exception, EndlessError) as error:  # the server's own code has failed
         model.finds(f"{type(error).__name__}: {error}")
         where = traceback.format_exc()
     finally:
@@ -89,15 +91,16 @@ def _play_lives(plan: Plan) -> Outcome:
     return Outcome(lives, schedule.trace, model.finding, where)
 
 
-def _play_cluster(plan: Plan) -> Outcome:
+def _play_cluster(plan: Plan, seconds: float) -> Outcome:
     model, schedule = Model(Limits(**plan["limits"])), Schedule(plan["seed"])
     where = ""
     try:
-        World(plan, model, schedule).play()
+        with bounded(seconds):
+            World(plan, model, schedule).play()
     except Finding as finding:
         model.finds(str(finding))
         where = traceback.format_exc()
-    except Exception as error:  # the server's own code has failed
+    except (Exception, EndlessError) as error:  # the server's own code has failed
         model.finds(f"{type(error).__name__}: {error}")
         where = traceback.format_exc()
     return Outcome(1, schedule.trace, model.finding, where)

@@ -43,6 +43,8 @@ from .store import FaultyStorage, KilledError
 FOREVER = 600.0
 # Turns, too: time may pass much faster than threads get on.
 MANY_TURNS = 20_000
+# Turns after which a wait is given up whatever the time is: somebody goes on without a pause.
+ENDLESS = 10 * MANY_TURNS
 
 SNAPSHOT_POINTS = 2
 SYNC_SECONDS = 0.5
@@ -117,10 +119,13 @@ class ShellServer:
         task.result()
 
     def _until(self, done: Callable[[], object], name: str) -> None:
-        deadline, bound = self.loop.now + FOREVER, self.schedule.turns + MANY_TURNS
+        deadline, begun = self.loop.now + FOREVER, self.schedule.turns
         while not done():
-            if not self.turn() or (self.loop.now > deadline and self.schedule.turns > bound):
+            turned, turns = self.turn(), self.schedule.turns - begun
+            if not turned or (self.loop.now > deadline and turns > MANY_TURNS):
                 raise self.model.finds(f"{name} waits for ever")
+            if turns > ENDLESS:
+                raise self.model.finds(f"{name} waits for ever, while somebody goes on without a pause")
 
     def turn(self) -> bool:
         """One turn; a promise that it broke is raised here."""

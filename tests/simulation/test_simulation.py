@@ -4,14 +4,18 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from cases import slow
 
+from simulation import shell_life, sqlite_store
 from simulation.mutate import PATCHES, fits, hunt
 from simulation.plan import random_plan
 from simulation.play import play
+from simulation.schedule import Schedule
+from simulation.shrink import LEAST, shrunk
 
 FINDINGS = sorted((Path(__file__).parent / "findings").glob("*.json"))
 # Plans of each layer, two seconds together; `make simulate` has more.
@@ -33,6 +37,35 @@ def test_no_promise_is_broken(layer):
 def test_what_was_found_stays_mended(file):
     outcome = play(json.loads(file.read_text())["plan"])
     assert outcome.finding is None, outcome.where
+
+
+@pytest.mark.parametrize("layer", ["shell", "cluster"])
+def test_a_plan_that_goes_on_within_one_turn_is_a_finding(layer, monkeypatch):
+    def go_on(_):
+        while True:
+            for _ in range(1000):
+                pass
+
+    monkeypatch.setattr(Schedule, "turn", go_on)
+    outcome = play(random_plan(FIRST, layer), 0.2)
+    assert outcome.finding == "EndlessError: it does not end within 0.2 s of processor time"
+    assert "go_on" in outcome.where
+
+
+def test_who_goes_on_without_a_pause_is_a_finding(monkeypatch):
+    monkeypatch.setattr(shell_life, "ENDLESS", 1000)
+    found = (play(random_plan(seed, "links")).finding or "" for seed in range(FIRST, FIRST + 100))
+    assert any(each.endswith("waits for ever, while somebody goes on without a pause") for each in found)
+
+
+def test_a_plan_with_a_finding_is_made_small_in_a_given_time(monkeypatch):
+    monkeypatch.setattr(sqlite_store, "may_go", lambda *_: False)
+    plan = json.loads((FINDINGS[0].parent / "segment_that_is_to_be_kept_again.json").read_text())["plan"]
+    begun = time.process_time()
+    small = shrunk(plan, 3.0)
+    assert time.process_time() - begun < 3.0 + 2 * LEAST
+    assert "goes, and should stay" in play(small).finding
+    assert len(small["lives"]) < len(plan["lives"])
 
 
 @slow
