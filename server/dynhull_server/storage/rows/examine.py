@@ -15,10 +15,10 @@ from ..port import Progress
 from .batch_rows import commit_columns, is_whole
 from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
-from .group import AnyStep, Cut, DropSnapshot
+from .group import AnyStep, Cut, DropSnapshot, MendSegment
 from .hull_rows import found_hulls, values
 from .ledger import HullRows, Ledger, StoredSnapshot
-from .segment_rows import erasure_from, segment_checksum, segment_from, segment_weight
+from .segment_examine import SegmentExamination
 from .tables import COLUMNS, FENCES_SINCE, SEGMENTS_SINCE, Reader
 from .totals import Totals, totals_from
 
@@ -48,6 +48,11 @@ class Findings:
     repairs: list[AnyStep] = field(default_factory=list)
     both_totals: bool = True
     starts: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def mends(self) -> list[MendSegment]:
+        """The repairs of segments, which the ledger has already, and the totals not yet."""
+        return [each for each in self.repairs if isinstance(each, MendSegment)]
 
     def blame(self, hull: HullRows, text: str, *, fatal: bool) -> None:
         """Record damage to a hull."""
@@ -105,6 +110,8 @@ class _Examination:
         self._newest_snapshot = MISSING
         self._next_number = 1
         self._fences = FoundFences()
+        self._past: SegmentExamination | None = None
+        self._mended = 0  # what the weights of segments that are put right are more than before
         self._renewed = 0  # checksums of the rows of hulls in the present format, less the stored ones
 
     def run(self) -> None:
@@ -214,26 +221,32 @@ class _Examination:
         self._ledger.batch_ids = count(newest + 1)
 
     def _segments(self) -> None:
-        newest = MISSING
-        for row in self._reader.every("segments", ", ".join(COLUMNS["segments"])):
-            place, number, first, last, file, facts, stored = row
-            newest = place
-            scanned = self._hulls.get(number)
-            if scanned is None:
-                self._ledger.dead["segments"].append(place)
-                continue
-            try:
-                if segment_checksum(*row[:-1]) != stored:
-                    raise ValueError("its checksum differs")
-                if file:
-                    scanned.rows.segments.append(segment_from(place, first, last, file, facts))
+        self._past = SegmentExamination(self._reader, self._ledger.hulls)
+        self._past.run()
+
+    def _mend_segments(self, lacking: int | None, committed: int) -> None:
+        """Take up what damaged rows of segments were: `lacking` is their weight, None where that is not known."""
+        past = self._past
+        if past is None:
+            return
+        found = None if lacking is None else past.explain(lacking, committed)
+        if found is None:
+            for hull, text in past.blamed():
+                if hull is None:
+                    self._findings.fatal.append(text)
                 else:
-                    scanned.rows.erasures.append(erasure_from(place, first, last, facts))
-                scanned.rows.weigh(segment_weight(row))
-            except (ValueError, TypeError, struct.error) as error:
-                text = f"the row of the past of revisions {first} to {last} is damaged ({error})"
-                self._findings.blame(scanned.rows, text, fatal=True)
-        self._ledger.segment_ids = count(newest + 1)
+                    self._findings.blame(hull, text, fatal=True)
+        for each in found or ():
+            self._mended += each.step.more
+            self._findings.repairs.append(each.step)
+            if each.lost and each.hull is not None:
+                self._findings.blame(each.hull, each.text, fatal=False)
+            else:
+                self._findings.notes.append(
+                    each.text if each.hull is None else f"hull {each.hull.row.name!r}: {each.text}"
+                )
+        self._ledger.dead["segments"].extend(past.dead)
+        self._ledger.segment_ids = count(past.newest + 1)
 
     def _counted(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
         for row in self._reader.every(table, columns):
@@ -248,7 +261,10 @@ class _Examination:
         fences = self._fences
         numbers = [self._next_number, fences.next_number, *(number + 1 for number in self._ledger.hulls)]
         there = Totals(next_number=max(numbers)).plus(0, 0, fences.sum, fences.rows)
+        lacking = None if totals is None else totals.sum - there.sum - sum(hull.sum for hull in hulls) + self._renewed
+        self._mend_segments(lacking, 0 if totals is None else totals.committed)
         there = there.plus(len(hulls), sum(len(hull.ids) for hull in hulls), sum(hull.sum for hull in hulls))
+        there = there.plus(0, 0, -self._mended)
         self._ledger.totals = (totals or there)._replace(sum=there.sum)
         stored = there.plus(0, 0, -self._renewed)
         if totals is not None and (totals.hulls, totals.batches, totals.sum) != (

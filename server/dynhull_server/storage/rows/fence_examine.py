@@ -290,6 +290,6 @@ def _begins(number: int, first: int, stored: object) -> bool:
 def _whole(number: int, consumer: Consumer, stored: object) -> bool:
     try:
         *_, expected = consumer_values(number, consumer)
-    except (TypeError, AttributeError, struct.error):
+    except (ValueError, TypeError, AttributeError, struct.error):
         return False
     return expected == stored

@@ -213,6 +213,7 @@ class Filed:
         file, first, last = segment.file + end, segment.first, segment.last
         what = f"revisions {first} to {last}" if end == BATCHES else f"the state at revision {first - 1}"
         try:
+            require_known(segment)
             yield
         except StorageError as error:
             with self._turn:
@@ -225,6 +226,12 @@ class Filed:
         """Take note that all of a file has been read: what is in memory, or a part of it, says nothing of the rest."""
         with self._turn:
             self.unreadable.discard(file)
+
+
+def require_known(segment: StoredSegment) -> None:
+    """Raise DamagedError if it is not known any more what the files of a segment were written with."""
+    if not segment.facts.bytes:
+        raise DamagedError(f"{segment.file}: its row in the database was damaged: restore a backup")
 
 
 def read_batches(archive: Archive, segment: StoredSegment) -> Batches:

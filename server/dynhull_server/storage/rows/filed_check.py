@@ -6,7 +6,7 @@ from pathlib import Path
 from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive, is_installed
 from ..segments.objects import archive_at
-from .filed import read_batches, read_state
+from .filed import read_batches, read_state, require_known
 from .filing import run_from_start
 from .group import DropErasure, RetireSegment
 from .ledger import HullRows, Ledger
@@ -25,6 +25,7 @@ def damaged_segments(hulls: Iterable[HullRows], archive: Archive) -> Iterator[tu
 
 def examine_segment(archive: Archive, segment: StoredSegment) -> None:
     """Raise DamagedError, which names the file, if a file of a segment is not as it was written."""
+    require_known(segment)
     if is_installed():
         read_batches(archive, segment)
         if segment.facts.state_bytes:

@@ -104,6 +104,15 @@ class RetireSegment:
 
 
 @dataclass(frozen=True, slots=True)
+class MendSegment:
+    """Step: a row of segments that the ledger has already takes the place of a damaged one."""
+
+    place: int
+    values: Values
+    more: int  # its weight, less that of the other
+
+
+@dataclass(frozen=True, slots=True)
 class EraseKeys:
     """Step: segments without some keys take the place of those that had them."""
 
@@ -161,7 +170,9 @@ class DropDeadSegment:
     place: int
 
 
-SegmentStep = SetHistory | NameFile | CloseSegment | RetireSegment | EraseKeys | DropErasure | DropDeadSegment
+SegmentStep = (
+    SetHistory | NameFile | CloseSegment | RetireSegment | MendSegment | EraseKeys | DropErasure | DropDeadSegment
+)
 AnyStep = (
     Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull | SegmentStep | FenceStep
 )
@@ -244,6 +255,9 @@ class Group:
                 self._close_segment(change)
             case RetireSegment():
                 self._retire_segment(change)
+            case MendSegment():
+                self.totals = self.totals.plus(0, 0, change.more)
+                self.statements += [Remove("segments", (change.place,)), Insert("segments", change.values)]
             case EraseKeys():
                 self._erase(change)
             case DropErasure():

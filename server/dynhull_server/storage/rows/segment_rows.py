@@ -7,6 +7,8 @@ A row without a file says that keys were erased.
 """
 
 import json
+import struct
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -15,6 +17,7 @@ from ..segments.archive import Written
 from .encoding import checksum, weight
 
 NO_HULL = 0
+NOT_A_ROW = (ValueError, TypeError, AttributeError, struct.error)  # of values that no row has
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,8 +127,21 @@ def segment_from(place: int, first: int, last: int, file: str, facts: str) -> St
 
 
 def segment_checksum(place: Any, number: Any, first: Any, last: Any, file: Any, facts: Any) -> int:
-    """The checksum of a row; AttributeError, TypeError or struct.error for values of other types."""
+    """The checksum of a row; an error of NOT_A_ROW for other values."""
     return checksum(f"{file}\n{facts}".encode(), place, number, first, last)
+
+
+def is_whole(row: Sequence[Any]) -> bool:
+    """Whether a row has its checksum, and can be read."""
+    try:
+        place, number, first, last, file, facts, stored = row
+        if segment_checksum(*row[:-1]) != stored:
+            return False
+        if number != NO_HULL:
+            segment_from(place, first, last, file, facts) if file else erasure_from(place, first, last, facts)
+    except NOT_A_ROW:
+        return False
+    return True
 
 
 def segment_weight(values: Values) -> int:

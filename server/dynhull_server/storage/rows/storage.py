@@ -60,13 +60,14 @@ from .past_rows import (
     state_until,
 )
 from .reading import commit_of, read_each, read_hull, read_records
-from .segment_rows import StoredErasure, StoredSegment
+from .segment_rows import StoredErasure, StoredSegment, is_whole
 from .staging import staging
-from .tables import Reader
+from .tables import COLUMNS, Reader
 
 log = logging.getLogger(__name__)
 
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
+SEGMENT = ", ".join(f"segments.{column}" for column in COLUMNS["segments"])
 LOOK = 3_600_000_000  # microseconds between looks for files that belong to nobody
 LATE = 86_400_000_000  # microseconds after which a store carries out nothing of what a server has given up
 
@@ -548,13 +549,15 @@ class RowStorage(ABC):
             if each not in self._filing and self._late.get(each, 0) <= now
         ]:
             with self._reading(lambda ledger: ledger.hulls.copy()) as (reader, hulls):
-                rows = list(reader.some("segments", "hull, file", array("q", ids[:1])))
-            if any(number in hulls for number, _ in rows):  # its commit was taken for a failure, and was none
+                rows = list(reader.some("segments", SEGMENT, array("q", ids[:1])))
+            damaged = not all(map(is_whole, rows))  # its file may be that of another one: the next start examines it
+            # Or its commit was taken for a failure, and was none.
+            if damaged or any(number in hulls for _, number, *_ in rows):
                 self._ledger.dead["segments"].remove(ids[0])
                 self._late.pop(ids[0], None)
                 continue
             self._confirm()
-            for _, file in rows:
+            for *_, file, _, _ in rows:
                 if file:
                     archive.remove(file)
                     if self._filed is not None:

@@ -414,6 +414,7 @@ def _finish(
     if findings.fatal:
         raise DamagedError(f"the data is damaged and was not copied: {'; '.join(findings.fatal)}")
     ledger = findings.ledger
+    change(connection, ledger, findings.mends)
     change(connection, ledger, _leading_back(SQLiteReader(connection, opened.version), ledger, lasts))
     if opened.version < FORMAT:
         migrate(connection, opened.version, ledger, findings.starts)

@@ -73,12 +73,17 @@ def load(connection: sqlite3.Connection, version: int = FORMAT) -> Ledger:
     Raises:
         DamagedError: it is damaged.
     """
+    return loaded(connection, version).ledger
+
+
+def loaded(connection: sqlite3.Connection, version: int = FORMAT) -> Findings:
+    """The same, with the repairs of what has been damaged since, but can be put right."""
     findings = Findings()
     if _has_tables(connection, version, findings):
         examine_rows(SQLiteReader(connection, version), version, findings, lambda *_: None, contents=False)
     if findings.fatal:
         raise DamagedError("; ".join(findings.fatal))
-    return findings.ledger
+    return findings
 
 
 def _has_tables(connection: sqlite3.Connection, version: int, findings: Findings) -> bool:

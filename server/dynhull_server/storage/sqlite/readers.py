@@ -25,6 +25,10 @@ def as_unreadable() -> Iterator[None]:
         raise UnreadableError(str(error)) from error
 
 
+def _text(content: bytes) -> str:
+    return content.decode(errors="surrogateescape")
+
+
 class SQLiteReader:
     """Reads rows, as of one moment if a transaction is open.
 
@@ -38,6 +42,8 @@ class SQLiteReader:
 
     def __init__(self, connection: sqlite3.Connection, version: int = FORMAT) -> None:
         self._connection = connection
+        # Damaged text is read, so that its checksum finds the row: SQLite would say of no row where it is.
+        connection.text_factory = _text
         self.version = version
 
     def begin(self) -> None:

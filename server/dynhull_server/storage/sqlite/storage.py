@@ -31,7 +31,7 @@ from ..rows.tables import FORMAT
 from ..rows.totals import MODES, STOPPED, Totals, totals_from
 from ..segments.archive import Archive
 from .disk import LOCK_SECONDS, Disk, OpenMode
-from .examination import examine, format_of, load
+from .examination import examine, format_of, loaded
 from .folder import Folder
 from .migration import begin_anew, make_tables, migrate
 from .origin import is_copied, note
@@ -167,9 +167,11 @@ class SQLiteStorage(RowStorage):
         with self._housekeeping:
             self._copy_log("RESTART")  # if possible; otherwise the failed frames stay after the end of the log
         connection.execute("BEGIN")
-        ledger = load(connection)
+        findings = loaded(connection)
         connection.execute("COMMIT")
-        self._renew(ledger)
+        if findings.mends:
+            raise DamagedError(f"{self._folder.database}: {'; '.join(findings.notes)}: restart the server")
+        self._renew(findings.ledger)
 
     def _write(self, group: Group) -> None:
         connection = self._writer
