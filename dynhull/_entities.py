@@ -301,6 +301,10 @@ class Entities(HullTree):
         """The least time; None if no entity has one. O(n)."""
         return min((time for _, time in self._held.values() if not math.isnan(time)), default=None)
 
+    def pack(self, idle: bool) -> bool:  # noqa: ARG002  # the kernel's
+        """Whether the entities are held in less memory: never, for nothing here is smaller than these objects."""
+        return False
+
     def keys_at(self, xy: npt.ArrayLike) -> list[Any]:
         """The least key at each place, None where there is no entity. O(n + k)."""
         return self._names(as_tuples(self._as_points(xy)))

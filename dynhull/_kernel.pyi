@@ -282,6 +282,11 @@ class Entities:
     def entities(self) -> tuple[dynhull.keys.Keys, dynhull.arrays.Points, dynhull.arrays.Points]:
         """Keys in order, places and times. O(n log n)."""
 
+    def pack(self, idle: bool) -> bool:
+        """
+        Hold the entities in less memory until they are needed, `idle` unless they were since the last such call. Whether they are held so. O(n), and O(n log n) when they are needed.
+        """
+
     def oldest(self) -> float | None:
         """The least time; None if no entity has one. O(n)."""
 

@@ -179,6 +179,22 @@ class Keyed(Live):
         """The least time of an entity; None if none has a time. O(1), and O(n) at the first call, like `expire`."""
         return self._tree.oldest()
 
+    def pack(self, *, idle: bool = False) -> bool:
+        """Hold the entities in about a third of the memory until the next call that needs them. O(n).
+
+        That call takes O(n log n) more, and any thread may make it. Nothing else differs: for programs with many hulls
+        of which few are in use.
+
+        Args:
+            idle: only if nothing has used them since the last such call: called now and then for all hulls, it packs
+                those at rest.
+
+        Returns:
+            Whether they are held so: not while a thread uses the hull, nor while a `FenceIndex` compares them, nor
+            where memory does not suffice; and never in the implementation in Python.
+        """
+        return self._tree.pack(idle)
+
     def vertex_keys(self) -> list[str] | list[int]:
         """The key at each vertex, in the order of `vertices`; the least one where several are. O(h log n).
 

@@ -138,6 +138,18 @@ class HullTree {
     *this = std::move(other);
   }
 
+  // Lets go of all points, which `take_back` brings again: then it is as if nothing had happened.
+  void set_aside() {
+    nodes_ = Nodes();
+    copies_ = Copies();
+    size_ = distinct_ = 0;
+  }
+  void take_back(HullTree same) {
+    same.changes = changes;
+    same.version_ = version_;
+    *this = std::move(same);
+  }
+
   // Calls `work` while a point that is there once is away.
   template <class Work>
   void without(Point p, Work work) {

@@ -173,6 +173,7 @@ class Server:
         if self._storage.keeps:
             interval = SYNC_SECONDS if self._settings.durability is Durability.INTERVAL else None
             self._engine.keep_house(self._settings.snapshot_points, interval)
+        self._engine.let_rest()
         if self._storage.epoch:
             self._supervisor.every(ENTITLED_SECONDS, "lease", self._look_at_lease)
         if self._settings.series_kept and self._settings.series_bytes:

@@ -43,7 +43,7 @@ class Life {
     const int steps = 10 + static_cast<int>(below(60));
     for (int step = 0; step < steps; ++step) {
       ++now_;
-      switch (below(12)) {
+      switch (below(13)) {
         case 0: put(1); break;
         case 1: put(below(12)); break;
         case 2: put(below(40)); break;
@@ -53,6 +53,7 @@ class Life {
         case 6: expire(); break;
         case 7: evict(); break;
         case 8: below(8) == 0 ? clear() : copy(); break;
+        case 9: pack(); break;
         default: name(); break;
       }
       check();
@@ -253,6 +254,23 @@ class Life {
   void copy() {
     auto other = std::make_unique<Entities>(*entities_);
     entities_ = std::move(other);
+  }
+
+  void pack() {
+    const std::uint64_t changes = tree_.changes(), version = tree_.plane().version();
+    const std::vector<Point> vertices = tree_.vertices();
+    with_failures([&] { require(entities_->pack(tree_), "entities without an index were not packed"); });
+    for (bool packed = true; packed;) {
+      if (below(2) == 0) allocations_left = static_cast<long>(below(12));
+      try {
+        entities_->unpack(tree_);
+        packed = false;
+      } catch (const std::bad_alloc&) {
+      }
+      allocations_left = -1;
+    }
+    require(tree_.changes() == changes && tree_.plane().version() == version, "to be packed counted as a change");
+    require(tree_.vertices() == vertices, "entities were unpacked to another hull");
   }
 
   // Names of the vertices, and of any places.

@@ -13,6 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from inputs import point
 
 from dynhull import DuplicateKeyError, MissingKeyError, Put
+from dynhull._entities import Entities
 from dynhull.keys import PackedKeys
 
 KEYS = {
@@ -26,10 +27,10 @@ only = st.sampled_from([None, None, "absent", "present"])
 class KeyedMachine(RuleBasedStateMachine):
     make = None
 
-    @initialize(key_type=st.sampled_from(["str", "int"]), ordered=st.booleans())
-    def start(self, key_type, ordered):
+    @initialize(key_type=st.sampled_from(["str", "int"]), ordered=st.booleans(), packs=st.booleans())
+    def start(self, key_type, ordered, packs):
         self.hull = self.make(key_type, ordered=ordered)
-        self.key_type, self.ordered = key_type, ordered
+        self.key_type, self.ordered, self.packs = key_type, ordered, packs
         self.model = {}  # key: (place, time)
         self.corners = []
 
@@ -226,6 +227,8 @@ class KeyedMachine(RuleBasedStateMachine):
         assert self.hull.keys() == sorted(self.model)
         times = [time for _, time in self.model.values() if not isnan(time)]
         assert self.hull.oldest() == min(times, default=None)
+        if self.packs:  # so that every step finds them packed
+            assert self.hull.pack() != isinstance(self.hull._tree, Entities)
 
 
 def machine(make):

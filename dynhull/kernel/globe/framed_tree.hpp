@@ -119,6 +119,20 @@ class FramedTree {
     set_changes(before + differs);
   }
 
+  // Lets go of all points, which `take_back` brings again: then it is as if nothing had happened.
+  void set_aside() {
+    plane_.set_aside();
+    given_ = Given();
+  }
+  // Throws before anything changes.
+  void take_back(const Point* points, std::size_t count) {
+    if (!frame_.on_globe()) return plane_.take_back(HullTree(points, count));
+    FramedTree same{Frame(frame_)};
+    same.fill(points, count);
+    given_ = std::move(same.given_);
+    plane_.take_back(std::move(same.plane_));
+  }
+
   // Visits every distinct point in order, with its number of copies.
   template <class Visit>
   void for_each(Visit visit) const {

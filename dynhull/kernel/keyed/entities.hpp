@@ -13,6 +13,7 @@
 #include "ages.hpp"
 #include "keys.hpp"
 #include "names.hpp"
+#include "packed.hpp"
 #include "puts.hpp"
 
 namespace dynhull {
@@ -161,6 +162,31 @@ class Entities {
     ages_.reset();
   }
 
+  // Holds the entities in the least memory, without a tree, until `unpack`; nothing else may be asked meanwhile. False
+  // while it tells an index of its changes, which knows the slots. Both throw before anything changes.
+  bool pack(FramedTree& tree) {
+    if (reports_ != nullptr) return false;
+    Packed packed(slots_);
+    packed_ = std::move(packed);
+    slots_ = Slots(slots_.strings());
+    table_ = SlotTable();
+    names_.reset();
+    ages_.reset();
+    tree.set_aside();
+    return true;
+  }
+  void unpack(FramedTree& tree) {
+    Slots slots(slots_.strings());
+    SlotTable table;
+    packed_.unpack(slots, table);
+    const Scratch<Point> places(slots.size());
+    for (std::uint32_t slot = 0; slot < slots.end(); ++slot) places[slot] = slots[slot].place;
+    tree.take_back(places.data(), slots.size());
+    std::swap(slots_, slots);
+    table_.swap(table);
+    packed_ = Packed();
+  }
+
   // Whether the names of all these places that are vertices are known. If not, `name` makes them known.
   bool named(const FramedTree& tree, std::span<const Point> places) const {
     return names_ && names_->current(tree, places);
@@ -205,7 +231,8 @@ class Entities {
   }
 
   std::size_t bytes() const {
-    return slots_.bytes() + table_.bytes() + (names_ ? names_->bytes() : 0) + (ages_ ? ages_->bytes() : 0);
+    return packed_.bytes() + slots_.bytes() + table_.bytes() + (names_ ? names_->bytes() : 0) +
+           (ages_ ? ages_->bytes() : 0);
   }
 
  private:
@@ -413,6 +440,7 @@ class Entities {
 
   Slots slots_;
   SlotTable table_;
+  Packed packed_;
   std::unique_ptr<Names> names_;
   std::unique_ptr<Ages> ages_;  // none until the oldest are asked for
   Reports* reports_ = nullptr;  // none, or those of the index that is attached

@@ -67,7 +67,10 @@ class Hull {
 
   std::size_t size() { return settled().size(); }
   std::size_t distinct() { return settled().distinct(); }
-  std::uint64_t changes() { return settled().changes(); }
+  std::uint64_t changes() {
+    lock_.await_settled();
+    return tree_.changes();
+  }
   void set_changes(std::uint64_t changes) { writable().set_changes(changes); }
   void clear() { writable().clear(); }
   std::uint64_t count(nb::handle x, nb::handle y) {
@@ -345,6 +348,8 @@ class Hull {
     const WriteLock lock(lock_);
     if (index_.stale(tree_.plane(), queries_)) index_.refresh(tree_.plane(), queries_);
   }
+
+  void forget_index() { index_ = LocateIndex(); }
 
   FramedTree tree_;
   ReadWriteLock lock_;

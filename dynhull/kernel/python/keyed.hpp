@@ -206,10 +206,28 @@ class KeyedHull : public Hull {
     return slots;
   }
 
+  // Puts the hull away until it is used, `idle` unless it has been used since the last such call. Whether it is.
+  bool pack(bool idle) {
+    if (lock_.put_away()) return true;
+    if (lock_.busy() || (idle && lock_.used())) return false;
+    try {
+      if (!entities_.pack(tree_)) return false;
+    } catch (const std::bad_alloc&) {
+      return false;
+    }
+    forget_index();
+    lock_.put_away(this, [](void* hull) {
+      auto* const self = static_cast<KeyedHull*>(hull);
+      self->entities_.unpack(self->tree_);
+    });
+    return true;
+  }
+
   bool strings() const { return entities_.slots().strings(); }
 
   std::pair<std::size_t, std::size_t> memory() {
-    const auto [used, reserved] = Hull::memory();
+    lock_.await_settled();
+    const std::size_t used = tree_.used_bytes(), reserved = tree_.reserved_bytes();
     return {used + entities_.bytes(), reserved + entities_.bytes()};
   }
 

@@ -190,6 +190,9 @@ void add_entities(nb::module_& module) {
       .def("entities", &KeyedHull::entities,
            nb::sig("def entities(self) -> tuple[dynhull.keys.Keys, dynhull.arrays.Points, dynhull.arrays.Points]"),
            "Keys in order, places and times. O(n log n).")
+      .def("pack", &KeyedHull::pack, "idle"_a,
+           "Hold the entities in less memory until they are needed, `idle` unless they were since the last such call. "
+           "Whether they are held so. O(n), and O(n log n) when they are needed.")
       .def("oldest", &KeyedHull::oldest_of_all, "The least time; None if no entity has one. O(n).")
       .def("keys_at", &KeyedHull::keys_at, nb::sig("def keys_at(self, xy: object) -> list[typing.Any]"), "xy"_a.none(),
            "The least key at each place, None where there is none.")

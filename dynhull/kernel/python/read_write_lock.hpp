@@ -13,6 +13,7 @@
 #include <limits>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 namespace dynhull {
 
@@ -22,10 +23,29 @@ class ReadWriteLock {
  public:
   // Wait until there is no writer, or until there is neither reader nor writer.
   void await_readable() {
-    if (writing_) await_turn([this] { return !writing_; });
+    await_settled();
+    use();
   }
   void await_writable() {
     if (writing_ || readers_ > 0) await_turn([this] { return !writing_ && readers_ == 0; });
+    use();
+  }
+  // The same for what a hull that is put away still has.
+  void await_settled() {
+    if (writing_) await_turn([this] { return !writing_; });
+  }
+
+  using TakeOut = void (*)(void* hull);
+
+  // Whether anybody reads, writes or waits.
+  bool busy() const { return writing_ || readers_ > 0 || arrived_ != entered_; }
+  bool put_away() const { return take_out_ != nullptr; }
+  // Whether anybody has used the hull since the last call.
+  bool used() { return std::exchange(used_, false); }
+  // Has who uses the hull next take it out first, before anybody else does.
+  void put_away(void* hull, TakeOut take_out) {
+    hull_ = hull;
+    take_out_ = take_out;
   }
 
   // Before a fork, waits until no batch runs in any hull and lets none start, so that the child's hulls are whole.
@@ -87,10 +107,20 @@ class ReadWriteLock {
     signal_->changed.notify_all();
   }
 
-  bool writing_ = false;
+  // Needs the GIL. If it throws, the hull stays put away, and nobody has entered.
+  void use() {
+    used_ = true;
+    if (take_out_ == nullptr) return;
+    take_out_(hull_);
+    take_out_ = nullptr;
+  }
+
+  bool writing_ = false, used_ = false;
   int readers_ = 0;
   std::uint64_t arrived_ = 0, entered_ = 0;
   int process_ = 0;  // in which the turns were counted
+  void* hull_ = nullptr;
+  TakeOut take_out_ = nullptr;
 
   static inline Signal* signal_ = new Signal;
   static inline int waiting_ = 0, running_ = 0;
@@ -103,6 +133,7 @@ class ReadLock {
  public:
   explicit ReadLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
     lock.await_turn([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_; });
+    lock.use();
     ++lock.readers_;
     ++ReadWriteLock::running_;
     if (rows > FEW_ROWS) release_.emplace();
@@ -125,6 +156,7 @@ class WriteLock {
  public:
   explicit WriteLock(ReadWriteLock& lock, std::size_t rows = ALL_ROWS) : lock_(lock) {
     lock.await_turn([&] { return ReadWriteLock::forking_ == 0 && !lock.writing_ && lock.readers_ == 0; });
+    lock.use();
     lock.writing_ = true;
     ++ReadWriteLock::running_;
     if (rows > FEW_ROWS) release_.emplace();

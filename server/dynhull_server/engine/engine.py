@@ -18,6 +18,7 @@ from .hulls import Hulls
 from .loading import Loader
 from .past_fences import PastFences
 from .positions import incarnation_of
+from .resting import Resting
 from .series import LOOK_SECONDS
 from .shard_store import ShardStore
 from .supervisor import Supervisor
@@ -138,6 +139,11 @@ class Engine:
         every(self.hulls.filing.SECONDS, "history", self.hulls.filing.round)
         if sync_seconds is not None:
             every(sync_seconds, "sync", house.sync)
+
+    def let_rest(self) -> None:
+        """Begin to put away the points of hulls that nobody uses."""
+        resting = Resting(lambda: self.driver.core.hulls.values())
+        self.driver.supervisor.every(resting.SECONDS, "rest", resting.round)
 
     def keep_series(self, seconds: float, most: int) -> None:
         """Begin to keep measures of hulls for so many seconds, in at most so many bytes."""

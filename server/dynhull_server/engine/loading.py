@@ -92,6 +92,7 @@ class Loader:
         loaded = []
         for row, kept in stored:
             state = state_of(self._driver.limits, row.settings, kept, now=clock.monotonic())
+            state.put_away(idle=False)
             loaded.append(_Loaded(row, state, sum(map(unsaved_of, kept.records))))
             if clock.monotonic() > until:
                 break

@@ -25,6 +25,9 @@ from .sent_vertices import SentVertices
 if TYPE_CHECKING:
     from .contents.live import AnyHull
 
+# So many points are needed again after a tenth of a millisecond.
+PUT_AWAY_POINTS = 1024
+
 
 @dataclass(slots=True)
 class Counts:
@@ -314,6 +317,15 @@ class HullState:
             return Counts(revision, points, distinct, clock, cause, center, outlined)
         held, rules = len(quarantine), quarantine.rules
         return Counts(revision, points, distinct, clock, cause, center, outlined, held, rules)
+
+    def put_away(self, *, idle: bool) -> None:
+        """Hold the keys of a small hull in less memory until they are needed.
+
+        Args:
+            idle: only if nobody has used them since the last call.
+        """
+        if isinstance(self.hull, AnyKeyedHull) and self.counts.points <= PUT_AWAY_POINTS:
+            self.hull.pack(idle=idle)
 
     # Reads
 
