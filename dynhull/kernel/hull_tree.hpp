@@ -260,9 +260,9 @@ class HullTree {
                      Beside beside) {
     Nodes nodes;
     if (count == 0) return nodes;
-    std::vector<Ref> refs(2 * leaves_for(count));
+    BuildingSite site(count);
     nodes.reserve(leaves_for(count));
-    const Building building(nodes, points, count, refs.data());
+    const Building building(nodes, points, count, site);
     nodes.root = building.tree(threads, beside);
     for (const Repeated& point : repeated) building.mark_repeated(point.number);
     return nodes;

@@ -19,12 +19,11 @@ class DividedBatch {
  public:
   // Allocates all memory but that of leaves and nodes, so that apply() cannot fail.
   DividedBatch(Nodes& nodes, std::span<const Change> changes)
-      : nodes_(nodes), changes_(changes.data()), count_(changes.size()) {
+      : nodes_(nodes), changes_(changes.data()), count_(changes.size()), site_(count_ > FEW ? LEAF + count_ : 0) {
     for (Side side : SIDES) candidates_[side].resize(count_);
     if (count_ > FEW) {
       points_.resize(LEAF + count_);
       repeated_.resize(LEAF + count_);
-      leaves_.resize(2 * leaves_for(LEAF + count_));
     }
     small_.reserve(count_);
   }
@@ -114,10 +113,10 @@ class DividedBatch {
 
     nodes_.give_back(tree);
     if (total == 0) return found.tree = NONE, found;
-    found.tree = Building(nodes_, points_.data(), total, leaves_.data()).tree();
+    found.tree = Building(nodes_, points_.data(), total, site_).tree();
     std::size_t next = 0;
     for (std::size_t i = 0; i < leaves_for(total); ++i) {
-      Leaf& part = nodes_.leaf(leaves_[i]);
+      Leaf& part = nodes_.leaf(site_.leaves[i]);
       for (unsigned k = 0; k < part.size; ++k)
         if (repeated_[next++]) part.repeated |= bit(k);
     }
@@ -223,8 +222,8 @@ class DividedBatch {
   std::vector<std::uint32_t> candidates_[2];
   std::vector<Point> points_;  // of a merged leaf
   std::vector<std::uint8_t> repeated_;
-  std::vector<Ref> leaves_;  // the leaves it becomes, and room for their nodes
-  std::vector<Ref> small_;   // leaves to merge with their neighbours in the end
+  BuildingSite site_;
+  std::vector<Ref> small_;  // leaves to merge with their neighbours in the end
 };
 
 }  // namespace dynhull

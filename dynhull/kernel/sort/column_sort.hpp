@@ -114,8 +114,15 @@ class ColumnSort {
     for (unsigned column = first; column < last; ++column) {
       Point *const begin = to_ + starts_[column], *const end = begin + size(column);
       sort_by_point(begin, scratch.data(), size(column));
-      repeated = repeated || std::adjacent_find(begin, end) != end;
+      repeated = repeated || repeats(begin, size(column));
     }
+    return repeated;
+  }
+
+  // Whether neighbours are equal. Without an early end, which would keep the loop from being vectorised.
+  static bool repeats(const Point* points, std::size_t count) {
+    bool repeated = false;
+    for (std::size_t i = 1; i < count; ++i) repeated |= points[i] == points[i - 1];
     return repeated;
   }
 

@@ -1,6 +1,9 @@
 // Bulk construction from sorted points.
 #pragma once
 
+#include <optional>
+
+#include "../memory/scratch.hpp"
 #include "../threads.hpp"
 #include "balance.hpp"
 
@@ -8,15 +11,33 @@ namespace dynhull {
 
 inline std::size_t leaves_for(std::size_t points) { return points <= LEAF ? 1 : (points + FILL - 1) / FILL; }
 
+// The memory that a build needs besides the tree's: enough for every build of up to `points` points.
+struct BuildingSite {
+  explicit BuildingSite(std::size_t points)
+      : leaves(leaves_for(points)),
+        inner(leaves_for(points)),
+        seams{Scratch<Seam>(leaves_for(points)), Scratch<Seam>(leaves_for(points))} {}
+
+  // Of a leaf and one side: which of its entries are on the chain of the largest subtree built so far, and the nearest
+  // leaves before and after it there that have some.
+  struct Seam {
+    Mask chain;
+    std::uint32_t before, after;
+  };
+
+  Scratch<Ref> leaves, inner;
+  Scratch<Seam> seams[2];
+};
+
 // Builds a balanced tree over sorted distinct points. Takes all leaves and nodes first, so that several threads can
 // fill them.
 class Building {
  public:
-  // `refs` has room for 2 leaves_for(count) entries, the leaves first; `nodes` has room for leaves_for(count) leaves.
-  Building(Nodes& nodes, const Point* points, std::size_t count, Ref* refs)
-      : nodes_(nodes), points_(points), count_(count), parts_(leaves_for(count)), leaves_(refs), inner_(refs + parts_) {
-    for (std::size_t i = 0; i < parts_; ++i) refs[i] = nodes.take_leaf();
-    for (std::size_t i = 1; i < parts_; ++i) refs[parts_ + i] = nodes.take_node();
+  // `nodes` has room for leaves_for(count) leaves. Their numbers are in `site` afterwards.
+  Building(Nodes& nodes, const Point* points, std::size_t count, BuildingSite& site)
+      : nodes_(nodes), points_(points), count_(count), parts_(leaves_for(count)), site_(site) {
+    for (std::size_t i = 0; i < parts_; ++i) site.leaves[i] = nodes.take_leaf();
+    for (std::size_t i = 1; i < parts_; ++i) site.inner[i] = nodes.take_node();
   }
 
   // The whole tree, detached. O(n).
@@ -39,7 +60,7 @@ class Building {
   // Marks a point as repeated in its leaf, once the leaf is built.
   void mark_repeated(std::size_t point) const {
     const std::size_t leaf = ((point + 1) * parts_ - 1) / count_;
-    nodes_.leaf(leaves_[leaf]).repeated |= bit(static_cast<unsigned>(point - start(leaf)));
+    nodes_.leaf(site_.leaves[leaf]).repeated |= bit(static_cast<unsigned>(point - start(leaf)));
   }
 
  private:
@@ -54,24 +75,75 @@ class Building {
       return joined(cut, subtree(first, cut), subtree(cut, last));
     }
     const std::size_t from = start(first), to = start(last);
-    nodes_.leaf(leaves_[first]).assign(points_ + from, static_cast<unsigned>(to - from));
-    return leaves_[first];
+    Leaf& leaf = nodes_.leaf(site_.leaves[first]);
+    leaf.assign(points_ + from, static_cast<unsigned>(to - from));
+    for (Side side : SIDES) site_.seams[side][first] = {leaf.chain[side], NONE, NONE};
+    return site_.leaves[first];
   }
   // The same, once the subtrees `levels` below it are there.
   Ref top(std::size_t first, std::size_t last, unsigned levels) const {
     const std::size_t cut = middle(first, last);
     if (levels > 0) return joined(cut, top(first, cut, levels - 1), top(cut, last, levels - 1));
-    return last - first > 1 ? inner_[cut] : leaves_[first];
+    return last - first > 1 ? site_.inner[cut] : site_.leaves[first];
   }
 
   Ref joined(std::size_t cut, Ref left, Ref right) const {
-    const Ref v = inner_[cut];
+    const Ref v = site_.inner[cut];
     nodes_.link(v, 0, left);
     nodes_.link(v, 1, right);
     nodes_.node(v).separator = points_[start(cut)];
-    refresh(nodes_, v);
+    for (Side side : SIDES) nodes_.bridge(v, side) = sewn(cut, side);
+    refresh_height(nodes_, v);
     return v;
   }
+
+  // A vertex of a chain.
+  struct Vertex {
+    std::uint32_t leaf;
+    unsigned entry;
+    Point p;
+  };
+  Vertex vertex(std::uint32_t leaf, unsigned entry) const {
+    return {leaf, entry, nodes_.leaf(site_.leaves[leaf])[entry]};
+  }
+  std::optional<Vertex> before(const Vertex& v, Side side) const {
+    const BuildingSite::Seam* const seams = site_.seams[side].data();
+    if (const Mask rest = seams[v.leaf].chain & below(v.entry)) return vertex(v.leaf, highest(rest));
+    const std::uint32_t leaf = seams[v.leaf].before;
+    return leaf == NONE ? std::nullopt : std::optional(vertex(leaf, highest(seams[leaf].chain)));
+  }
+  std::optional<Vertex> after(const Vertex& v, Side side) const {
+    const BuildingSite::Seam* const seams = site_.seams[side].data();
+    if (const Mask rest = seams[v.leaf].chain & ~below(v.entry + 1)) return vertex(v.leaf, lowest(rest));
+    const std::uint32_t leaf = seams[v.leaf].after;
+    return leaf == NONE ? std::nullopt : std::optional(vertex(leaf, lowest(seams[leaf].chain)));
+  }
+
+  // Joins the chains on both sides of a cut, and returns the edge that does. Starts from the points beside the cut and
+  // moves outwards: what it passes is on no larger chain, so that a build passes each vertex once.
+  Edge sewn(std::size_t cut, Side side) const {
+    const auto right_leaf = static_cast<std::uint32_t>(cut), left_leaf = right_leaf - 1;
+    Vertex a = vertex(left_leaf, nodes_.leaf(site_.leaves[left_leaf]).size - 1), b = vertex(right_leaf, 0);
+    std::optional<Vertex> beside_a = before(a, side), beside_b = after(b, side);
+    while (true) {
+      if (beside_a && turned(side, orientation(beside_a->p, a.p, b.p)) >= 0) {
+        a = *beside_a;
+        beside_a = before(a, side);
+      } else if (beside_b && turned(side, orientation(a.p, b.p, beside_b->p)) >= 0) {
+        b = *beside_b;
+        beside_b = after(b, side);
+      } else {
+        break;
+      }
+    }
+    BuildingSite::Seam &left = site_.seams[side][a.leaf], &right = site_.seams[side][b.leaf];
+    left.chain &= below(a.entry + 1);
+    left.after = b.leaf;
+    right.chain &= ~below(b.entry);
+    right.before = a.leaf;
+    return {a.p, b.p};
+  }
+
   Ref detached(Ref tree) const {
     nodes_.set_parent(tree, NONE);
     return tree;
@@ -80,7 +152,7 @@ class Building {
   Nodes& nodes_;
   const Point* points_;
   std::size_t count_, parts_;
-  const Ref *leaves_, *inner_;
+  BuildingSite& site_;
 };
 
 }  // namespace dynhull
