@@ -71,6 +71,7 @@ class Scratch {
   ~Scratch() { BlockCache::give_back(block_); }
 
   Record* data() const { return static_cast<Record*>(block_.data); }
+  std::size_t room() const { return block_.bytes / sizeof(Record); }
   Record& operator[](std::size_t i) const { return data()[i]; }
 
  private:

@@ -56,10 +56,10 @@ std::optional<PointArray> convex_hull(const Rows& xy, std::optional<bool> discar
   if (!hull->finite()) return std::nullopt;
   const std::span<const Point> vertices = hull->vertices();
   const std::size_t count = vertices.size();
-  if (2 * count <= hull->room()) return array_of({vertices.begin(), vertices.end()});
-  Point* const memory = hull->take_memory().release();  // from here on the capsule owns it
-  const nb::capsule owner(memory, [](void* points) noexcept { delete[] static_cast<Point*>(points); });
-  return PointArray(reinterpret_cast<double*>(memory), {count, 2}, owner);
+  if (count == 0 || 2 * count <= hull->memory()->room()) return array_of({vertices.begin(), vertices.end()});
+  auto* const kept = new Scratch<Point>(std::move(*hull->memory()));
+  const nb::capsule owner(kept, [](void* memory) noexcept { delete static_cast<Scratch<Point>*>(memory); });
+  return PointArray(reinterpret_cast<double*>(kept->data()), {count, 2}, owner);
 }
 
 using ChanRound = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t, bool>;

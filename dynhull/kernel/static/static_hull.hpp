@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "../memory/scratch.hpp"
 #include "../sort/by_point.hpp"
 #include "../threads.hpp"
 #include "inner_boxes.hpp"
@@ -30,16 +31,16 @@ class StaticHull {
         threads_, [&] { lower_end = chain(0, least_, greatest_); },
         [&] { upper_end = chain(width_, greatest_, least_); });
     // Both chains include both ends.
-    if (lower_end > memory_.get() + 1) lower_end = std::copy(memory_.get() + starts_[width_], upper_end - 1, lower_end);
-    vertices_ = {memory_.get(), lower_end};
+    Point* const memory = memory_->data();
+    if (lower_end > memory + 1) lower_end = std::copy(memory + starts_[width_], upper_end - 1, lower_end);
+    vertices_ = {memory, lower_end};
   }
 
   bool finite() const { return finite_; }  // if false, there is no hull
 
-  // Counter-clockwise from the least. They are at the start of memory with room for room() points.
+  // Counter-clockwise from the least, at the start of the memory.
   std::span<const Point> vertices() const { return vertices_; }
-  std::size_t room() const { return room_; }
-  std::unique_ptr<Point[]> take_memory() { return std::move(memory_); }
+  std::optional<Scratch<Point>>& memory() { return memory_; }
 
  private:
   std::size_t size() const { return parts_[0].size() + parts_[1].size(); }
@@ -70,16 +71,16 @@ class StaticHull {
   // Puts the points into columns: those below the line through the ends from left to right, then those above it from
   // right to left. Points on the line are no vertices.
   void place() {
-    constexpr std::size_t MOST_COLUMNS = 1024, A_COLUMN = 512;
+    constexpr std::size_t MOST_COLUMNS = 512, A_COLUMN = 1024;
     width_ = static_cast<unsigned>(std::min(std::bit_ceil(size() / A_COLUMN + 1), MOST_COLUMNS));
     const Columns columns(least_.x, greatest_.x, width_);
     const unsigned none = 2 * width_;
-    std::unique_ptr<std::uint16_t[]> keys[2];
+    const Scratch<std::uint16_t> keys[2] = {Scratch<std::uint16_t>(parts_[0].size()),
+                                            Scratch<std::uint16_t>(parts_[1].size())};
     std::vector<std::size_t> next[2];  // counts of each column, then the place of its next point
     const auto count = [&](int part) {
       next[part].assign(none + 1, 0);
-      keys[part] = std::make_unique_for_overwrite<std::uint16_t[]>(parts_[part].size());
-      std::uint16_t* key = keys[part].get();
+      std::uint16_t* key = keys[part].data();
       for (Point p : parts_[part]) {
         const int side = orientation(least_, greatest_, p);
         const unsigned mirror = (none - 1) * static_cast<unsigned>(side > 0);
@@ -97,13 +98,13 @@ class StaticHull {
       starts_[column] = total;
       for (auto& part : next) total += std::exchange(part[column], total);
     }
-    room_ = starts_[none] - 1;
-    memory_ = std::make_unique_for_overwrite<Point[]>(room_);
+    Point* const memory = memory_.emplace(starts_[none] - 1).data();
     const auto put = [&](int part) {
-      const std::uint16_t* key = keys[part].get();
+      const std::uint16_t* key = keys[part].data();
+      std::size_t* const place = next[part].data();
       for (Point p : parts_[part]) {
         const unsigned column = *key++;
-        if (column != none) memory_[next[part][column]++] = positive_zeros(p);
+        if (column != none) memory[place[column]++] = positive_zeros(p);
       }
     };
     both(threads_, [&] { put(0); }, [&] { put(1); });
@@ -116,12 +117,13 @@ class StaticHull {
     std::size_t most = 0;
     for (unsigned column = first; column < first + width_; ++column)
       most = std::max(most, end(column) - starts_[column]);
-    const auto scratch = std::make_unique_for_overwrite<Point[]>(most);
-    Chain chain(&memory_[starts_[first] - 1]);
+    const Scratch<Point> scratch(most);
+    Point* const memory = memory_->data();
+    Chain chain(&memory[starts_[first] - 1]);
     chain.push(from);
     for (unsigned column = first; column < first + width_; ++column) {
-      const std::span<Point> points(&memory_[starts_[column]], &memory_[end(column)]);
-      sort_by_point(points.data(), scratch.get(), points.size());
+      const std::span<Point> points(&memory[starts_[column]], &memory[end(column)]);
+      sort_by_point(points.data(), scratch.data(), points.size());
       if (first > 0) std::reverse(points.begin(), points.end());
       for (Point p : points) chain.push(p);
     }
@@ -136,8 +138,7 @@ class StaticHull {
   Point least_, greatest_;
   unsigned width_ = 0;
   std::vector<std::size_t> starts_;
-  std::size_t room_ = 0;
-  std::unique_ptr<Point[]> memory_;
+  std::optional<Scratch<Point>> memory_;
   std::span<const Point> vertices_;
 };
 
