@@ -7,6 +7,9 @@ from .driver import Driver
 from .hulls import Hulls
 from .live_hull import LiveHull
 
+# So many times the points that make a snapshot due are between the last two when another one does not wait for more.
+BURST = 2
+
 
 class Housekeeping:
     """The parts of the work, each called periodically by the supervisor."""
@@ -37,11 +40,13 @@ class Housekeeping:
         """Write a snapshot of every hull that needs one, one after another.
 
         A hull needs one when the batches since its last snapshot have at least as many points as the hull itself, and
-        at least `least_points`.
+        at least `least_points`. What comes between two snapshots goes into a segment after the later one: where it is
+        BURST times as much, because batches came faster than snapshots, the next one does not wait for more batches.
         """
         failure: Exception | None = None
         for hull in self._hulls:
-            if hull.unsaved < max(least_points, hull.size):
+            least = max(least_points, hull.size)
+            if hull.unsaved < least and not (hull.settings.history and hull.between >= BURST * least):
                 continue
             try:
                 await self._snapshot(hull)

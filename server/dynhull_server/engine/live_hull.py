@@ -143,9 +143,15 @@ class LiveHull:
         """The number of points in batches since the last snapshot."""
         return self._hull.unsaved
 
+    @property
+    def between(self) -> int:
+        """The number of points in batches between the last two snapshots; 0 for none since the hull was loaded."""
+        return self._hull.between
+
     def saved(self, points: int) -> None:
         """Record a snapshot, which includes batches with this number of points."""
         self._hull.unsaved -= points
+        self._hull.between = points
 
     @property
     def keyed(self) -> bool:

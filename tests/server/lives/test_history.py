@@ -79,6 +79,20 @@ def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_pa
         assert not [name for name in scrape(metrics) if name.startswith("dynhull_past_holes")]
 
 
+def test_what_was_written_faster_than_snapshots_come_is_in_segments_without_more_batches(tmp_path):
+    """The journal has no more than what makes two snapshots due, and what was written since."""
+    batches = 500
+    with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="str", history="30d")
+        with client.writer("fleet") as writer:
+            for revision in range(1, batches + 1):
+                writer.put(keys=KEYS, points=positions(revision))
+        assert client.get_hull("fleet").info.revision == batches
+        wait_until(lambda: batches * len(KEYS) - client.history("fleet").moves < 3 * 200)
+        _, points = client.track("fleet", KEYS[:1])[KEYS[0]]
+        assert points.tolist() == [positions(revision)[0].tolist() for revision in range(1, batches + 1)]
+
+
 def test_what_is_in_memory_or_a_part_of_a_file_does_not_hide_a_hole(tmp_path):
     with measured("--data", str(tmp_path), *SNAPSHOTS) as (server, metrics), HullClient(server.address) as client:
         client.create_hull("fleet", keyed="str", history="30d")
