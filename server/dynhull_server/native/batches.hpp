@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bit>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -25,8 +26,34 @@ constexpr std::int64_t FOREVER = std::numeric_limits<std::int64_t>::max();
 // The places in OPS of storage/segments/columns.py: insert, delete, put, remove; and none.
 constexpr std::int8_t NO_OP = -1, INSERT = 0, DELETE = 1, PUT = 2, REMOVE = 3;
 
-// Keys; integers as their eight bytes.
-using Wanted = std::unordered_set<std::string_view>;
+// Keys; integers as their eight bytes. Most of those that are looked up are none of these: a sieve of their lengths and
+// last bytes lets few others through.
+class Wanted {
+ public:
+  void insert(std::string_view key) {
+    keys_.insert(key);
+    const std::string padded = std::string(sizeof(std::uint64_t), '\0') + std::string(key);
+    sieve_[hole({padded.data() + sizeof(std::uint64_t), key.size()})] = true;
+  }
+
+  // There are at least eight other bytes before the key.
+  bool contains(std::string_view key) const { return sieve_[hole(key)] && keys_.contains(key); }
+
+ private:
+  static constexpr int HOLES = 12;  // bits
+
+  static std::size_t hole(std::string_view key) {
+    constexpr std::size_t SIZE = sizeof(std::uint64_t);
+    if (key.empty()) return 0;
+    std::uint64_t last;
+    std::memcpy(&last, key.data() + key.size() - SIZE, SIZE);
+    if (key.size() < SIZE) last >>= 8 * (SIZE - key.size());
+    return static_cast<std::size_t>((last ^ key.size()) * 0x9e3779b97f4a7c15 >> (64 - HOLES));
+  }
+
+  std::unordered_set<std::string_view> keys_;
+  std::bitset<std::size_t(1) << HOLES> sieve_;
+};
 
 // One batch of a payload that says nothing but what it puts and removes; others are left to Python, as is what is no
 // batch. What it has lies in the payload.
