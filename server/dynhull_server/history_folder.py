@@ -5,7 +5,7 @@ from pathlib import Path
 
 from .settings import Settings
 from .storage.segments.archive import HISTORY, Archive
-from .storage.segments.objects import archive_at
+from .storage.segments.objects import REST_SECONDS, ObjectArchive, archive_at
 from .storage.segments.owner import Claimant
 
 MICROSECONDS = 1_000_000
@@ -28,6 +28,8 @@ def archive_of(settings: Settings, data: Path | None = None, owner: Claimant | N
         place, owner = str(data / HISTORY), None
     archive = archive_at(place, settings.max_history_bytes, round(settings.max_history_age * MICROSECONDS))
     archive.owner = owner
+    if isinstance(archive, ObjectArchive):
+        archive.rest = REST_SECONDS
     return archive
 
 

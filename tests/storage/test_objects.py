@@ -8,12 +8,14 @@ from command_line import dynhull
 from filed_fleet import KEYS, Fleet, read_back
 from folders import no_progress, same
 from object_store import BUCKET, CREDENTIALS, OBJECT, object_store, place
+from patience import wait_until
 from proxy import Proxy
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.records import Delete
 from dynhull_server.storage.port import DamagedError, StorageError
 from dynhull_server.storage.rows.storage import LOOK
+from dynhull_server.storage.segments import objects as store_calls
 from dynhull_server.storage.segments.objects import ORPHAN_SECONDS, ObjectArchive
 from dynhull_server.storage.segments.owner import Claimant, OccupiedError
 from dynhull_server.storage.sqlite import copies
@@ -131,6 +133,33 @@ def test_while_the_store_fails_the_journal_keeps_what_is_due_and_takes_more(flee
     assert len(objects(fleet)) == sum(
         1 + (each.facts.state_bytes > 0) for each in fleet.storage._ledger.hulls[1].segments
     )
+
+
+def test_who_reads_while_the_store_hangs_hears_in_time_for_what_it_waits(fleet, monkeypatch):
+    """And others do not wait one behind the other."""
+    fleet.fill(3)
+    monkeypatch.setattr(store_calls, "READ_SECONDS", 0.5)
+    fleet.archive.rest = 3.0
+    fleet.proxy.silence()
+    fleet.proxy.flowing.clear()
+    reader, begun = fleet.make_reader(), time.monotonic()
+    for _ in range(20):
+        with pytest.raises(StorageError, match="revisions 1 to 7 cannot be read") as refused:
+            reader.batches(1, 0, 1)
+        assert refused.value.for_callers.endswith(
+            "cannot be read at present: the object store has not answered for 1 s"
+        )
+    assert time.monotonic() - begun < 3.0
+    fleet.proxy.flowing.set()
+
+    def read():
+        try:
+            return reader.batches(1, 0, 1)
+        except StorageError:
+            return []
+
+    wait_until(read)
+    same(read_back(reader, len(fleet.records)), fleet.records)
 
 
 def test_an_object_that_was_cut_exchanged_or_lost_is_refused_by_its_name(fleet):

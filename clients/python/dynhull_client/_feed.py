@@ -118,6 +118,7 @@ class FeedPlace(Place[FeedBatch]):
 
     def take(self, message: feed_pb2.FeedResponse) -> Sequence[FeedBatch]:
         """The batches of a message. The next connection continues after them."""
+        cause = self._cause
         self._connected()
         batches = list(self._began(message)) if self._many and self._there is not None else []
         after: int | bytes | None = (message.position or None) if self._many else message.revision
@@ -131,6 +132,8 @@ class FeedPlace(Place[FeedBatch]):
                 batches.append(decode_feed_batch(each, None if self._many else each.revision))
         if self._reports_progress and not batches and after is not None:
             batches.append(FeedBatch("progress", self.request.name, message.revision, message.uid, after=after))
+        if not message.batches:  # what follows may be what could not be read before
+            self._cause = cause
         if after is not None:
             self._unplaced.clear()
             self._go_on_from(message, after)

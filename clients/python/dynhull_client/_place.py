@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 import grpc
 
 from ._errors import DynhullError
-from ._retry import LONGEST_PAUSE, pauses, seconds_until
+from ._retry import LONGEST_PAUSE, pauses, seconds_until, with_cause
 
 Happening = TypeVar("Happening", covariant=True)
 
@@ -38,6 +38,7 @@ class Place(ABC, Generic[Happening]):
         self._longest_pause = longest_pause
         self._begun = False
         self._retries = retries
+        self._cause: DynhullError | None = None  # why the last connection was lost, while there is no other
         self._pauses = self._new_pauses()
 
     @property
@@ -61,6 +62,7 @@ class Place(ABC, Generic[Happening]):
         """A message has arrived."""
         if self.lost is not None or not self._begun:
             self.lost, self._begun, self._pauses = None, True, self._new_pauses()
+            self._cause = None
 
     def _continue_later(self, error: DynhullError) -> None:
         """Prepare the next connection after this one was lost; raises any other error.
@@ -73,7 +75,8 @@ class Place(ABC, Generic[Happening]):
             self._retries -= 1
             again = self._retries >= 0
         if not again or error.code != grpc.StatusCode.UNAVAILABLE:
-            raise error from None
+            raise with_cause(error, self._cause) from None
+        self._cause = error
         self._report_connection()
         self.pause = next(self._pauses)
 

@@ -47,6 +47,13 @@ def seconds_until(deadline: float | None) -> float | None:
     return None if deadline is None else max(0.0, deadline - monotonic())
 
 
+def with_cause(error: DynhullError, cause: DynhullError | None) -> DynhullError:
+    """The error of the last attempt; with that of the one before, if there was no time for it."""
+    if cause is None or not isinstance(error, DeadlineError):
+        return error
+    return DeadlineError(f"{error}; before: {cause}", error.code, error.reason, error.metadata)
+
+
 class Attempts:
     """The attempts at one call, which share its timeout."""
 
@@ -57,6 +64,7 @@ class Attempts:
         self._left = retries
         self._waits_in_a_crowd = retries > 0
         self._repeatable = call.repeatable
+        self._cause: DynhullError | None = None
 
     def timeout(self) -> float | None:
         """Seconds left."""
@@ -78,7 +86,8 @@ class Attempts:
             self._left -= 1
         safe = self._repeatable or error.reason in NOT_BEGUN or not_sent(error)
         if self._left < 0 or late or not passes(error) or not safe:
-            raise self._explained(call, error) from None
+            raise with_cause(self._explained(call, error), self._cause) from None
+        self._cause = error
         return call, pause
 
     def _explained(self, call: Call[Answer], error: DynhullError) -> DynhullError:

@@ -9,6 +9,7 @@ from functools import partial
 from itertools import chain, zip_longest
 from threading import Lock, Thread
 
+from ...state.errors import words_for_callers
 from ...state.records import CommitStamp, Kept, Keys, Record
 from ...state.tracks import KeyChanges
 from ...state.ways import KeyWays
@@ -218,7 +219,7 @@ class Filed:
         except StorageError as error:
             with self._turn:
                 self.unreadable.add(file)
-            why = "is missing or damaged" if isinstance(error, DamagedError) else "cannot be read at present"
+            why = "is missing or damaged" if isinstance(error, DamagedError) else words_for_callers(error)
             plainly = f"{what} cannot be read: segment {segment.file} {why}"
             raise type(error)(f"{what} cannot be read: {error}", for_callers=plainly) from error
 

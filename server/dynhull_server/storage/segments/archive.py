@@ -23,6 +23,7 @@ HISTORY = "history"  # the folder within a data folder, unless another one is na
 DIGEST_BYTES = 16
 # Who needs a part of a file reads and checks whole blocks of it: a group of rows is in one or two.
 BLOCK, BLOCK_DIGEST_BYTES = 2**16, 8
+WAITED = "cannot be read at present: {}"
 NEEDS = "needs pyarrow: pip install 'dynhull[history]'"
 
 
@@ -156,7 +157,7 @@ class Archive:
             StorageError: the file cannot be read at present.
         """
         with self._reading(file):
-            content = self.content(file, wrote.bytes)
+            content = self._for_reader(file, wrote.bytes)
         if len(content) != wrote.bytes or digest_of(content) != wrote.digest:
             raise _changed(self.path / file)
         return content
@@ -194,7 +195,12 @@ class Archive:
         except FileNotFoundError:
             raise DamagedError(f"{path} is missing: restore a backup") from None
         except OSError as error:
-            raise StorageError(f"{path} cannot be read: {error}") from error
+            why = WAITED.format(error.strerror) if error.errno == errno.ETIMEDOUT else "cannot be read at present"
+            raise StorageError(f"{path} cannot be read: {error}", for_callers=why) from error
+
+    def _for_reader(self, file: str, size: int) -> bytes:
+        """The same as `content`, for who waits for it."""
+        return self.content(file, size)
 
     def content(self, file: str, size: int = 0) -> bytes:
         """All bytes of a file, whatever they are; no more than one byte more than a size, if that is not 0.

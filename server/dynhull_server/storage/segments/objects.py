@@ -16,7 +16,7 @@ from concurrent.futures import TimeoutError as TooLongError
 from functools import partial
 from pathlib import Path
 from threading import BoundedSemaphore, Lock, Thread
-from time import time
+from time import monotonic, time
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
@@ -35,6 +35,9 @@ CONNECT_SECONDS, SILENT_SECONDS = 5.0, 5.0
 # Seconds for a call, and bytes in each further one.
 CALL_SECONDS, SLOWEST_BYTES = 30.0, 250_000
 CALLS = 8  # at a time, also of those that were given up and hang
+# Who reads the past of a hull waits for an answer: less than clients wait by default, also behind another one. After a
+# read that was given up, others are for some time refused with the same words, so that they do not wait one by one.
+READ_SECONDS, REST_SECONDS = 10.0, 5.0
 ORPHAN_SECONDS = 86_400.0
 
 
@@ -53,7 +56,12 @@ class ObjectArchive(Archive):
         place: its address, without credentials.
         most_bytes, most_age: as of other archives.
         seconds: for a call.
+
+    Attributes:
+        rest: for how many seconds reads are refused at once after one that was given up.
     """
+
+    rest = 0.0
 
     takes_late = True
     has_parts = False  # an object is asked for once
@@ -67,6 +75,7 @@ class ObjectArchive(Archive):
         self._places = BoundedSemaphore(CALLS)
         self._making = Lock()
         self._made: FileSystem | None = None
+        self._away: tuple[float, OSError] | None = None  # until when reads are refused, and why
 
     def write(self, file: str, content: bytes) -> Written:
         """Write an object, and read it: what comes back is what was sent.
@@ -86,10 +95,10 @@ class ObjectArchive(Archive):
             with self._store().open_output_stream(self._key(file)) as stream:
                 stream.write(content)
 
-        self._ask(file, put, len(content))
+        self._ask(file, put, self._seconds, len(content))
 
     def _drop(self, file: str) -> None:
-        self._ask(file, partial(self._removed, self._key(file)))
+        self._ask(file, partial(self._removed, self._key(file)), self._seconds)
 
     def _claims(self) -> set[str]:
         return {each.base_name for each in self._listed(CLAIMS)}
@@ -102,7 +111,7 @@ class ObjectArchive(Archive):
             found = self._store().get_file_info(FileSelector(self._key(folder), allow_not_found=True))
             return [each for each in found if each.type == FileType.File]
 
-        return self._ask(folder, look)
+        return self._ask(folder, look, self._seconds)
 
     def content(self, file: str, size: int = 0) -> bytes:
         """All bytes of an object, whatever they are; no more than one byte more than a size, if that is not 0.
@@ -111,14 +120,25 @@ class ObjectArchive(Archive):
             FileNotFoundError: it is not there.
             OSError: the store refuses, or does not answer.
         """
-        key = self._key(file)
+        return self._ask(file, partial(self._get, file, size), self._seconds, size)
 
-        def get() -> bytes:
-            with self._store().open_input_file(key) as stream:
-                found: bytes = stream.read(size + 1 if size else None)
-            return found
+    def _for_reader(self, file: str, size: int) -> bytes:
+        away = self._away
+        if away is not None and monotonic() < away[0]:
+            raise away[1]
+        try:
+            found = self._ask(file, partial(self._get, file, size), min(READ_SECONDS, self._seconds), size)
+        except OSError as error:
+            if error.errno == errno.ETIMEDOUT:
+                self._away = monotonic() + self.rest, error
+            raise
+        self._away = None
+        return found
 
-        return self._ask(file, get, size)
+    def _get(self, file: str, size: int) -> bytes:
+        with self._store().open_input_file(self._key(file)) as stream:
+            found: bytes = stream.read(size + 1 if size else None)
+        return found
 
     def remove(self, file: str) -> None:
         """Remove the objects of a segment; those that are not there are passed over.
@@ -133,7 +153,7 @@ class ObjectArchive(Archive):
     def files(self, file: str) -> Iterator[str]:
         """The names of the objects of a segment that are there."""
         yield file + BATCHES
-        if self._ask(file, lambda: self._is_there(self._key(file + STATE))):
+        if self._ask(file, lambda: self._is_there(self._key(file + STATE)), self._seconds):
             yield file + STATE
 
     def orphans(self, uid: str, epoch: int) -> list[str]:
@@ -187,13 +207,14 @@ class ObjectArchive(Archive):
 
         return bool(self._store().get_file_info(key).type != FileType.NotFound)
 
-    def _ask(self, what: str, function: Callable[[], Result], size: int = 0) -> Result:
-        """The result of a function that asks the store, in a thread of its own.
+    def _ask(self, what: str, function: Callable[[], Result], seconds: float, size: int = 0) -> Result:
+        """The result of a function that asks the store for so many bytes, in a thread of its own.
 
         Raises:
             OSError: there is none in time, or too many calls hang; or what the function raises.
         """
-        seconds = self._seconds + size / SLOWEST_BYTES
+        seconds += size / SLOWEST_BYTES
+        until = monotonic() + seconds
         late = OSError(errno.ETIMEDOUT, f"the object store has not answered for {seconds:.0f} s", what)
         if not self._places.acquire(timeout=seconds):
             raise late
@@ -201,7 +222,7 @@ class ObjectArchive(Archive):
         # It must not keep the process from ending.
         Thread(target=self._call, args=(function, answer), name="object store", daemon=True).start()
         try:
-            return answer.result(seconds)
+            return answer.result(max(0.0, until - monotonic()))
         except TooLongError:
             raise late from None
 
