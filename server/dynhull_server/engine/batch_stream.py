@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..state.batch import Write
 from ..state.events import Arrived, Gone
 from ..state.hull import Hull
-from ..state.requests import Request, Stream, WriteBatch
+from ..state.requests import Birth, Request, Stream, WriteBatch
 
 if TYPE_CHECKING:
     from ..state.batch import Applied
@@ -35,19 +35,32 @@ class BatchStream:
         self._stream = Stream(name, hull)
         self._notify = notify
 
+    def write_one(self, write: Write) -> None:
+        """Send a batch."""
+        applied = self._driver.write_at_once(self._stream, write)
+        if applied is not None:
+            self.applied.append((write.sequence, applied))
+            self._notify()
+            return
+        self.batches += 1
+        self.rows += write.rows
+        self._driver.dispatch(WriteBatch(self, write, self._birth(), self._stream))
+
     def write(self, writes: Sequence[Write]) -> None:
         """Send batches that have arrived together."""
-        stream = self._stream
-        birth = self._driver.birth() if stream.hull is None else None
-        requests = []
-        for write in writes:
-            requests.append(WriteBatch(self, write, birth, stream))
-            self.rows += write.rows
+        if len(writes) == 1:
+            self.write_one(writes[0])
+            return
+        birth = self._birth()
+        requests = [WriteBatch(self, write, birth, self._stream) for write in writes]
         self.batches += len(requests)
-        if len(requests) == 1:
-            self._driver.dispatch(requests[0])
-        elif requests:
+        self.rows += sum(write.rows for write in writes)
+        if requests:
             self._driver.dispatch(Arrived(requests))
+
+    def _birth(self) -> Birth | None:
+        """The origin of the hull, if the stream may create it; None once it has written to one."""
+        return self._driver.birth() if self._stream.hull is None else None
 
     def answer(self, request: Request) -> None:
         """Take the answer to a batch."""

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, Protocol, assert_never
 
 from ..state import events
+from ..state.batch import Applied, Write
 from ..state.core import Core, not_stored
 from ..state.errors import StoppingError
 from ..state.events import (
@@ -35,7 +36,7 @@ from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.limits import Limits
 from ..state.records import CommitStamp, Kept
-from ..state.requests import Birth, Expire, Request, WriteBatch
+from ..state.requests import Birth, Expire, Request, Stream, WriteBatch
 from ..state.trip import Trip
 from ..storage.port import Storage
 from .group_commit import GroupCommit
@@ -224,6 +225,23 @@ class Driver:
         finally:
             self._stepping = False
 
+    def write_at_once(self, stream: Stream, write: Write) -> Applied | None:
+        """The result of a small batch of a stream, which is applied without a request; None if it takes one."""
+        if self._stepping:
+            return None
+        try:
+            written = self.core.write_at_once(stream, write)
+            if written is None:
+                return None
+            hull, applied = written
+            if not applied.duplicate:
+                self._number_commit()
+                self._hulls.moved((hull,))
+        except Exception as error:  # a bug in the core: its state is no longer reliable
+            self.supervisor.died("core", error)
+            raise
+        return applied
+
     async def ask(self, request: Request) -> Any:
         """The result of a request with a Waiter, or raise its error. Cancelling the caller ends only the wait."""
         waiter = request.to
@@ -322,8 +340,8 @@ class Driver:
         match effect:
             case Reply():
                 if effect.moved:
-                    if not self._storage.keeps:  # it does not number its commits: nor does it need their time exactly
-                        self.published = CommitStamp(self.published[0] + 1, self._ticked)
+                    if not self._storage.keeps:
+                        self._number_commit()
                     self._hulls.moved(effect.moved)
                 for request in effect.requests:
                     request.to.answer(request)
@@ -342,6 +360,10 @@ class Driver:
                 self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))
             case _:
                 assert_never(effect)
+
+    def _number_commit(self) -> None:
+        """Number a commit of a storage that keeps none of them, nor needs their time exactly."""
+        self.published = CommitStamp(self.published[0] + 1, self._ticked)
 
     def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
         if trip is None:  # the storage is immediate

@@ -122,7 +122,8 @@ class StreamedBatches:
         self._hulls = hulls
         self._driver = driver
         self._uid: str = first.uid
-        self._decode_write = partial(decode_write, name, self._producer, call.owner, self._may_skip)
+        self._owner = call.owner
+        self._decode_write = partial(decode_write, name, self._producer, self._owner, self._may_skip)
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._loop = asyncio.get_running_loop()
@@ -169,13 +170,6 @@ class StreamedBatches:
 
     async def take(self, message: Any) -> None:
         """Send the batches of a message; those before an invalid one, too."""
-        if type(message) is PointsMessage:
-            batch = message.batch() if not self._producer and message.name in self._own_names else None
-            if batch is not None:
-                rows = self._call.message_bytes // decode.BYTES_PER_POINT
-                self._send([Write(self.name, batch, self._driver.time(), rows, "", 0, self._call.owner)])
-                return
-            message = message.whole()
         name, producer = message.name, message.producer
         if name and name != self.name:
             raise decode.InvalidFieldError("name", name, f"this call writes to {self.name!r}")
@@ -214,9 +208,25 @@ class StreamedBatches:
                     message = await self._call.read()
                     if message is None:
                         return
+                    if type(message) is PointsMessage:
+                        if self._take_points(message):
+                            continue
+                        message = message.whole()
                     await self.take(message)
         except Exception as failure:  # raised after the batches before it are answered
             self._failure = failure
+
+    def _take_points(self, message: PointsMessage) -> bool:
+        """Send the batch of a message with points and nothing else; False if it has to be taken as a whole."""
+        if self._producer or message.name not in self._own_names:
+            return False
+        batch = message.batch()
+        if batch is None:
+            return False
+        rows = self._call.message_bytes // decode.BYTES_PER_POINT
+        self._arrivals.append(time.perf_counter())
+        self._batches.write_one(Write(self.name, batch, self._driver.time(), rows, "", 0, self._owner))
+        return True
 
     def _require_batches_alone(self, message: Any, batches: int) -> None:
         """Refuse several batches where the call has not asked for them, too many, or one beside them."""

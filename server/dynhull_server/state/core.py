@@ -62,6 +62,7 @@ from .requests import (
     ReadHull,
     ReadTogether,
     Request,
+    Stream,
     Together,
     WriteBatch,
     WriteTogether,
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
 
     from sortedcontainers import SortedDict
 
+    from .batch import Applied, Write
     from .fences.model.records import KeptFence
 
 # A request for at most this many points runs at once: a tenth of a millisecond. It holds the GIL anyway.
@@ -304,7 +306,7 @@ class Core:
         if request.stream is not None and request.stream.stopped:
             return
         records: list[Record] | None = [] if self._keeps else None
-        applied = write(request, hull, self._now, records)
+        applied = None if hull.state.torn else write(request, hull, self._now, records)
         line = queue.line
         if line is not None and applied is not None and line.stirred(hull, applied, request.write.arrived):
             trip = self._new_trip([queue], [request])
@@ -323,6 +325,29 @@ class Core:
             self._ran(trip, effects)
         else:
             effects.append(Reply([request]))
+
+    def write_at_once(self, stream: Stream, write: "Write") -> "tuple[Hull, Applied] | None":
+        """Apply a small batch of a stream as `_write` does, without a request; the hull and the result.
+
+        None where it takes one: the batch is refused, or something goes on in the queue of the hull, or depends on it.
+        Then nothing has changed, unless the hull is torn.
+        """
+        queue = self._queues.get(stream.name)
+        if queue is None or queue.trip is not None or queue.waiting or self._stopping or not self._immediate:
+            return None
+        hull = queue.hull
+        if hull is None or hull is not stream.hull or stream.stopped or hull.divided or write.rows > SMALL:
+            return None
+        if self._keeps or queue.line is not None or self._schedule.fences:
+            return None
+        try:
+            applied = hull.state.apply(write, self._now, None)
+        except Exception:  # a request is refused with it
+            return None
+        hull.counts = hull.state.counts
+        if hull.timed:
+            self._schedule.plan(hull)
+        return hull, applied
 
     def _gone(self, event: Gone, effects: list[Effect]) -> None:
         event.what.leave()

@@ -240,7 +240,7 @@ class HullState:
             self._producers.applied(write.producer, write.sequence, write.owner, now, may_skip=write.may_skip)
         if gone:
             applied.expired = gone
-        chosen = self.center if self._follow_center() else None
+        chosen = self.center if contents.globe is not None and self._follow_center() else None
         cause = contents.cause(batch)
         self._applied(applied.points, cause, hull_changed=applied.hull_changed)
         if records is not None:
@@ -302,17 +302,21 @@ class HullState:
 
     def _applied(self, points: int, cause: Cause, *, hull_changed: bool, revision: int | None = None) -> None:
         """Update the counts and what was sent after a change, by default that of the next revision."""
-        before, center = self.counts, self.center
+        before = self.counts
+        globe = self.contents.globe
+        center = None if globe is None else globe.center
         revision, outlined = before.revision + 1 if revision is None else revision, before.outlined
         if hull_changed:
             outlined = self._changed_at = revision
             self._sent.changed(revision)
-        if center != before.center:
+        if center is not before.center and center != before.center:
             outlined = revision
         self.counts = self._counted(revision, points, cause, center, outlined)
 
     def _counted(self, revision: int, points: int, cause: Cause | None, center: Center | None, outlined: int) -> Counts:
-        distinct, clock, quarantine = self.hull.distinct, self.contents.clock, self.quarantine
+        contents = self.contents
+        distinct, clock = self.hull.distinct, contents.clock
+        quarantine = contents.quarantine if isinstance(contents, Keyed) else None
         if quarantine is None:
             return Counts(revision, points, distinct, clock, cause, center, outlined)
         held, rules = len(quarantine), quarantine.rules
