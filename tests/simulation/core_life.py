@@ -73,6 +73,7 @@ from dynhull_server.state.requests import (
     ReadHull,
     Recenter,
     Request,
+    Stream,
     WriteBatch,
     WriteTogether,
 )
@@ -221,6 +222,18 @@ class CoreServer:
             for effect in self.core.step(self._events.popleft()):
                 self._carry_out(effect)
         self._stepping = False
+
+    def write_at_once(self, stream: Stream, write: Write) -> Applied | None:
+        """The result of a batch that the core applies without a request, as the driver has it; None if it takes one."""
+        written = None if self._stepping else self.core.write_at_once(stream, write)
+        if written is None:
+            return None
+        hull, applied, changes = written
+        if changes:
+            self._commit(None, changes)
+        self._carry_out(Reply([], () if applied.duplicate else (hull,)))
+        self.schedule.note(("at once", applied.revision))
+        return applied
 
     def _carry_out(self, effect: Effect) -> None:
         match effect:

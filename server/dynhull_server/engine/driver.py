@@ -233,10 +233,11 @@ class Driver:
             written = self.core.write_at_once(stream, write)
             if written is None:
                 return None
-            hull, applied = written
+            hull, applied, changes = written
+            if changes:
+                self._commit(None, changes)
             if not applied.duplicate:
-                self._number_commit()
-                self._hulls.moved((hull,))
+                self._moved((hull,))
         except Exception as error:  # a bug in the core: its state is no longer reliable
             self.supervisor.died("core", error)
             raise
@@ -340,9 +341,7 @@ class Driver:
         match effect:
             case Reply():
                 if effect.moved:
-                    if not self._storage.keeps:
-                        self._number_commit()
-                    self._hulls.moved(effect.moved)
+                    self._moved(effect.moved)
                 for request in effect.requests:
                     request.to.answer(request)
             case Divide():
@@ -361,9 +360,10 @@ class Driver:
             case _:
                 assert_never(effect)
 
-    def _number_commit(self) -> None:
-        """Number a commit of a storage that keeps none of them, nor needs their time exactly."""
-        self.published = CommitStamp(self.published[0] + 1, self._ticked)
+    def _moved(self, hulls: Sequence[Hull]) -> None:
+        if not self._storage.keeps:  # it does not number its commits: nor does it need their time exactly
+            self.published = CommitStamp(self.published[0] + 1, self._ticked)
+        self._hulls.moved(hulls)
 
     def _commit(self, trip: Trip | None, changes: list[Any]) -> None:
         if trip is None:  # the storage is immediate

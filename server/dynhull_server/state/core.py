@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from sortedcontainers import SortedDict
 
     from .batch import Applied, Write
+    from .changes import Change
     from .fences.model.records import KeptFence
 
 # A request for at most this many points runs at once: a tenth of a millisecond. It holds the GIL anyway.
@@ -326,8 +327,8 @@ class Core:
         else:
             effects.append(Reply([request]))
 
-    def write_at_once(self, stream: Stream, write: "Write") -> "tuple[Hull, Applied] | None":
-        """Apply a small batch of a stream as `_write` does, without a request; the hull and the result.
+    def write_at_once(self, stream: Stream, write: "Write") -> "tuple[Hull, Applied, list[Change]] | None":
+        """Apply a small batch of a stream as `_write` does, without a request: the hull, the result, what to commit.
 
         None where it takes one: the batch is refused, or something goes on in the queue of the hull, or depends on it.
         Then nothing has changed, unless the hull is torn.
@@ -338,16 +339,17 @@ class Core:
         hull = queue.hull
         if hull is None or hull is not stream.hull or stream.stopped or hull.divided or write.rows > SMALL:
             return None
-        if self._keeps or queue.line is not None or self._schedule.fences:
+        if queue.line is not None or self._schedule.fences:
             return None
+        records: list[Record] | None = [] if self._keeps else None
         try:
-            applied = hull.state.apply(write, self._now, None)
+            applied = hull.state.apply(write, self._now, records)
         except Exception:  # a request is refused with it
             return None
         hull.counts = hull.state.counts
         if hull.timed:
             self._schedule.plan(hull)
-        return hull, applied
+        return hull, applied, [Append(hull.row.number, records)] if records else []
 
     def _gone(self, event: Gone, effects: list[Effect]) -> None:
         event.what.leave()

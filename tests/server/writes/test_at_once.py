@@ -13,7 +13,7 @@ from dynhull_server.state.batch import NO_POINTS, Applied, Batch, KeyedBatch, Wr
 from dynhull_server.state.contents.multiset import Multiset
 from dynhull_server.state.core import SMALL, Core
 from dynhull_server.state.errors import PointMissingError, SequenceGapError
-from dynhull_server.state.events import Compute, Effect, Event, Examine, Gone, Reply, Stopping
+from dynhull_server.state.events import Commit, Committed, Compute, Effect, Event, Examine, Gone, Reply, Stopping
 from dynhull_server.state.fences.model.config import FenceConfig
 from dynhull_server.state.fences.model.requests import CreateFence
 from dynhull_server.state.hull import Hull
@@ -25,8 +25,8 @@ CREATED = Birth("uid", 0.0)
 ONE: Batch = Batch(np.array([[1.0, 2.0]]), NO_POINTS, 0, False)
 
 
-def serving(settings: HullSettings = DEFAULT) -> tuple[Core, Stream]:
-    core = Core(LIMITS, immediate=True, keeps=False)
+def serving(settings: HullSettings = DEFAULT, *, keeps: bool = False) -> tuple[Core, Stream]:
+    core = Core(LIMITS, immediate=True, keeps=keeps)
     core.step(CreateHull(None, NAME, CREATED, settings))
     return core, Stream(NAME, core.get(NAME))
 
@@ -65,9 +65,10 @@ KINDS: list[tuple[HullSettings, Callable[[np.random.Generator, int], Any]]] = [
 
 @pytest.mark.parametrize(("settings", "make"), KINDS)
 @pytest.mark.parametrize("producer", ["", "p"])
-def test_as_with_a_request(settings: HullSettings, make: Any, producer: str) -> None:
+@pytest.mark.parametrize("keeps", [False, True])
+def test_as_with_a_request(settings: HullSettings, make: Any, producer: str, *, keeps: bool) -> None:
     random = np.random.default_rng(11)
-    (core, stream), (other, its_stream) = serving(settings), serving(settings)
+    (core, stream), (other, its_stream) = serving(settings, keeps=keeps), serving(settings, keeps=keeps)
     for number in range(200):
         again = number % 7 == 3
         sequence = (number if again else number + 1) if producer else 0
@@ -77,9 +78,12 @@ def test_as_with_a_request(settings: HullSettings, make: Any, producer: str) -> 
         found = core.write_at_once(stream, write)
         assert found is not None
         request = WriteBatch(None, write, None, its_stream)
-        answered(other, request)
+        effects = answered(other, request)
         assert request.error is None
-        assert found == (core.get(NAME), request.result)
+        hull, applied, changes = found
+        assert (hull, applied) == (core.get(NAME), request.result)
+        committed = [change for effect in effects if isinstance(effect, Commit) for change in effect.changes]
+        assert (repr(changes), bool(changes)) == (repr(committed), keeps and not applied.duplicate)
         assert request.result.duplicate == (again and bool(producer))
         mine, theirs = core.get(NAME), other.get(NAME)
         assert (mine.counts, mine.due) == (theirs.counts, theirs.due)
@@ -125,16 +129,17 @@ def test_only_where_nothing_goes_on(what: Callable[[Core, Stream], None]) -> Non
     assert (core.hulls[NAME].state.counts if NAME in core.hulls else None) is before
 
 
-def test_large_batches_and_kept_ones_take_a_request() -> None:
+def test_large_batches_and_commits_that_take_time_need_a_request() -> None:
     core, stream = serving()
     assert core.write_at_once(stream, Write(NAME, ONE, 1, SMALL)) is not None
     assert core.write_at_once(stream, Write(NAME, ONE, 1, SMALL + 1)) is None
     assert core.write_at_once(Stream(NAME), Write(NAME, ONE, 1, 1)) is None  # it may have to create the hull
-    for immediate, keeps in ((True, True), (False, True)):
-        kept = Core(LIMITS, immediate=immediate, keeps=keeps)
-        kept.step(CreateHull(None, NAME, CREATED))
-        hull = kept.hulls.get(NAME)
-        assert kept.write_at_once(Stream(NAME, hull), Write(NAME, ONE, 1, 1)) is None
+    waits = Core(LIMITS)
+    for effect in waits.step(CreateHull(None, NAME, CREATED)):
+        assert isinstance(effect, Commit)
+        assert effect.ticket is not None
+        waits.step(Committed(effect.ticket))
+    assert waits.write_at_once(Stream(NAME, waits.get(NAME)), Write(NAME, ONE, 1, 1)) is None
 
 
 @pytest.mark.parametrize(
