@@ -9,7 +9,7 @@ from ._fence_index import Crossings, FenceIndex
 from ._geo import GeoHull, GeoKeyedHull, GeoWindowHull
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL, set_threads
-from ._keyed import KeyedHull, Put
+from ._keyed import KeyedHull, KeyedLoader, Put
 from ._predicates import orient2d
 from ._window import WindowHull
 from .static import convex_hull
@@ -24,6 +24,7 @@ __all__ = [
     "GeoKeyedHull",
     "GeoWindowHull",
     "KeyedHull",
+    "KeyedLoader",
     "MissingKeyError",
     "MissingPointError",
     "Put",

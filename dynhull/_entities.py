@@ -110,6 +110,7 @@ class Entities(HullTree):
         self.key_type: KeyType = key_type
         self.ordered = ordered
         self._held: dict[Key, tuple[Point, float]] = {}  # place and time of each key
+        self._whole = True  # whether the tree has their places
         self._journal_of: Callable[[], Journal | None] = _no_journal
 
     def clear(self) -> None:
@@ -121,7 +122,7 @@ class Entities(HullTree):
     def copy(self) -> Self:
         """Independent entities with the same keys, points and times. O(n)."""
         new = super().copy()
-        new.key_type, new.ordered, new._held = self.key_type, self.ordered, self._held.copy()
+        new.key_type, new.ordered, new._held, new._whole = self.key_type, self.ordered, self._held.copy(), self._whole
         return new
 
     # Updates
@@ -146,6 +147,18 @@ class Entities(HullTree):
     def load(self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None) -> None:
         """Put all rows, like `update`; a time that is NaN means none."""
         self._put_rows(*self._checked(keys, xy, times, or_none=not self.ordered), None)
+
+    def begin_load(self) -> None:
+        """Put off the tree, for some calls of `load` and `remove_many`: of several batches it is built once."""
+        if type(self) is not Entities or self._held:
+            raise ValueError("only an empty hull of a plane is loaded so")
+        self._whole = False
+
+    def end_load(self) -> None:
+        """Build the tree. O(n log n)."""
+        if not self._whole:
+            self._whole = True
+            self._apply_net(Counter(p for p, _ in self._held.values()))
 
     def put(self, key: Any, x: float, y: float, time: float | None, only: Only | None) -> bool:
         """Insert or move one entity. True if the hull changed. O(log² n)."""
@@ -227,7 +240,8 @@ class Entities(HullTree):
                 net[held[0]] -= 1
                 net[p] += 1
             changed[key] = p, time
-        self._apply_net(net)
+        if self._whole:
+            self._apply_net(net)
         self._note(changed)
         self._held.update(changed)
         return new, moved, unmoved, stale, skipped
@@ -238,7 +252,8 @@ class Entities(HullTree):
         net: Counter[Point] = Counter()
         for key in keys:
             net[self._held.pop(key)[0]] -= 1
-        self._apply_net(net)
+        if self._whole:
+            self._apply_net(net)
         return len(keys)
 
     # The journal

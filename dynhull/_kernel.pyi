@@ -250,6 +250,12 @@ class Entities:
     def load(self, keys: object | None, xy: object | None, times: object | None) -> None:
         """Put all rows; a time that is NaN means none."""
 
+    def begin_load(self) -> None:
+        """Put off the tree, for some calls of `load` and `remove_many`."""
+
+    def end_load(self) -> None:
+        """Build the tree. O(n log n)."""
+
     def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool:
         """Insert or move one entity. True if the hull changed. O(log² n)."""
 

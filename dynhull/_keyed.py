@@ -280,6 +280,20 @@ class KeyedHull(Keyed, Hull):
         hull._tree.load(keys, xy, times)
         return hull
 
+    @classmethod
+    def loader(cls, key_type: KeyType = "str", *, ordered: bool = False) -> KeyedLoader:
+        """What takes the entities of a new hull in several batches, as from a log, and builds the hull once.
+
+        >>> from dynhull import KeyedHull
+        >>> loader = KeyedHull.loader()
+        >>> loader.update(["LH400", "UA17"], [(0, 0), (4, 0)])
+        >>> loader.update(["UA17", "AF84"], [(5, 1), (0, 3)])
+        >>> loader.remove_many(["LH400", "BA9"])
+        >>> loader.hull().vertex_keys()
+        ['AF84', 'UA17']
+        """
+        return KeyedLoader(cls(key_type, ordered=ordered))
+
     # As a value
 
     def __getstate__(self) -> tuple[KeyType, bool, tuple[Keys, Points, npt.NDArray[np.float64]], int]:
@@ -291,6 +305,44 @@ class KeyedHull(Keyed, Hull):
         self._tree.load(*entities)
         self._tree.changes = changes
         self._measured = (changes, {})
+
+
+class KeyedLoader:
+    """The entities of a hull that is to be built: see `KeyedHull.loader`."""
+
+    __slots__ = ("_hull",)
+
+    def __init__(self, hull: KeyedHull) -> None:
+        self._hull: KeyedHull | None = hull
+        hull._tree.begin_load()
+
+    def update(self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None) -> None:
+        """Insert or move k entities, as `KeyedHull.update` does; a time that is NaN means none. O(k).
+
+        Raises:
+            DuplicateKeyError: a key comes twice in these.
+        """
+        self._loading()._tree.load(keys, xy, times)
+
+    def remove_many(self, keys: Any) -> None:
+        """Remove those of k entities that are there. O(k).
+
+        Raises:
+            DuplicateKeyError: a key comes twice in these.
+        """
+        self._loading()._tree.remove_many(keys, True)
+
+    def hull(self) -> KeyedHull:
+        """The hull of the entities, which is built now. O(n log n). Nothing can be asked of the loader afterwards."""
+        hull = self._loading()
+        hull._tree.end_load()
+        self._hull = None
+        return hull
+
+    def _loading(self) -> KeyedHull:
+        if self._hull is None:
+            raise ValueError("the loader has given its hull away")
+        return self._hull
 
 
 def _known(only: Only | None) -> Only | None:

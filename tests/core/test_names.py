@@ -16,7 +16,7 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library"
 PACKAGES = {
     "dynhull": {
         *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d", "set_threads"),
-        *("KeyedHull", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings"),
+        *("KeyedHull", "KeyedLoader", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings"),
         *("GeoHull", "GeoKeyedHull", "GeoWindowHull"),
         *("arrays", "keys", "measure", "robust", "static"),  # imported with it
     },

@@ -83,6 +83,37 @@ def test_a_fleet(kind, key_type, ordered):
         both.agree()
 
 
+@pytest.mark.parametrize("ordered", [False, True])
+@pytest.mark.parametrize("key_type", ["str", "int"])
+def test_a_hull_that_is_loaded_in_several_batches(key_type, ordered):
+    """It is as one that has had them one after the other, and what is refused meanwhile changes nothing."""
+    random = np.random.default_rng(11)
+    loaded, updated = Both(key_type, ordered), Both(key_type, ordered)
+    loaded("begin_load")
+    for step, size in enumerate((900, 30, 700, 64, 0, 1)):
+        numbers = random.permutation(1000)[:size].astype(np.uint64)
+        keys = PackedKeys.pack([f"key {each}" for each in numbers]) if key_type == "str" else numbers
+        places, times = cloud("grid", size, random), random.integers(0, 50, size).astype(float)
+        for both in (loaded, updated):
+            both("load", keys, places, times)
+            both("remove_many", [*keys][: size // 5], True)
+            both("load", [*keys, *keys][: size + 2], np.zeros((size + 2, 2)), np.zeros(size + 2))
+            both("remove_many", [*keys, *keys][: size + 1], True) if size else None
+        if step == 3:
+            loaded("load", keys, np.full((size, 2), np.nan), times)
+    loaded("end_load")
+    loaded.agree()
+    for each in ("points", "entities", "vertices", "vertex_keys"):
+        same_as, found = getattr(updated.reference, each)(), getattr(loaded.reference, each)()
+        assert repr(found) == repr(same_as)
+    loaded("begin_load")  # it is not empty any more
+    keys = [*updated.reference.entities()[0]][:20]
+    for both in (loaded, updated):
+        both("update", keys, cloud("circle", 20, np.random.default_rng(1)), np.full(20, 60.0), None)
+        both("expire", 30.0)
+        both.agree()
+
+
 CLOCKS = {
     "in order": lambda now, size, random: now + np.sort(random.random(size)),
     "stragglers": lambda now, size, random: now - random.exponential(3, size),

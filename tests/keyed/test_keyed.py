@@ -117,6 +117,29 @@ def test_other_refusals(make, hull):
     assert hull == before
 
 
+def test_a_loader_gives_the_hull_of_all_batches():
+    for key_type, keys in (("str", ["a", "b", "c", "d"]), ("int", [1, 2, 3, 4])):
+        loader = KeyedHull.loader(key_type)
+        loader.update(keys[:3], [[0, 0], [4, 0], [0, 4]], [1, nan, 2])
+        loader.update(keys[1:3], [[5, 0], [0, 4]])
+        loader.remove_many(keys[:1] + keys[3:])
+        for bad in (lambda: loader.update(keys[:2], [[1, 1]] * 3), lambda: loader.update(keys[:1] * 2, [[1, 1]] * 2)):  # noqa: B023
+            with pytest.raises(ValueError, match=r"points must have one row|both"):
+                bad()
+        loader.update(keys[3:], [[9, 9]], [3])
+        hull = loader.hull()
+        hull.check()
+        assert hull == KeyedHull.from_entities(keys[1:], [[5, 0], [0, 4], [9, 9]], [nan, nan, 3], key_type)
+        for call in (loader.hull, lambda: loader.update(keys[:1], [[1, 1]]), lambda: loader.remove_many(keys)):  # noqa: B023
+            with pytest.raises(ValueError, match="the loader has given its hull away"):
+                call()
+        assert len(hull) == 3
+    with pytest.raises(ValueError, match="times is None"):
+        KeyedHull.loader(ordered=True).update(["a"], [[0, 0]])
+    with pytest.raises(ValueError, match="key_type must be"):
+        KeyedHull.loader("float")
+
+
 def test_missing_keys(hull):
     with pytest.raises(MissingKeyError, match=r"^keys row 1: the key 'z' is missing; nothing was changed$"):
         hull.remove_many(["a", "z"])

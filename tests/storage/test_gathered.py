@@ -13,20 +13,24 @@ from hypothesis import strategies as st
 from dynhull.keys import PackedKeys
 from dynhull_server.compiled import native
 from dynhull_server.state.batch import Batch, KeyedBatch, Write
+from dynhull_server.state.contents import begun
 from dynhull_server.state.errors import MisfitError, RefusedError
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import CommitStamp, HullRow, HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.state.root_state import state_of
 from dynhull_server.storage.of_keys import changes_of_keys
+from dynhull_server.storage.port import DamagedError
 from dynhull_server.storage.rows import batch_columns, past_rows
 from dynhull_server.storage.rows.batch_columns import columns_of_rows
 from dynhull_server.storage.rows.encoding import STRINGS, encode
 from dynhull_server.storage.rows.past_rows import gathered_after
+from dynhull_server.storage.segments import by_key, parquet
 from dynhull_server.storage.segments import gathered as gathering
 from dynhull_server.storage.segments.archive import Parts
-from dynhull_server.storage.segments.columns import Batches, columns_of
+from dynhull_server.storage.segments.columns import Batches, columns_of, joined
 from dynhull_server.storage.segments.gathered import gathered, key_codes
-from dynhull_server.storage.segments.parquet import from_parquet, keys_from_parquet, to_parquet
+from dynhull_server.storage.segments.parquet import from_parquet, keys_from_parquet, rows_from_parquet, to_parquet
 
 LIMITS = Limits(10, 1000, 10, 10, 10**6)
 SECOND = 10**6
@@ -113,6 +117,13 @@ def seen(state):
     return [state.counts, state.committed, state.vertices(), keys, state.kept()]
 
 
+def built(hull, records, after, found):
+    """A hull that is built once, of its state at a revision and of what follows it, as for who asks for the past."""
+    kept = HullState(LIMITS, hull, Kept(records=records[:after]), 0.0).kept()
+    contents = begun(kept, hull, LIMITS.points_of(hull))
+    return state_of(LIMITS, hull, dataclasses.replace(kept, records=found), 0.0, contents)
+
+
 def require_same(hull, records, after, batches):
     """Gathered from a revision on, batches lead to the state that they lead to one by one; returns what is applied."""
     found = list(gathered(batches, hull, after, len(records)))
@@ -121,6 +132,7 @@ def require_same(hull, records, after, batches):
         one.catch_up([record], 0.0)
     if found:
         other.catch_up(found, 0.0)
+        same(seen(built(hull, records, after, found)), seen(one))
     same(seen(other), seen(one))
     return found
 
@@ -134,6 +146,72 @@ def test_gathered_batches_lead_to_the_same_state(kind, steps, after):
     if records:
         batches = Batches(from_parquet(to_parquet(columns_of(records, hull.identity), {}), "a file")[0])
         assert len(require_same(hull, records, min(after, len(records)), batches)) <= len(records)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(
+    steps=STEPS,
+    after=st.integers(0, 10),
+    less=st.integers(0, 3),
+    group_rows=st.sampled_from([1, 2, 3, 5, 2**14]),
+    few=st.sampled_from([0, by_key.FEW, 2**20]),
+)
+@settings(max_examples=15, deadline=None)
+def test_rows_by_key_lead_to_the_same_state(kind, steps, after, less, group_rows, few):
+    """From any revision to any other one, wherever a group of rows ends, which may be amid those of a key."""
+    hull = KINDS[kind]
+    records = lived(hull, steps)
+    if not records:
+        return
+    until = max(len(records) - less, 0)
+    after = min(after, until)
+    columns = columns_of(records, hull.identity)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parquet, "GROUP_ROWS", group_rows)
+        patch.setattr(by_key, "FEW", few)
+        rows, _, _ = rows_from_parquet(to_parquet(columns, {}), "a file")
+        found = rows.last_places(hull, after, until)
+        some = rows.batches_between(after, until)
+    same(rows.batches().columns, columns)
+    same(some.columns.between(after, until), columns.between(after, until))
+    if found is None:
+        return
+    one, other = (HullState(LIMITS, hull, Kept(records=records[:after]), 0.0) for _ in range(2))
+    for each in records[after:until]:
+        one.catch_up([each], 0.0)
+    other.catch_up([found], 0.0)
+    same(seen(other), seen(one))
+    same(seen(built(hull, records, after, [found])), seen(one))
+
+
+def test_the_last_places_of_a_thousand_moves_of_a_few_keys_need_no_records():
+    """In groups of few rows, so that most keys are in several; and of a part of the revisions."""
+    for kind in ("keyed", "numbered", "recent-keyed"):
+        hull = KINDS[kind]
+        records = lived(hull, [("put", 1 << place % 8, place % 7, 0) for place in range(100)])
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(parquet, "GROUP_ROWS", 10)
+            rows, _, _ = rows_from_parquet(to_parquet(columns_of(records, hull.identity), {}), "a file")
+        for after, until, keys in ((0, 100, 8), (0, 99, 8), (50, 57, 7), (93, 100, 7)):
+            found = rows.last_places(hull, after, until)
+            assert found is not None
+            assert (found.revision, len(found.rows.keys), found.committed) == (
+                until,
+                keys,
+                records[until - 1].committed,
+            )
+        assert rows.last_places(hull, 50, 56) is None  # so few are put in order
+
+
+@pytest.mark.parametrize("which", [1, 7])
+def test_a_file_that_lacks_a_row_is_damaged(which):
+    """Of one row for each revision, and of three: of these not the last, which nothing but the digest tells."""
+    columns = columns_of(lived(KINDS["keyed"], [("put", which, place, 0) for place in range(4)]), "str")
+    for lacks in range(1, len(columns) - 1):
+        if which == 1 or columns.place[lacks + 1] > 0:
+            left = [columns.rows(0, lacks), columns.rows(lacks + 1, len(columns))]
+            with pytest.raises(DamagedError, match="a row is missing"):
+                from_parquet(to_parquet(joined(left, "str"), {}), "a file")
 
 
 @given(kind=st.sampled_from(sorted(KINDS)), steps=STEPS, together=st.integers(1, 5))
@@ -200,11 +278,15 @@ def test_last_places_lead_to_the_same_state(kind, steps, together, after, less):
         patch.setattr(past_rows, "batch_rows", lambda _, places: iter(places))
         patch.setattr(past_rows, "whole_rows", lambda _, rows: rows)
         patch.setattr(past_rows, "LEAST_BYTES", 1)
-        while after < until:
-            found = gathered_after(None, of_hull, after, until)
+        last, all_found = after, []
+        while last < until:
+            found = gathered_after(None, of_hull, last, until)
             other.catch_up(found, 0.0)
-            after = found[-1].revision
+            all_found += found
+            last = found[-1].revision
     same(seen(other), seen(one))
+    if all_found:
+        same(seen(built(hull, records, after, all_found)), seen(one))
 
 
 @pytest.mark.skipif(native is None, reason="C++ is not built")

@@ -31,7 +31,8 @@ class Entities {
   const bool ordered;
 
   Entities(bool strings, bool ordered) : ordered(ordered), slots_(strings) {}
-  Entities(const Entities& other) : ordered(other.ordered), slots_(other.slots_), table_(other.table_) {}
+  Entities(const Entities& other)
+      : ordered(other.ordered), slots_(other.slots_), table_(other.table_), whole_(other.whole_) {}
 
   const Slots& slots() const { return slots_; }
   std::size_t size() const { return slots_.size(); }
@@ -66,12 +67,21 @@ class Entities {
   }
   void detach() { reports_ = nullptr; }
 
+  // Puts and removes do not reach the tree until `build`, which is asked nothing before: of several batches it is built
+  // once. To be called before the first entity of a plane.
+  void put_off() { whole_ = false; }
+  void build(FramedTree& tree) {
+    if (whole_) return;
+    rebuild(tree);
+    whole_ = true;
+  }
+
   // Throws DuplicateKey; then, and after every other exception, nothing has changed.
   template <class Keys>
   Counts put(FramedTree& tree, const Keys& keys, Puts& puts, Only only) {
     const std::size_t count = keys.size();
     Counts counts;
-    const Changes changes(2 * count);
+    const Changes changes(whole_ ? 2 * count : 0);
     Batch<Keys> batch(*this, keys);
     if (reports_) reports_->make_room(count);
     if (only != Only::ALL || ordered)
@@ -92,6 +102,7 @@ class Entities {
         std::swap(slot.place, puts.place(i));
         row.moved = row.entered || !(slot.place == puts.place(i));
         ++(row.entered ? counts.fresh : row.moved ? counts.moved : counts.unmoved);
+        if (!whole_) continue;
         if (row.moved && !row.entered) changes.set(change++, -1, puts.place(i));
         if (row.moved) changes.set(change++, +1, slot.place);
       }
@@ -113,12 +124,13 @@ class Entities {
   // Returns the number of entities removed. Throws DuplicateKey, and MissingKey unless missing keys are ignored.
   template <class Keys>
   std::int64_t remove(FramedTree& tree, const Keys& keys, bool ignore_missing) {
-    const Changes changes(keys.size());
+    const Changes changes(whole_ ? keys.size() : 0);
     Batch<Keys> batch(*this, keys);
     std::size_t change = 0;
     for (std::size_t i = 0; i < keys.size(); ++i) {
       if (!batch[i].entered) {
-        changes.set(change++, -1, slots_[batch[i].slot].place);
+        if (whole_) changes.set(change, -1, slots_[batch[i].slot].place);
+        ++change;
         continue;
       }
       if (!ignore_missing) throw MissingKey{i};
@@ -126,7 +138,7 @@ class Entities {
     }
     const auto slot = [&](std::size_t i) { return batch[i].slot; };
     make_room_to_leave(keys.size(), slot);
-    changes.apply(tree, change, false);
+    if (whole_) changes.apply(tree, change, false);
     batch.commit();
     for (std::size_t i = 0; ages_ && i < keys.size(); ++i)
       if (batch[i].slot != NONE) ages_->remove(batch[i].time);
@@ -163,9 +175,10 @@ class Entities {
   }
 
   // Holds the entities in the least memory, without a tree, until `unpack`; nothing else may be asked meanwhile. False
-  // while it tells an index of its changes, which knows the slots. Both throw before anything changes.
+  // while it tells an index of its changes, which knows the slots, and before it is built. Both throw before anything
+  // changes.
   bool pack(FramedTree& tree) {
-    if (reports_ != nullptr) return false;
+    if (reports_ != nullptr || !whole_) return false;
     Packed packed(slots_);
     packed_ = std::move(packed);
     slots_ = Slots(slots_.strings());
@@ -354,8 +367,13 @@ class Entities {
 
   // Applies the rows of a batch of puts to the tree. If it moves most entities, a new tree of all of them takes less.
   void apply(FramedTree& tree, const Changes& changes, std::size_t count, const Counts& counts) const {
+    if (!whole_) return;
     if (static_cast<std::size_t>(counts.moved) * MOST < slots_.end() || counts.moved == 0 || tree.frame().on_globe())
       return changes.apply(tree, count, counts.moved == 0);
+    rebuild(tree);
+  }
+
+  void rebuild(FramedTree& tree) const {
     const Scratch<Point> places(slots_.size());
     std::size_t next = 0;
     slots_.for_each([&](std::uint32_t slot) { places[next++] = slots_[slot].place; });
@@ -441,6 +459,7 @@ class Entities {
   Slots slots_;
   SlotTable table_;
   Packed packed_;
+  bool whole_ = true;  // whether the tree has what the slots have
   std::unique_ptr<Names> names_;
   std::unique_ptr<Ages> ages_;  // none until the oldest are asked for
   Reports* reports_ = nullptr;  // none, or those of the index that is attached

@@ -55,6 +55,16 @@ class KeyedHull : public Hull {
     put_all(keys, xy, times, Only::ALL, !ordered());
   }
 
+  void begin_load() {
+    if (tree_.frame().on_globe() || size() > 0) throw nb::value_error("only an empty hull of a plane is loaded so");
+    const WriteLock lock(lock_);
+    entities_.put_off();
+  }
+  void end_load() {
+    const WriteLock lock(lock_);
+    entities_.build(tree_);
+  }
+
   bool put(const nb::object& key, nb::handle x, nb::handle y, const nb::object& time, const nb::object& only) {
     return with_key(key, [&](const GivenKeys& given, const nb::object&) {
       const Point place = point(x, y);

@@ -70,7 +70,7 @@ class Root:
         if settings.quarantine is not None:
             raise ValueError("quarantine is set: no shard knows the hull that its rules compare with")
         self._keyed = settings.identity != "multiset"
-        self._most_points = min(settings.max_points or limits.max_points, limits.max_points)
+        self._most_points = limits.points_of(settings)
         self._log = log
         self._epoch, decided = log.begin(None)
         most, most_of_one = limits.max_producers, limits.max_producers_per_caller

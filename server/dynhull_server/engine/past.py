@@ -11,6 +11,7 @@ from weakref import WeakValueDictionary
 
 from dynhull.arrays import Points
 
+from ..state.contents import begun
 from ..state.core import SMALL
 from ..state.errors import (
     HullNotFoundError,
@@ -28,6 +29,7 @@ from ..state.records import CommitStamp, Kept, Keys, Record
 from ..state.root_state import state_of
 from ..state.tracks import Moves, Tracker
 from ..storage.past import Erasure, Hole, Moment, Past, created
+from ..storage.port import NEWEST
 from .divided_hull import DividedHull
 from .driver import Driver
 from .fences import Fences
@@ -299,32 +301,30 @@ class PastHulls:
         rebuilt = self._take(hull, revision)
         self.outcomes["anew" if rebuilt is None else "kept"] += 1
         ahead: list[Record] = []
+        at = NEWEST  # the revision that is there
         while rebuilt is None or rebuilt.state.counts.revision < revision:
             try:
                 if rebuilt is None:
-                    rebuilt, read = await self._begin(hull, revision)
-                    if isinstance(read, NotStoredError):
-                        raise read
-                    ahead = read
+                    erasures, kept = await self._stored(hull, revision)
+                    at = kept.revision
+                    rebuilt, ahead = await self._begin(hull, revision, erasures, kept)
                 else:
+                    at = rebuilt.state.counts.revision
                     ahead = await self._step(rebuilt, ahead, revision)
             except _ErasedMeanwhileError:
-                rebuilt = None
+                rebuilt, at = None, NEWEST
             except NotStoredError:
                 oldest: Moment = await self.ask(hull.name, partial(self._past.oldest_moment, hull.row.number))
                 if oldest.revision > revision:
                     raise _forgotten(hull.counts.revision, revision, oldest, "at_revision") from None
-                if rebuilt is None or rebuilt.state.counts.revision >= oldest.revision:
+                if at >= oldest.revision:
                     raise
-                rebuilt = None  # what followed it has been dropped meanwhile: a newer state leads there
+                rebuilt, at = None, NEWEST  # what followed it has been dropped meanwhile: a newer state leads there
         return rebuilt
 
-    async def _begin(self, hull: Hull, revision: int) -> tuple[_Rebuilt, list[Record] | NotStoredError]:
-        """The newest stored state at or before a revision, and some batches after it, read while it is built.
-
-        Or why these cannot be read.
-        """
-        number, round_ = hull.row.number, self._round
+    async def _stored(self, hull: Hull, revision: int) -> tuple[tuple[Erasure, ...], Kept]:
+        """The newest stored state at or before a revision, and the erasures before it was read."""
+        number = hull.row.number
 
         def stored() -> tuple[tuple[Erasure, ...], Kept]:
             erasures = self._past.erasures(number)
@@ -334,11 +334,18 @@ class PastHulls:
                 kept.committed = created(hull.row)
             return erasures, kept
 
-        erasures, kept = await self.ask(hull.name, stored)
+        found: tuple[tuple[Erasure, ...], Kept] = await self.ask(hull.name, stored)
+        return found
 
-        def build() -> _Rebuilt:
-            state = state_of(self._driver.limits, hull.row.settings, kept, self._driver.machine.clock.monotonic())
-            return _Rebuilt(hull, state, len(kept.contents), erasures, round_)
+    async def _begin(
+        self, hull: Hull, revision: int, erasures: tuple[Erasure, ...], kept: Kept
+    ) -> tuple[_Rebuilt, list[Record]]:
+        """A hull from a stored state and some batches after it, which are read while the state is loaded.
+
+        And others after these, which are read while the hull is built of both.
+        """
+        number, round_, settings = hull.row.number, self._round, hull.row.settings
+        limits, now = self._driver.limits, self._driver.machine.clock.monotonic()
 
         def read() -> list[Record]:
             found: list[Record] = []
@@ -350,14 +357,28 @@ class PastHulls:
                 after = found[-1].revision
             return found
 
-        works = [self.ask(hull.name, build), self.ask(hull.name, read)]
-        built: Any
-        records: Any
-        built, records = await asyncio.gather(*works, return_exceptions=True)
-        for each in (built, records):
-            if isinstance(each, BaseException) and not (each is records and isinstance(each, NotStoredError)):
+        contents, records = await self._both(
+            hull.name, partial(begun, kept, settings, limits.points_of(settings)), read
+        )
+        rows = len(kept.contents) + sum(1 + len(each.rows) for each in records)
+        self._require_room(rows)
+        kept.records = records
+        last = kept.last_revision
+        build = partial(state_of, limits, settings, kept, now, contents)
+        onwards = partial(self._gathered, number, last, revision, erasures) if last < revision else None
+        state, following = await self._both(hull.name, build, onwards)
+        return _Rebuilt(hull, state, rows, erasures, round_), following
+
+    async def _both(
+        self, name: str, work: Callable[[], Any], read: Callable[[], list[Record]] | None
+    ) -> tuple[Any, list[Record]]:
+        """What two functions return, that have a thread each; the second one may be none."""
+        works = [self.ask(name, each) for each in (work, read) if each is not None]
+        found: list[Any] = await asyncio.gather(*works, return_exceptions=True)
+        for each in found:
+            if isinstance(each, BaseException):
                 raise each
-        return built, records
+        return found[0], found[1] if read is not None else []
 
     def _gathered(self, number: int, after: int, until: int, erasures: tuple[Erasure, ...]) -> list[Record]:
         """What the next batches come to, for a state that was read when these were the erasures."""
@@ -377,14 +398,9 @@ class PastHulls:
             records = await self.ask(name, partial(read, state.counts.revision))
         rebuilt.rows += sum(1 + len(each.rows) for each in records)
         self._require_room(rebuilt.rows)
-        works = [self.ask(name, partial(state.catch_up, records, self._driver.machine.clock.monotonic()))]
-        if records[-1].revision < revision:
-            works.append(self.ask(name, partial(read, records[-1].revision)))
-        found: list[Any] = await asyncio.gather(*works, return_exceptions=True)
-        for each in found:
-            if isinstance(each, BaseException):
-                raise each
-        following: list[Record] = found[1] if len(works) > 1 else []
+        last = records[-1].revision
+        apply = partial(state.catch_up, records, self._driver.machine.clock.monotonic())
+        _, following = await self._both(name, apply, partial(read, last) if last < revision else None)
         return following
 
     def require_room(self, hulls: Sequence[Hull]) -> None:

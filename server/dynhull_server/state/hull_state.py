@@ -12,7 +12,7 @@ from dynhull.arrays import Points
 from .batch import NO_POINTS, Applied, Write
 from .contents import replayed
 from .contents.keyed import Keyed
-from .contents.live import AnyKeyedHull, layer_of
+from .contents.live import AnyKeyedHull, LiveContents, layer_of
 from .contents.places import GeographicHull
 from .contents.quarantine import Quarantine
 from .errors import HullUnsuitableError, MisfitError, RefusedError
@@ -70,12 +70,20 @@ class HullState:
         counts: the counts after the last batch.
         committed: the commit of the last revision that was read from the storage.
         torn: whether a batch has been applied in part, because memory ran out in the middle of it.
+
+    Args:
+        limits: the limits on it.
+        settings: the settings of the hull.
+        kept: the hull as stored.
+        now: the time by the server's monotonic clock.
+        contents: what `begun` has made of the points of `kept`, which then belongs to this; None to begin here.
     """
 
-    def __init__(self, limits: Limits, settings: HullSettings, kept: Kept, now: float) -> None:
+    def __init__(
+        self, limits: Limits, settings: HullSettings, kept: Kept, now: float, contents: LiveContents | None = None
+    ) -> None:
         self.torn = False
-        most_points = min(settings.max_points or limits.max_points, limits.max_points)
-        self.contents = contents = replayed(kept, settings, most_points)
+        self.contents = contents = replayed(kept, settings, limits.points_of(settings), contents)
         self.hull: AnyHull = contents.hull
         self._limits = limits
         self._producers: Producers | None = None  # most of ten thousand hulls have none

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from .records import HullSettings
+
 
 @dataclass(frozen=True, slots=True)
 class FenceLimits:
@@ -49,3 +51,7 @@ class Limits:
     fences: FenceLimits = FenceLimits()
     max_past_rows: int = 20_000_000
     max_feed_consumers: int = 1_000
+
+    def points_of(self, settings: HullSettings) -> int:
+        """The number of points of a hull, with multiplicity."""
+        return min(settings.max_points or self.max_points, self.max_points)

@@ -5,6 +5,7 @@ It follows what its shards have done, and decides nothing.
 
 from collections.abc import Sequence
 
+from .contents.live import LiveContents
 from .hull_state import Counts, HullState
 from .limits import Limits
 from .records import Cause, HullSettings, Kept, Record, Tally
@@ -111,6 +112,10 @@ class RootState(HullState):
         return Counts(revision, points, distinct, self._clock, cause, outlined=outlined, shards=self.division.shards)
 
 
-def state_of(limits: Limits, settings: HullSettings, kept: Kept, now: float) -> HullState:
-    """A hull with these settings as stored."""
-    return (RootState if settings.divided else HullState)(limits, settings, kept, now)
+def state_of(
+    limits: Limits, settings: HullSettings, kept: Kept, now: float, contents: LiveContents | None = None
+) -> HullState:
+    """A hull with these settings as stored; its contents may have begun before, unless it is divided."""
+    if settings.divided:
+        return RootState(limits, settings, kept, now)
+    return HullState(limits, settings, kept, now, contents)

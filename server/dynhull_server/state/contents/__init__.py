@@ -10,20 +10,31 @@ from .windowed import Windowed
 UNLIMITED = 2**63
 
 
-def replayed(kept: Kept, settings: HullSettings = DEFAULT, most_points: int = UNLIMITED) -> LiveContents:
-    """The contents of a hull with these settings: those of a snapshot, and the changes after it. O(n log² n).
+def begun(kept: Kept, settings: HullSettings = DEFAULT, most_points: int = UNLIMITED) -> LiveContents:
+    """The contents of a hull with these settings as a snapshot has them, for `replayed`. O(n log n).
 
     The root of a hull over shards has vertices in place of points: they leave when their shard says so.
     """
-    contents: LiveContents
     if settings.divided:
         settings = HullSettings(settings.identity)
     globe = Globe(kept.center or settings.center) if settings.geographic else None
     if settings.identity == "multiset" and settings.window is None:
-        contents = Multiset(kept.contents, most_points, globe)
-    elif settings.identity == "multiset":
-        contents = Windowed(settings, kept.contents, kept.clock, most_points, globe)
-    else:
-        contents = Keyed(settings, kept.contents, kept.clock, most_points, globe, kept.rules)
+        return Multiset(kept.contents, most_points, globe)
+    if settings.identity == "multiset":
+        return Windowed(settings, kept.contents, kept.clock, most_points, globe)
+    return Keyed(settings, kept.contents, kept.clock, most_points, globe, kept.rules)
+
+
+def replayed(
+    kept: Kept, settings: HullSettings = DEFAULT, most_points: int = UNLIMITED, contents: LiveContents | None = None
+) -> LiveContents:
+    """The contents of a hull with these settings: those of a snapshot, and the changes after it. O(n log² n).
+
+    The first of these may have begun before.
+    """
+    if contents is None:
+        contents = begun(kept, settings, most_points)
     contents.replay(kept.records)
+    if isinstance(contents, Keyed):
+        contents.build()
     return contents

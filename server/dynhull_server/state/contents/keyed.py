@@ -7,7 +7,7 @@ from itertools import compress
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import DuplicateKeyError, GeoKeyedHull, KeyedHull, Put
+from dynhull import DuplicateKeyError, GeoKeyedHull, KeyedHull, KeyedLoader, Put
 from dynhull.arrays import Points
 from dynhull.keys import key_list
 
@@ -74,7 +74,7 @@ class Found:
 
 
 class Keyed:
-    """The contents of a keyed hull, with or without a window.
+    """The contents of a keyed hull, with or without a window. `build` comes before all but `replay`.
 
     Args:
         settings: the settings of the hull.
@@ -106,6 +106,7 @@ class Keyed:
         self.clock = clock
         self.globe = globe
         self.hull: AnyKeyedHull
+        self._loader: KeyedLoader | None = None
         if globe is None:
             self.hull = KeyedHull(self._kind, ordered=settings.by_event_time)
         else:
@@ -266,8 +267,10 @@ class Keyed:
             assert isinstance(rows, KeyRows | Expiry)
             alone = record.center is not None or size >= REPLAYED_TOGETHER
             if group and (alone or not self._may_follow(group[-1], rows)):
-                self._carry_out(merged(group))
+                self._load_after(merged(group))
                 group, size = [], 0
+            if record.center is not None or isinstance(rows, Expiry):
+                self.build()
             if record.center is not None:
                 move_center(self.hull, record.center)
             if isinstance(rows, Expiry):
@@ -281,7 +284,7 @@ class Keyed:
             if isinstance(rows, KeyRows) and rows.held is not None:
                 self._gate.follow(rows.held)
         if group:
-            self._carry_out(merged(group))
+            self._load_after(merged(group))
 
     def _may_follow(self, before: KeyRows, rows: KeyRows | Expiry) -> bool:
         """Whether two changes have the effect of one that has the last position of each key."""
@@ -328,7 +331,8 @@ class Keyed:
         times = None if stored.times is None else library_times(stored.times)
         ordered = self._settings.by_event_time
         if self.globe is None:
-            self.hull = KeyedHull.from_entities(keys, stored.points, times, self._kind, ordered=ordered)
+            self._loader = KeyedHull.loader(self._kind, ordered=ordered)
+            self._loader.update(keys, stored.points, times)
         else:
             center = self.globe.center
             self.hull = GeoKeyedHull.from_entities(
@@ -340,6 +344,32 @@ class Keyed:
             self._deadlines.set(key_list(keys), stored.deadlines.tolist())
         if stored.accuracies is not None:
             self._accuracies.set(key_list(keys), stored.accuracies.tolist())
+
+    def build(self) -> None:
+        """Build the hull of what was stored, and of the changes after it that have been replayed. O(n log n)."""
+        if self._loader is not None:
+            self.hull, self._loader = self._loader.hull(), None
+
+    def _load_after(self, rows: KeyRows) -> None:
+        """Have a change as if it had been stored, where it only puts and removes keys: the hull is built once."""
+        loader = self._loader
+        if loader is None or not self._is_plain(rows):
+            self.build()
+            self._carry_out(rows)
+            return
+        if len(rows.removes):
+            loader.remove_many(rows.removes)
+        if len(rows.keys):
+            loader.update(rows.keys, rows.points, None if rows.times is None else library_times(rows.times))
+        if rows.times is not None:
+            self._note_times(rows.times)
+
+    def _is_plain(self, rows: KeyRows) -> bool:
+        """Whether a change does nothing but put and remove keys, here where none but these leave."""
+        if self._settings.window is not None and self._settings.window.max_points:
+            return False
+        said = rows.condition, rows.deadlines, rows.accuracies, rows.held
+        return not (len(self._deadlines) or len(self._accuracies) or any(each is not None for each in said))
 
     def _carry_out(self, rows: KeyRows) -> tuple[Put, int, int]:
         """Apply rows whose keys are all different. Returns the counts of the puts, keys removed, and keys evicted."""

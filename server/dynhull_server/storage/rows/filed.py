@@ -17,9 +17,10 @@ from ..of_keys import changes_of_keys
 from ..past import Found, Hole, Moment, created
 from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive
+from ..segments.by_key import RowsByKey
 from ..segments.columns import Batches, SegmentColumns, contents_of, joined
 from ..segments.gathered import gathered
-from ..segments.parquet import from_parquet, keys_from_parquet, ways_from_parquet
+from ..segments.parquet import from_parquet, keys_from_parquet, rows_from_parquet, ways_from_parquet
 from .chunks import state_from
 from .ledger import HullRows
 from .past_rows import STEP_POINTS
@@ -46,7 +47,7 @@ class Filed:
         self._archive = archive
         self.unreadable: set[str] = set()
         self._turn = Lock()
-        self._open: OrderedDict[str, Future[Batches]] = OrderedDict()
+        self._open: OrderedDict[str, Future[RowsByKey]] = OrderedDict()
         self._ahead: Thread | None = None  # reads what is needed next
 
     def oldest_moment(self, hull: HullRows, *, timed: bool) -> Moment | None:
@@ -88,12 +89,15 @@ class Filed:
 
     def batches(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """Some batches after a revision: no more than one segment has."""
-        return _some(self._batches_after(hull, after, until).between(after, until))
+        return _some(self._rows_after(hull, after, until).batches().between(after, until))
 
     def gathered(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """What some batches after a revision come to: no more than one segment has."""
-        batches = self._batches_after(hull, after, until)
-        return _some(gathered(batches, hull.row.settings, after, until))
+        rows, settings = self._rows_after(hull, after, until), hull.row.settings
+        record = rows.last_places(settings, after, until)
+        if record is not None:
+            return [record]
+        return _some(gathered(rows.batches_between(after, until), settings, after, until))
 
     def key_state(self, hull: HullRows, keys: Keys, until: int) -> Kept:
         """The newest state that lies beside a segment, with the points of some keys alone."""
@@ -152,22 +156,25 @@ class Filed:
         with self._turn:
             self._open.pop(file, None)
 
-    def _batches_after(self, hull: HullRows, after: int, until: int) -> Batches:
+    def _rows_after(self, hull: HullRows, after: int, until: int) -> RowsByKey:
         """The segment with the batches that follow a revision. The next one is read meanwhile if it is needed, too."""
         segment = _segment(hull, after + 1)
-        batches = self._batches(segment)
+        rows = self._rows(segment)
         if segment.last < min(until, hull.oldest):
             self._read_ahead(_segment(hull, segment.last + 1))
-        return batches
+        return rows
 
     def _batches(self, segment: StoredSegment) -> Batches:
+        return self._rows(segment).batches()
+
+    def _rows(self, segment: StoredSegment) -> RowsByKey:
         reading, begins = self._reading(segment)
         if begins:
             self._read(segment, reading)
         with self._named(segment, BATCHES):
             return reading.result()
 
-    def _reading(self, segment: StoredSegment) -> "tuple[Future[Batches], bool]":
+    def _reading(self, segment: StoredSegment) -> "tuple[Future[RowsByKey], bool]":
         """What has been read of a segment, or is being read; and whether the caller is to read it."""
         with self._turn:
             reading = self._open.get(segment.file)
@@ -175,15 +182,15 @@ class Filed:
                 self._open.move_to_end(segment.file)
                 return reading, False
             reading = self._open[segment.file] = Future()
-            rows = sum(map(_rows, self._open.values()))
+            rows = sum(map(_count, self._open.values()))
             while len(self._open) > KEPT_OPEN and rows > KEPT_ROWS:
-                rows -= _rows(self._open.popitem(last=False)[1])
+                rows -= _count(self._open.popitem(last=False)[1])
             return reading, True
 
-    def _read(self, segment: StoredSegment, reading: "Future[Batches]") -> None:
+    def _read(self, segment: StoredSegment, reading: "Future[RowsByKey]") -> None:
         """Read a segment. Others wait for it; if it cannot be read, who needs it next tries again."""
         try:
-            found = read_batches(self._archive, segment)
+            found = read_rows(self._archive, segment)
             self._readable(segment.file + BATCHES)
             reading.set_result(found)
         except Exception as error:
@@ -235,13 +242,18 @@ def require_known(segment: StoredSegment) -> None:
         raise DamagedError(f"{segment.file}: its row in the database was damaged: restore a backup")
 
 
-def read_batches(archive: Archive, segment: StoredSegment) -> Batches:
-    """The batches of a segment. Raises DamagedError, which names the file, or StorageError."""
+def read_rows(archive: Archive, segment: StoredSegment) -> RowsByKey:
+    """The rows of a segment. Raises DamagedError, which names the file, or StorageError."""
     name, facts = segment.file + BATCHES, segment.facts
-    columns, _, _ = from_parquet(archive.read(name, facts.wrote), name)
-    if not len(columns) or (columns.revision[0], columns.revision[-1]) != (segment.first, segment.last):
+    rows, _, _ = rows_from_parquet(archive.read(name, facts.wrote), name)
+    if not len(rows) or (rows.first, rows.first + len(rows.starts) - 2) != (segment.first, segment.last):
         raise DamagedError(f"{name} has other revisions than {segment.first} to {segment.last}: restore a backup")
-    return Batches(columns)
+    return rows
+
+
+def read_batches(archive: Archive, segment: StoredSegment) -> Batches:
+    """The batches of a segment. Raises the errors of `read_rows`."""
+    return read_rows(archive, segment).batches()
 
 
 def read_state(archive: Archive, segment: StoredSegment, keys: Keys | None = None) -> Kept:
@@ -332,6 +344,6 @@ def _not_kept(hull: HullRows, revision: int) -> DamagedError:
     return DamagedError(f"revision {revision} of hull {hull.row.name!r} is no longer kept")
 
 
-def _rows(reading: "Future[Batches]") -> int:
+def _count(reading: "Future[RowsByKey]") -> int:
     """The rows of a segment that has been read; 0 of one that is being read."""
-    return len(reading.result().columns) if reading.done() and reading.exception() is None else 0
+    return len(reading.result()) if reading.done() and reading.exception() is None else 0

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from ...compiled import Native, native
-from ...state.records import NO_TIME, CommitStamp, HullSettings, Kept, KeyRows, Keys, Record
+from ...state.records import NO_TIME, CommitStamp, Kept, KeyRows, Keys, Record
 from ..past import Moment, created
 from ..port import DamagedError
 from ..segments.columns import CAUSES, NONE, Batches, SegmentColumns, joined
-from ..segments.gathered import gathered
+from ..segments.gathered import gathered, last_places_count
 from .batch_columns import KINDS, BatchRow, columns_of_rows, keys_of
 from .batch_rows import is_whole
 from .ledger import HullRows
@@ -105,18 +105,12 @@ def gathered_after(reader: Reader, hull: HullRows, after: int, until: int) -> li
     last = min(until, hull.last)
     if after >= last:
         return []
-    if native is not None and _last_places_count(hull.row.settings):
+    if native is not None and last_places_count(hull.row.settings):
         found = _last_places(native, reader, hull, after, last)
         if found is not None:
             return [found]
     columns = columns_between(reader, hull, after, last, GATHERED_ROWS)
     return list(gathered(Batches(columns), hull.row.settings, after, last))
-
-
-def _last_places_count(settings: HullSettings) -> bool:
-    """Whether of batches that put and remove keys the last place of each key is all that counts."""
-    recent = settings.window is not None and settings.window.max_points > 0  # who is among them depends on each batch
-    return settings.identity != "multiset" and not settings.by_event_time and not recent
 
 
 def _last_places(native: Native, reader: Reader, hull: HullRows, after: int, until: int) -> Record | None:

@@ -4,8 +4,10 @@ Of a key that many batches move only the last place counts. What stands for itse
 the quarantine, a new centre) stays a record of its own.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +52,12 @@ def key_codes(keys: Keys) -> Codes:
 def _codes(keys: PackedKeys) -> npt.NDArray[np.int32]:
     numbers: dict[str, int] = {}
     return np.array([numbers.setdefault(key, len(numbers)) for key in keys], np.int32)
+
+
+def last_places_count(settings: HullSettings) -> bool:
+    """Whether of batches that put and remove keys the last place of each key is all that counts."""
+    recent = settings.window is not None and settings.window.max_points > 0  # who is among them depends on each batch
+    return settings.identity != "multiset" and not settings.by_event_time and not recent
 
 
 def _alone(batches: Batches, settings: HullSettings, first: int, last: int) -> Flags:
@@ -102,16 +110,29 @@ def _keys(batches: Batches, settings: HullSettings, first: int, last: int) -> Ro
     rows, columns = batches.rows(first, last), batches.columns
     keys = batches.keys(rows.start, rows.stop)
     at = np.flatnonzero(columns.keyed[rows]) + rows.start
-    put = columns.op[at] == PUT
-    times, deadlines, accuracies = columns.event_time[at], columns.expire_time[at], columns.accuracy[at]
+    names = ("op", "points", "event_time", "expire_time", "accuracy")
+    found = {name: getattr(columns, name)[at] for name in names}
+    newest = _newest(key_codes(keys), found["event_time"] if settings.by_event_time else None)
+    return last_of_keys(found, newest, partial(select_keys, keys))
+
+
+def last_of_keys(columns: dict[str, npt.NDArray[Any]], newest: Flags, select: Callable[[Flags], Keys]) -> Rows | None:
+    """The last place of each key; None if only some of the points have times.
+
+    Args:
+        columns: columns of rows that have a key.
+        newest: which rows are the last ones of their keys.
+        select: returns the keys of some rows.
+    """
+    put = columns["op"] == PUT
+    times, deadlines, accuracies = columns["event_time"], columns["expire_time"], columns["accuracy"]
     if _some_only(times[put], NO_TIME) or _some_only(deadlines[put], FOREVER):
         return None
-    newest = _newest(key_codes(keys), times if settings.by_event_time else None)
     stays, leaves = newest & put, newest & ~put
     return KeyRows(
-        select_keys(keys, stays),
-        columns.points[at[stays]],
-        select_keys(keys, leaves),
+        select(stays),
+        columns["points"][stays],
+        select(leaves),
         times[stays] if _dated(times[put], NO_TIME) else None,
         deadlines[stays] if _dated(deadlines[put], FOREVER) else None,
         accuracies=accuracies[stays],

@@ -10,7 +10,6 @@ from __future__ import annotations
 from base64 import b64encode
 from bisect import bisect_left
 from functools import cache, partial
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,11 +20,12 @@ from ...state.contents.key_rows import select_keys
 from ...state.records import FOREVER, NO_TIME, Identity
 from ...state.ways import KeyWays, Stamps
 from ..port import DamagedError
+from .by_key import RowsByKey
 from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
 from .gathered import key_codes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import numpy.typing as npt
     import pyarrow as pa
@@ -109,7 +109,7 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
     commits = np.count_nonzero(np.diff(columns.committed)) + 1
     shared = commits * SHARED <= len(columns)
     group_rows = LARGE_GROUP_ROWS if shared and commits >= MANY_COMMITS else GROUP_ROWS
-    order, key = _by_key(columns, group_rows)
+    order, key = _sorted(columns, group_rows)
     found = _in_order(columns, order, key)
     fields = {name: pa.field(name, _seen_as(column.type)) for name, column in found.items()}
     there = ~np.isnan(columns.points[:, 0])
@@ -177,6 +177,16 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
     Raises:
         DamagedError: it is no file of ours, or of a newer version.
     """
+    rows, about, state = rows_from_parquet(data, name)
+    return rows.columns(0, len(rows.starts) - 1), about, state
+
+
+def rows_from_parquet(data: bytes, name: str) -> tuple[RowsByKey, dict[str, str], bytes]:
+    """The same with the rows as they lie in the file.
+
+    Raises:
+        DamagedError: it is no file of ours, or of a newer version.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -189,7 +199,7 @@ def from_parquet(data: bytes, name: str) -> tuple[SegmentColumns, dict[str, str]
                 metadata=file.metadata,
                 read_dictionary=CODED[1:],
             )
-        return _all(file), _about(found), found.get(STATE, b"")
+        return _by_key(file), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
 
@@ -300,7 +310,7 @@ def _ways(file: pq.ParquetFile, name: str, after: int, until: int) -> Iterator[K
                 rows = rows[codes[rows] != NONE]
                 codes, x, y = codes[rows], x[rows], y[rows]
             starts = _starts(codes, words)
-            keys = _packed([words], codes[starts], identity)
+            keys = _packed(words, codes[starts], identity)
             yield KeyWays(keys, starts, x, y, *(partial(_stamps, file, groups, each) for each in (rows, within)))
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
@@ -389,126 +399,175 @@ def _about(found: dict[bytes, bytes]) -> dict[str, str]:
     }
 
 
-def _all(file: pq.ParquetFile) -> SegmentColumns:
-    """All rows by revision and place.
+def _by_key(file: pq.ParquetFile) -> RowsByKey:
+    """All rows, a group at a time: of all of them there are no arrays but those that are the result.
 
-    A group at a time is put where it belongs: of all rows there are no arrays but those that are the result, since
-    memory that is new takes longer than what is done with it.
+    Memory that is new takes longer than what is done with it.
     """
-    import pyarrow as pa
-
     identity: Any = file.schema_arrow.metadata[b"dynhull.identity"].decode()
-    heads = _heads(file)
-    belongs = heads.belongs
-    count, at = len(belongs), 0
+    count = file.metadata.num_rows
     same = _same([file.metadata.row_group(group) for group in range(file.num_row_groups)]) if count else {}
-    arrays: dict[str, npt.NDArray[Any]] = {"place": heads.place, **_of_revisions(file, same, heads)}
-    for name, words_of in CONSTANT.items():
-        if name in same:
-            arrays[name] = np.broadcast_to(_code(same[name], name, words_of), count)
-    known = {*arrays, *same, "revision", "row"}
+    placed = _placed(file)
+    revisions = len(placed.starts) - 1
+    of_rows: dict[str, npt.NDArray[Any]] = {
+        name: np.broadcast_to(_code(same[name], name, words), count) for name, words in CONSTANT.items() if name in same
+    }
+    apart = OF_REVISION if revisions * SHARED <= count else ()
+    known = {*of_rows, *same, *apart, "revision", "row"}
     columns = [name for name in file.schema_arrow.names if name not in known]
-    detail: list[str | None] = [None] * count
-    codes, words, number = np.full(count, NONE, np.int32), list[pa.Array](), 0
+    detail: dict[int, str] = {}
+    codes, words, at = np.full(count, NONE, np.int32), _Words(identity), 0
     for group in range(file.num_row_groups):
         table = file.read_row_group(group, columns=columns, use_threads=False)
-        rows = belongs[at : at + len(table)]
-        at += len(table)
-        for name, values in _arrays(table).items():
-            if values.strides == (0,):  # there is none in this group
-                continue
-            if name not in arrays:
-                arrays[name] = np.full((count, *values.shape[1:]), NOTHING.get(name, NONE), values.dtype)
-            _items(arrays[name])[rows] = _items(values)
+        rows = slice(at, at + len(table))
+        _add_arrays(of_rows, table, rows, count)
         if "key" in columns:
-            of_group, there = _coded(table.column("key"))
-            codes[rows] = np.where(of_group == NONE, NONE, of_group + number)
-            words.append(there)
-            number += len(there)
+            codes[rows] = words.numbers(table.column("key"))
         if "detail" in columns:
-            for row, text in zip(rows.tolist(), table.column("detail").to_pylist(), strict=True):
-                detail[row] = text
-    for name, none in (("event_time", NO_TIME), ("expire_time", FOREVER)):
-        arrays.setdefault(name, _constant(none, count))
+            found = enumerate(table.column("detail").to_pylist(), at)
+            detail |= {row: text for row, text in found if text is not None}
+        at += len(table)
     for name in CONSTANT:
-        arrays.setdefault(name, np.full(count, NONE, np.int8))  # of no rows: the state of an empty hull
-    arrays.setdefault(ACCURACY, _exact(count))
-    arrays.setdefault("points", np.full((count, 2), np.nan))
-    keyed = codes != NONE
-    keys = _packed(words, codes[keyed], identity)
-    return SegmentColumns(identity=identity, **arrays, keyed=keyed, keys=keys, detail=detail)
+        of_rows.setdefault(name, np.full(count, NONE, np.int8))  # of no rows: the state of an empty hull
+    for name, none in NOTHING.items():
+        if name not in apart:
+            of_rows.setdefault(name, _constant(none, count))
+    of_rows.setdefault(ACCURACY, _exact(count))
+    of_rows.setdefault("points", np.full((count, 2), np.nan))
+    of_revisions = _of_revisions(file, [name for name in apart if name not in same], placed)
+    of_revisions |= {name: _constant(NO_TIME, revisions) for name in apart if name in same}
+    return RowsByKey(identity, *placed, of_revisions, of_rows, codes, words.packed(), detail)
 
 
-def _items(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Rows of numbers, those of two as one item each: these are copied in a third of the time."""
-    return values if values.ndim == 1 else np.ascontiguousarray(values).view(np.complex128)[:, 0]
+def _add_arrays(of_rows: dict[str, npt.NDArray[Any]], table: pa.Table, rows: slice, count: int) -> None:
+    """Write the columns of words, positions and numbers of a group to where its rows are among all."""
+    for name, values in _arrays(table).items():
+        none = NOTHING.get(name, np.nan if name == "points" else 0.0 if name == ACCURACY else NONE)
+        if name not in of_rows:
+            if values.strides == (0,):  # there has been none so far
+                continue
+            of_rows[name] = np.empty((count, *values.shape[1:]), values.dtype)
+            of_rows[name][: rows.start] = none
+        of_rows[name][rows] = values
 
 
-def _of_revisions(file: pq.ParquetFile, same: dict[str, str | None], heads: _RowPlaces) -> dict[str, Integers]:
-    """What all rows of a revision have in common, and the revision itself: no more is read than each of them once."""
-    counts = heads.counts
-    numbers = np.arange(len(counts))
-    since = np.repeat(numbers.astype(np.int32), counts)
-    found = {name: np.full(len(counts), NO_TIME, np.int64) for name in OF_REVISION if name not in same}
+class _Words:
+    """The keys of groups of rows, which lie by key, and a number for each of them."""
+
+    def __init__(self, identity: Identity) -> None:
+        self._identity = identity
+        self._parts: list[pa.Array] = []
+        self._count = 0
+
+    def numbers(self, column: pa.ChunkedArray) -> npt.NDArray[np.int32]:
+        """The numbers of the keys of the next group, NONE for no key. The first may be the last one before it."""
+        codes, words = _coded(column)
+        if self._identity == "int":
+            words = words.drop_null()
+            starts = _starts(np.arange(len(words), dtype=np.int32), words)
+            begins = np.zeros(len(words), np.int32)
+            begins[starts] = 1
+            codes[codes != NONE] = np.cumsum(begins) - 1
+            words = words.take(starts)
+        first = self._count
+        if first and len(words) and words[0] == self._parts[-1][-1]:
+            first -= 1
+            words = words[1:]
+        if len(words):
+            self._parts.append(words)
+            self._count += len(words)
+        if first:
+            codes = np.where(codes == NONE, np.int32(NONE), codes + np.int32(first))
+        return codes
+
+    def packed(self) -> Callable[[npt.NDArray[np.int32]], Keys]:
+        """What returns the keys with some numbers."""
+        import pyarrow as pa
+
+        kind = pa.uint64() if self._identity == "int" else pa.string()
+        words = pa.concat_arrays([pa.array([], kind), *(each.cast(kind) for each in self._parts)])
+        return partial(_packed, words, identity=self._identity)
+
+
+def _of_revisions(file: pq.ParquetFile, names: list[str], placed: _Placed) -> dict[str, Integers]:
+    """What all rows of a revision have in common: no more is read than each of them once."""
+    counts = np.diff(placed.starts)
+    since = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    found = {name: np.full(len(counts), NO_TIME, np.int64) for name in names}
     seen, group, at = np.zeros(len(counts), np.bool_), 0, 0
     while found and group < file.num_row_groups and not seen.all():
-        table = file.read_row_group(group, columns=list(found))
-        which = since[heads.belongs[at : at + len(table)]]
+        table = file.read_row_group(group, columns=list(found), use_threads=False)
+        which = since[placed.places[at : at + len(table)]]
         for name, values in found.items():
             values[which] = _integers(table, name, NO_TIME)
         seen[which] = True
         group, at = group + 1, at + len(table)
-    arrays = {name: np.repeat(values, counts) for name, values in {"revision": heads.first + numbers, **found}.items()}
-    return {name: _constant(NO_TIME, len(heads.place)) for name in OF_REVISION} | arrays
+    return found
 
 
-class _RowPlaces(NamedTuple):
-    """Where rows belong, which say that themselves.
-
-    Attributes:
-        first: the first revision.
-        counts: the number of rows of each revision from that on.
-        belongs: the place of each row among all.
-        place: of the rows in this order the place in their revision.
-    """
+class _Placed(NamedTuple):
+    """Where rows belong, which say that themselves: what RowsByKey has of it."""
 
     first: int
-    counts: Integers
-    belongs: npt.NDArray[np.int32]
-    place: Integers
+    starts: Integers
+    places: npt.NDArray[np.int32]
+    rows: npt.NDArray[np.int32]
 
 
-def _heads(file: pq.ParquetFile) -> _RowPlaces:
+def _placed(file: pq.ParquetFile) -> _Placed:
     """Where the rows of a file belong. ValueError if one is missing."""
-    count, sizes = file.metadata.num_rows, [0]
-    belongs, rows = np.empty(count, np.int32), np.empty(count, np.int32)
-    first = 0
-    for group in range(file.num_row_groups if count else 0):
-        table = file.read_row_group(group, columns=["revision", "row"], use_threads=False)
-        revision, row = _integers(table, "revision", NO_TIME), _integers(table, "row", NO_TIME)
-        start, end = sizes[-1], sizes[-1] + len(table)
-        first = first if start else int(revision[0])
-        since = revision - first
-        if np.abs(since).max() >= count or row.min() < 0 or row.max() >= count:
-            raise ValueError("a row is missing")
-        belongs[start:end], rows[start:end] = since, row
-        sizes.append(end)
-    least = int(belongs.min(initial=0))
-    belongs -= least
-    parts = [slice(*ends) for ends in pairwise(sizes)]
-    counts = np.zeros(int(belongs.max(initial=-1)) + 1, np.int64)
-    for part in parts:
-        counts += np.bincount(belongs[part], minlength=len(counts))
-    starts, place = np.cumsum(counts) - counts, np.full(count, NONE, np.int64)
-    for part in parts:
-        there = starts[belongs[part]]
-        there += rows[part]
-        if there.max() >= count:
-            raise ValueError("a row is missing")
-        belongs[part], place[there] = there, rows[part]
-    if not (place != NONE).all():
+    count = file.metadata.num_rows
+    if not count:
+        return _Placed(0, np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.int32))
+    first, last = _bounds(file, "revision")
+    if last - first >= count or _bounds(file, "row")[0] < 0:
         raise ValueError("a row is missing")
-    return _RowPlaces(first + least, counts, belongs, place)
+    numbers = _numbers(file, "row")
+    since = _numbers(file, "revision", first)
+    if first == last:
+        starts, places = np.array([0, count]), numbers
+    else:
+        counts = np.bincount(since, minlength=last - first + 1)
+        if not counts.all():
+            raise ValueError("a row is missing")
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        places = since if len(counts) == count else starts.astype(np.int32)[since]
+        if numbers.strides != (0,):
+            places = places + numbers
+    if places.max() >= count:
+        raise ValueError("a row is missing")
+    rows = np.full(count, NONE, np.int32)
+    rows[places] = np.arange(count, dtype=np.int32)
+    if rows.min() == NONE:
+        raise ValueError("a row is missing")
+    return _Placed(first, starts, places, rows)
+
+
+def _numbers(file: pq.ParquetFile, name: str, first: int = 0) -> npt.NDArray[np.int32]:
+    """A column of all rows, less a number. It is not read where its bounds say that all are the same."""
+    least, greatest = _bounds(file, name)
+    count, at = file.metadata.num_rows, 0
+    if greatest - first >= count:
+        raise ValueError("a row is missing")
+    if least == greatest:
+        return np.broadcast_to(np.int32(least - first), count)
+    found = np.empty(count, np.int32)
+    for group in range(file.num_row_groups):
+        table = file.read_row_group(group, columns=[name], use_threads=False)
+        np.subtract(_integers(table, name, NO_TIME), first, out=found[at : at + len(table)], casting="same_kind")
+        at += len(table)
+    if int(found.min()) != least - first or int(found.max()) != greatest - first:
+        raise ValueError(f"column {name} has other numbers than its bounds say")
+    return found
+
+
+def _bounds(file: pq.ParquetFile, name: str) -> tuple[int, int]:
+    """The least number of a column, and the greatest one, as the statistics of its groups say."""
+    place = ORDER.index(name)
+    found = [file.metadata.row_group(group).column(place).statistics for group in range(file.num_row_groups)]
+    if not all(each is not None and each.has_min_max and not each.null_count for each in found):
+        raise ValueError(f"column {name} does not say what it has")
+    return min(each.min for each in found), max(each.max for each in found)
 
 
 def _rows_of(table: pa.Table, values: list[Any]) -> pa.Table:
@@ -541,7 +600,7 @@ def _columns(table: pa.Table, same: dict[str, str | None], found: dict[bytes, by
     count = len(table)
     codes, words = _coded(table.column("key"))
     keyed = codes != NONE
-    keys = _packed([words], codes[keyed], identity)
+    keys = _packed(words, codes[keyed], identity)
     arrays = {name: _constant(none, count) for name, none in NOTHING.items()} | _arrays(table)
     for name, words_of in CONSTANT.items():
         if name in same:
@@ -655,7 +714,7 @@ def _filled(values: Any, none: float) -> Any:
     return values.fill_null(none) if values.null_count else values
 
 
-def _by_key(columns: SegmentColumns, group_rows: int) -> tuple[Rows, pa.Array | pa.ChunkedArray]:
+def _sorted(columns: SegmentColumns, group_rows: int) -> tuple[Rows, pa.Array | pa.ChunkedArray]:
     """The rows by key, then revision and place, those without a key last; and their keys in this order."""
     import pyarrow as pa
 
@@ -712,19 +771,20 @@ def _ranked(keys: PackedKeys) -> tuple[npt.NDArray[Any], pa.Array]:
     return rank[codes], names.take(in_order)
 
 
-def _packed(words: list[pa.Array], codes: npt.NDArray[np.int32], identity: Identity) -> Keys:
-    """The keys at some places of several arrays that lie one after the other."""
+def _packed(words: pa.Array, codes: npt.NDArray[np.int32], identity: Identity) -> Keys:
+    """The keys at some places of an array."""
     import pyarrow as pa
 
-    kind = pa.uint64() if identity == "int" else pa.string()
-    there = pa.concat_arrays([pa.array([], kind), *(each.cast(kind) for each in words)]).take(pa.array(codes))
+    there = words.cast(pa.uint64() if identity == "int" else pa.string())
+    if len(codes) != len(there) or not np.array_equal(codes, np.arange(len(there), dtype=np.int32)):
+        there = there.take(pa.array(codes))
     if identity == "int":
         integers: npt.NDArray[np.uint64] = there.to_numpy(zero_copy_only=False)
         return integers
     _, offsets, data = there.buffers()
     ends = np.frombuffer(offsets, np.int32, len(there) + 1, 4 * there.offset) if offsets else np.zeros(1, np.int32)
     lengths = np.diff(ends).astype(np.uint8)
-    return PackedKeys(lengths, b"" if data is None else data.to_pybytes()[ends[0] : ends[-1]])
+    return PackedKeys(lengths, b"" if data is None else data.slice(ends[0], ends[-1] - ends[0]).to_pybytes())
 
 
 def _scaled(values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_], order: Rows) -> tuple[pa.Array, int | None]:

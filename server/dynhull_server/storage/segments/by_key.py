@@ -1,0 +1,147 @@
+"""Rows of a segment as its file has them: by key, then revision.
+
+So the last place of each key is where another key begins, and is found without a table of keys. What lies by revision
+is made of it when it is asked for: of a few batches these alone, of all batches once.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from threading import Lock
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynhull.keys import Keys
+
+from ...state.records import HullSettings, Identity, Record
+from .columns import NONE, ROWS, Batches, Integers, SegmentColumns
+from .gathered import last_of_keys, last_places_count
+
+Places = npt.NDArray[np.int32]
+
+# Batches of fewer rows than this part of all are put in order alone.
+FEW = 16
+
+
+@dataclass(slots=True)
+class RowsByKey:
+    """Rows of one hull, by key, then revision and place; those without a key come last.
+
+    Attributes:
+        identity: what identifies a point of the hull.
+        first: the first revision.
+        starts: of each revision the number of rows before it, and the number of all rows.
+        places: the place of each row among all by revision.
+        rows: the row at each place.
+        of_revisions: `commit`, `committed` and `clock` of each revision; none where most have one row.
+        of_rows: the other columns, of each row.
+        codes: a number for the key of each row, greater than those of the keys before it; NONE without a key.
+        packed: returns the keys with some numbers.
+        detail: of the rows that have one what no column has, as JSON.
+    """
+
+    identity: Identity
+    first: int
+    starts: Integers
+    places: Places
+    rows: Places
+    of_revisions: dict[str, Integers]
+    of_rows: dict[str, npt.NDArray[Any]]
+    codes: Places
+    packed: Callable[[Places], Keys]
+    detail: dict[int, str]
+    _batches: Batches | None = field(default=None, init=False)
+    _turn: Any = field(default_factory=Lock, init=False)
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def batches(self) -> Batches:
+        """All batches, by revision. O(n) the first time."""
+        with self._turn:
+            if self._batches is None:
+                self._batches = Batches(self.columns(0, len(self.starts) - 1))
+            return self._batches
+
+    def batches_between(self, after: int, until: int) -> Batches:
+        """The batches after one revision up to another one; of others some may be there, too."""
+        begin, end = self._numbers(after, until)
+        return Batches(self.columns(begin, end)) if self._are_few(begin, end) else self.batches()
+
+    def last_places(self, settings: HullSettings, after: int, until: int) -> Record | None:
+        """What the batches after one revision up to another one come to as one; None for `gathered` to do it."""
+        begin, end = self._numbers(after, until)
+        if self._are_few(begin, end) or self.detail or not last_places_count(settings):
+            return None
+        start, stop = int(self.starts[begin]), int(self.starts[end])
+        there = np.flatnonzero((self.places >= start) & (self.places < stop))
+        rows: Any = slice(None) if len(there) == len(self) else there
+        of_rows = {name: values[rows] for name, values in self.of_rows.items()}
+        if (of_rows["kind"] != ROWS).any():
+            return None
+        codes = self.codes[rows]
+        if (codes == NONE).any():  # a batch of nothing
+            keyed = codes != NONE
+            codes, of_rows = codes[keyed], {name: values[keyed] for name, values in of_rows.items()}
+        newest = np.append(codes[1:] != codes[:-1], True)[: len(codes)]
+        found = last_of_keys(of_rows, newest, lambda which: self.packed(codes[which]))
+        if found is None:
+            return None
+        return replace(Batches(self.columns(end - 1, end)).at(0), rows=found)
+
+    def columns(self, begin: int, end: int) -> SegmentColumns:
+        """The rows of some revisions, by revision and place."""
+        start, stop = int(self.starts[begin]), int(self.starts[end])
+        rows = self.rows[start:stop]
+        if stop - start == len(self) and bool((np.diff(rows) == 1).all()):  # as a state, where every key is another one
+            ordered: Any = slice(None)
+        else:
+            ordered = rows
+        counts = np.diff(self.starts[begin : end + 1])
+        codes = self.codes[ordered]
+        keyed = codes != NONE
+        detail: list[str | None] = [None] * (stop - start)
+        if self.detail:
+            detail = [self.detail.get(row) for row in rows.tolist()]
+        columns: dict[str, Any] = {
+            name: _repeated(values[begin:end], counts) for name, values in self.of_revisions.items()
+        }
+        columns |= {name: _taken(values, ordered, stop - start) for name, values in self.of_rows.items()}
+        return SegmentColumns(
+            identity=self.identity,
+            revision=np.repeat(self.first + np.arange(begin, end), counts),
+            place=np.arange(start, stop) - np.repeat(self.starts[begin:end], counts),
+            keyed=keyed,
+            keys=self.packed(codes if keyed.all() else codes[keyed]),
+            detail=detail,
+            **columns,
+        )
+
+    def _are_few(self, begin: int, end: int) -> bool:
+        return bool((self.starts[end] - self.starts[begin]) * FEW <= len(self))
+
+    def _numbers(self, after: int, until: int) -> tuple[int, int]:
+        """The numbers of the first revision after one, and of the first one after another, from 0."""
+        last = len(self.starts) - 1
+        begin, end = (min(max(each + 1 - self.first, 0), last) for each in (after, until))
+        return begin, max(begin, end)
+
+
+def _repeated(values: Integers, counts: Integers) -> Integers:
+    """The value of each revision for all of its rows. What has the same in all takes no memory for each."""
+    if values.strides == (0,) and len(values):
+        return np.broadcast_to(values[0], int(counts.sum()))
+    return np.repeat(values, counts)
+
+
+def _taken(values: npt.NDArray[Any], rows: Any, count: int) -> npt.NDArray[Any]:
+    """Some rows of a column."""
+    if values.strides[0] == 0:
+        return values[:count]
+    found: npt.NDArray[Any]
+    if values.ndim == 1 or isinstance(rows, slice):
+        found = values[rows]
+    else:  # those of two numbers as one item each: these are copied in a third of the time
+        found = values.view(np.complex128)[:, 0][rows].view(np.float64).reshape(-1, 2)
+    return found
