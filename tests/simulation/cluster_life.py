@@ -151,13 +151,13 @@ class OwnedStorage:
         self._commits += 1
         return commit
 
-    def settle(self) -> None:
+    def settle(self) -> CommitStamp:
         """Decide what was left undecided: connect again, and look."""
         session = self._begun(own=None)
         self._commits = self._site.commits
-        if self._rows is not None:
-            self._rows.settle()
+        commit = self._store._inner.settle()
         session.execute("COMMIT")
+        return commit
 
     def _begun(self, own: int | None = -1) -> Session:
         """A session with a transaction in which this server is the owner, and has made all commits."""

@@ -78,10 +78,11 @@ class SharedRows(RowStorage):
         """The owner does not know what became of its last commit."""
         self._unsettled = True
 
-    def settle(self) -> None:
+    def settle(self) -> CommitStamp:
         """Look what became of it."""
         if self._unsettled:
             self._renew(self._examined(lambda *_: None, contents=False).ledger)
+        return self._latest
 
     @property
     def _place(self) -> str:

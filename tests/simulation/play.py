@@ -129,6 +129,25 @@ def _live(
     if life.get("restored"):
         storage.restore()
     server: CoreServer | ShellServer = LAYERS[layer](limits, storage, model, schedule)
+    try:
+        clients = _lived(server, life, model, schedule, storage, before)
+    except BaseException:
+        if isinstance(server, ShellServer):
+            server.end()
+        raise
+    server.kill()
+    return clients
+
+
+def _lived(
+    server: CoreServer | ShellServer,
+    life: dict[str, Any],
+    model: Model,
+    schedule: Schedule,
+    storage: FaultyStorage,
+    before: list[Client],
+) -> list[Client]:
+    """The clients of a life that has been led to its end."""
     model.new_life()
     model.wall += life.get("clock", 0)
     server.check()
@@ -143,7 +162,6 @@ def _live(
     with suppress(KilledError):  # where the plan says so
         _lead(server, life, model, schedule, storage)
     storage.dead, storage.killing = True, False
-    server.kill()
     return clients
 
 

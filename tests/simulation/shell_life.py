@@ -105,7 +105,11 @@ class ShellServer:
         self._clients: list[ClientActor] = []
         self._news: dict[BatchStream, asyncio.Event] = {}
         self._closed = False
-        self._drive(self._start(), "the start")
+        try:
+            self._drive(self._start(), "the start")
+        except BaseException:
+            self.end()
+            raise
         model.clock = lambda: self.time()
 
     async def _start(self) -> None:
@@ -326,9 +330,15 @@ class ShellServer:
 
     def kill(self) -> None:
         """End the life without a shutdown, as a kill does."""
+        self.end()
+        self.model.finding = None  # the answers of a killed server reach no client
+
+    def end(self) -> None:
+        """Let nothing of it go on; what is found stays."""
+        finding, self._storage.dead = self.model.finding, True
         self.loop.kill()
         self._threads.kill()
-        self.model.finding = None  # the answers of a killed server reach no client
+        self.model.finding = finding
 
     def stop(self) -> None:
         """End the server as the process does: background work first, then its callers, then the engine."""

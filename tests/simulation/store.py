@@ -136,11 +136,11 @@ class FaultyStorage:
             if kept:
                 self._keep(changes, now)
 
-    def settle(self) -> None:
+    def settle(self) -> CommitStamp:
         """Decide what was left undecided."""
         self._fail("settle")
         self._decide()
-        self._inner.settle()
+        return self._inner.settle()
 
     def row(self, number: int) -> HullRow | None:
         """The row of a hull."""

@@ -60,7 +60,7 @@ def test_who_goes_on_without_a_pause_is_a_finding(monkeypatch):
 
 def test_a_plan_with_a_finding_is_made_small_in_a_given_time(monkeypatch):
     monkeypatch.setattr(sqlite_store, "may_go", lambda *_: False)
-    plan = json.loads((FINDINGS[0].parent / "segment_that_is_to_be_kept_again.json").read_text())["plan"]
+    plan = random_plan(123000000120, "past")
     begun = time.process_time()
     small = shrunk(plan, 3.0)
     assert time.process_time() - begun < 3.0 + 2 * LEAST

@@ -566,10 +566,11 @@ def test_reading_goes_on_beside_commits(opened):
 
 
 def test_housekeeping_changes_nothing(opened):
-    opened.create(1, Append(1, records(1, 3)))
+    opened.create(1)
+    commit = opened.storage.commit([Append(1, records(1, 3))], 5_000_000)
     opened.storage.sync()
     opened.storage.checkpoint()
-    opened.storage.settle()
+    assert opened.storage.settle() == commit
     assert opened.storage.bytes_used() >= 0
     same(opened.storage.read(1).records, records(1, 3))
 

@@ -95,8 +95,10 @@ def test_an_unknown_outcome_is_decided(storage, folder, disk, error, kept, tmp_p
     disk.fail("COMMIT", failure(sqlite3.SQLITE_IOERR_FSYNC))
     with pytest.raises(StorageError, match="injected"):
         storage.settle()
-    storage.settle()
     last = 4 if kept else 3
+    settled = storage.settle()
+    assert settled.number >= storage.batches(1, last - 1, last)[0].committed.number
+    assert storage.settle() == settled
     same(storage.read(1).records, records(1, last))
     assert (storage.row(2) is not None) == kept
     append(storage, last + 1, last + 2)

@@ -42,7 +42,7 @@ class Faulty(SQLiteStorage):
 
     def settle(self):
         fails("settle", no_disk())
-        super().settle()
+        return super().settle()
 
     def checkpoint(self):
         fails("checkpoint", no_disk())

@@ -205,10 +205,10 @@ class PostgresStorage(RowStorage):
         self._write(group)
         return group.commit
 
-    def settle(self) -> None:
+    def settle(self) -> CommitStamp:
         """Decide the outcome of the last commit, as described at the top of this file."""
         if not self._unsettled:
-            return
+            return self._latest
         self._disconnect()
         connection = self._writer = self._connect_writer(writer_name(self._partition, self._owner.epoch))
         with as_storage_errors():
@@ -222,6 +222,7 @@ class PostgresStorage(RowStorage):
         if findings.mends:
             raise DamagedError(f"{self._place}: {'; '.join(findings.notes)}: restart the server")
         self._renew(findings.ledger)
+        return self._latest
 
     def _write(self, group: Group) -> None:
         try:

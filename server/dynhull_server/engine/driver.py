@@ -129,6 +129,9 @@ class Driver:
         self._stepping = False
         self._expiries = Expiries(supervisor)
         self._idle: asyncio.Event | None = None
+        # The last commit there was when an outcome was decided, until all that is in doubt is published; who waits.
+        self._decided: CommitStamp | None = None
+        self._undecided: list[asyncio.Future[None]] = []
         self._begun = self._started = False
 
     # Start and shutdown
@@ -178,6 +181,7 @@ class Driver:
         """Complete the trips in progress, and refuse the waiting requests."""
         self.dispatch(Stopping())
         self._idle = asyncio.Event()
+        self._have_decided(StoppingError())
         self._notice_idle()
         await self._idle.wait()
 
@@ -212,7 +216,11 @@ class Driver:
         self._stepping = True
         try:
             while True:
-                for effect in self.core.step(event):
+                effects = self.core.step(event)
+                if self._decided is not None and not self.core.undecided:
+                    self.published, self._decided = max(self.published, self._decided), None
+                    self._have_decided(None)
+                for effect in effects:
                     self._carry_out(effect)
                 if self._idle is not None:
                     self._notice_idle()
@@ -329,6 +337,29 @@ class Driver:
         except UNREADABLE as error:
             raise not_stored(error) from error
 
+    async def whole(self) -> CommitStamp:
+        """A commit that is published as a whole, with all before it: the newest one.
+
+        Waits for the commits that have begun, and until what was in doubt is published, or raises NotStoredError:
+        that cannot be decided at present.
+        """
+        while True:
+            published = self.published
+            await self.settled()
+            if not self.core.undecided:
+                return published
+            if self._idle is not None:  # perhaps nobody looks any more
+                raise StoppingError
+            decided: asyncio.Future[None] = self._loop.create_future()
+            self._undecided.append(decided)
+            await decided
+
+    def _have_decided(self, error: Exception | None) -> None:
+        """Have those who wait for what is in doubt hear of it."""
+        waiting, self._undecided = self._undecided, []
+        for each in waiting:
+            _settle(each, error)
+
     def commit_from_thread(self, changes: list[Any]) -> None:
         """Commit, from another thread, changes of shards; raises the error of a failure."""
         done: Future[None] = Future()
@@ -356,6 +387,7 @@ class Driver:
                 self._fences.notify(effect.fences, effect.events)
             case Retry():
                 self.supervisor.failed("examination", effect.reason)
+                self._have_decided(not_stored(effect.reason))
                 self._loop.call_later(effect.pause, self.dispatch, Retried(effect.ticket))
             case _:
                 assert_never(effect)
@@ -394,15 +426,16 @@ class Driver:
 
         def settled(error: Exception | None, _: bool) -> None:
             if error is None:
-                self._from_thread(partial(self._read_for, effect))
+                self._from_thread(partial(self._read_for, effect, self._commits.latest))
             else:
                 self._from_thread(partial(self.dispatch, NotExamined(effect.ticket, error)))
 
         self._commits.settle(settled)
 
-    def _read_for(self, effect: Examine) -> None:
+    def _read_for(self, effect: Examine, latest: CommitStamp | None) -> None:
         if self._idle is not None and self._idle.is_set():  # the server has stopped without waiting for it
             return
+        self._decided = max(self._decided or self.published, latest or self.published)
 
         def examined() -> Event:
             try:

@@ -105,10 +105,8 @@ class HullFeeds:
             raise HullUnsuitableError(hull.name, "is divided among shards, and has no feed")
 
     async def settled(self) -> CommitStamp:
-        """A commit that is published as a whole, with all before it: the newest one."""
-        published = self._driver.published
-        await self._driver.settled()
-        return published
+        """A commit that is published as a whole, with all before it: the newest one. Raises NotStoredError."""
+        return await self._driver.whole()
 
     async def sent_until(self, hull: LiveHull, commit: CommitStamp) -> tuple[int, bool]:
         """The last revision of a hull that was committed at or before a commit, and whether some after it are lost.

@@ -26,8 +26,6 @@ MOST_AHEAD = 2**17
 # Names that are sent together.
 NAMES_TOGETHER = 4096
 BEGINNING = CommitStamp(0, 0)
-# Seconds between looks at batches that are not settled yet.
-UNSETTLED = 0.05
 
 
 class OfHull(NamedTuple):
@@ -139,8 +137,6 @@ class PrefixFeed:
         for first in range(0, max(len(there), 1), NAMES_TOGETHER):
             last = first + NAMES_TOGETHER >= len(there)
             yield ManyFeedPart(there=there[first : first + NAMES_TOGETHER], position=self._position() if last else b"")
-        loop = asyncio.get_running_loop()
-        said = loop.time()
         while True:
             async with aclosing(self._merged(waiting, settled)) as parts:
                 async for part in parts:
@@ -149,21 +145,16 @@ class PrefixFeed:
             if self._part:
                 self._part.position = self._position()
                 yield self._part
-                said = loop.time()
             self._part = ManyFeedPart()
             roster.heard(key, version)
-            # Those whose newest batch was not settled come again: one that was examined is so with the next commit.
+            # Those whose newest batch came after what was settled come again: by now it is.
             waiting = {name for name in waiting if (entry := roster.get(name)) is not None and self._is_news(entry)}
-            while roster.version <= version:
+            while not waiting and roster.version <= version:
                 try:
-                    async with asyncio.timeout(UNSETTLED if waiting else progress_interval):
+                    async with asyncio.timeout(progress_interval):
                         await roster.beyond(version, roster.generation)
                 except TimeoutError:
-                    if not waiting or (progress_interval is not None and loop.time() - said >= progress_interval):
-                        yield ManyFeedPart(position=self._position())
-                        said = loop.time()
-                    if waiting:
-                        break
+                    yield ManyFeedPart(position=self._position())
             settled = await self._feeds.settled()
             changed, version = roster.after(version), roster.version
             waiting |= {entry.name for entry in changed if entry.gone or entry.new or self._is_news(entry)}

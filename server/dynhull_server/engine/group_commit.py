@@ -74,7 +74,8 @@ class GroupCommit:
 
     Attributes:
         since: the time by the clock when the commit in progress began; None while there is none.
-        latest: the last commit that has taken place, set before `done` is called for it; None before the first.
+        latest: the last commit that has taken place, set before `done` is called for it, and when an outcome is
+            decided; None before the first.
         undecided: whether the outcome of the last commit is unknown.
     """
 
@@ -144,7 +145,7 @@ class GroupCommit:
         if not self.undecided:
             return True
         try:
-            self._storage.settle()
+            self.latest = self._storage.settle()
         except TakenOverError as error:
             self._end(group, error)
         except Exception as error:

@@ -445,7 +445,6 @@ class Core:
 
     def _over(self, trip: Trip) -> None:
         self._trips -= 1
-        self._undecided -= trip.unknown
         self._registry.give_back(len(trip.places))
         if trip.fences is not None:
             self._fences.over(trip, trip.fences)
@@ -572,6 +571,7 @@ class Core:
         found = list(zip(trip.legs.values(), event.states, strict=True))
         if trip.unknown and trip.landed(event.states, event.fences):
             commits = [state.committed for state in event.states if state is not None and state.committed is not None]
+            self._undecided -= 1
             self._keep(trip, effects, max(commits, default=None))
         elif any(leg.before is not None and state is None for leg, state in found):
             self._not_examined(NotExamined(trip, LookupError("the hull is not in the storage")), effects)
@@ -585,6 +585,7 @@ class Core:
                 self._fences.give_back(trip, trip.fences, event.restored)
             assert trip.failure is not None  # a trip is examined only after a failure
             if trip.unknown:
+                self._undecided -= 1
                 self._refuse_changes(trip, not_stored(trip.failure), effects)
             self._again(trip)
         self._go_on(trip.queues, effects)

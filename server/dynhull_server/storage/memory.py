@@ -112,8 +112,9 @@ class MemoryStorage:
         """Nothing: commits take no time."""
         return (), changes
 
-    def settle(self) -> None:
-        """Do nothing: the outcome of a commit is never unknown."""
+    def settle(self) -> CommitStamp:
+        """The last commit: its outcome is never unknown."""
+        return self._commit
 
     def row(self, number: int) -> HullRow | None:
         """The hull with that number, or None."""

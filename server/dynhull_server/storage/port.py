@@ -146,10 +146,11 @@ class Storage(Past, Protocol):
         effect before that. Without steps, the changes are the same. To give up, commit nothing more.
         """
 
-    def settle(self) -> None:
+    def settle(self) -> CommitStamp:
         """Decide a commit with an unknown outcome. From then on `read` and `row` show the outcome.
 
-        Until then `commit`, `read`, `row` and `oldest` raise StorageError.
+        Returns the last commit that has taken place, or a later one that has changed nothing. Until then `commit`,
+        `read`, `row` and `oldest` raise StorageError.
 
         Raises:
             TakenOverError: another server decides from now on.

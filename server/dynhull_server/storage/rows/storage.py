@@ -147,6 +147,12 @@ class RowStorage(ABC):
         except Exception as error:  # a value that does not fit a column, or no memory
             raise NotCommittedError(f"nothing was written: {words(error)}") from error
 
+    @property
+    def _latest(self) -> CommitStamp:
+        """The last commit."""
+        totals = self._ledger.totals
+        return CommitStamp(totals.commits, totals.committed)
+
     def _renew(self, ledger: Ledger) -> None:
         """Go on with the rows as they are in the database, after a commit with an unknown outcome."""
         with self._visible:

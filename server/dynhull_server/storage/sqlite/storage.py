@@ -150,10 +150,10 @@ class SQLiteStorage(RowStorage):
         return group.commit
 
     @_as_storage_errors()
-    def settle(self) -> None:
+    def settle(self) -> CommitStamp:
         """Decide the outcome of the last commit, as described at the top of this file."""
         if not self._unsettled:
-            return
+            return self._latest
         self._disconnect()
         connection = self._writer = self._connect_writer()
         connection.execute("PRAGMA synchronous = FULL")
@@ -172,6 +172,7 @@ class SQLiteStorage(RowStorage):
         if findings.mends:
             raise DamagedError(f"{self._folder.database}: {'; '.join(findings.notes)}: restart the server")
         self._renew(findings.ledger)
+        return self._latest
 
     def _write(self, group: Group) -> None:
         connection = self._writer
