@@ -8,7 +8,7 @@ from functools import partial
 from dynhull_cli.feed_lines import batch_members
 from dynhull_client import AsyncFeed, AsyncHullClient, FeedBatch, HullReplacedError, UnavailableError
 
-from .messages import COMMENT, message, place
+from .messages import COMMENT, last_problem, message, place
 from .shared import over_restarts
 
 
@@ -66,7 +66,7 @@ async def look(client: AsyncHullClient, reading: FeedReading) -> None:
 
 def batches(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:
     """The batches as text, over restarts of the server; a comment when there is none for long."""
-    return over_restarts(partial(_read, client, reading, keepalive), reading, "hull", HullReplacedError)
+    return over_restarts(partial(_read, client, reading, keepalive), reading, "hull", HullReplacedError, last_problem)
 
 
 async def _read(client: AsyncHullClient, reading: FeedReading, keepalive: float) -> AsyncIterator[bytes]:

@@ -6,10 +6,12 @@ from typing import Any
 from pydantic_core import to_json
 
 from dynhull_client import DynhullError
+from dynhull_surface.reasons import Repeat, repeat_of
 
 from ..refusals import of_refusal
 
 RETRY_MILLISECONDS = 1000
+OVER, ANY = "over", "any"  # in an id, after the uid; and for a uid that is not known
 FIRST = f"retry: {RETRY_MILLISECONDS}\n\n".encode()
 COMMENT = b": \n\n"
 
@@ -20,9 +22,25 @@ def message(kind: str, ident: str, data: Any) -> bytes:
     return lines.encode() + to_json(data, inf_nan_mode="null") + b"\n\n"
 
 
-def problem(error: DynhullError) -> bytes:
+def problem(error: DynhullError, ident: str = "") -> bytes:
     """The event that ends a stream: the problem details of an error."""
-    return message("problem", "", json.loads(bytes(of_refusal(error).body)))
+    return message("problem", ident, json.loads(bytes(of_refusal(error).body)))
+
+
+def last_problem(error: DynhullError) -> bytes:
+    """The same, with an id after which a browser is not to connect again unless the error may pass."""
+    return problem(error, "" if repeat_of(error.reason, error.code.name) is not Repeat.NO else over())
+
+
+def over(uid: str = "") -> str:
+    """The id of the last event of a stream: who connects again with it is answered with 204, which ends it for good."""
+    return f"{uid or ANY}:{OVER}"
+
+
+def is_over(ident: str | None) -> bool:
+    """Whether a Last-Event-ID is that of the last event of a stream."""
+    uid, _, end = (ident or "").rpartition(":")
+    return bool(uid) and end == OVER
 
 
 # A browser passes on only events with data.

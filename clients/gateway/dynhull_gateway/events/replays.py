@@ -13,7 +13,7 @@ from ..callers import Caller, token_of
 from ..problems import ProblemError
 from ..schemas import HullPath
 from . import documents
-from .messages import COMMENT, message, problem, resumed
+from .messages import COMMENT, is_over, last_problem, message, over, resumed
 from .routes import OF_A_HULL, Described, FormOf, LastEventId, Layer, MaxVertices, WithKeys, WithMeasures, admit, events
 from .stream import EventStream
 from .texts import HullTexts, View
@@ -35,7 +35,6 @@ EveryEvent = Annotated[
     float | None, Query(gt=0, le=86_400 * 366, description="The least number of seconds of the past between events.")
 ]
 ReplayRate = Annotated[float, Query(ge=0, le=1000, description="The most events a second; 0 for any number.")]
-OVER = "over"  # in an id, after the uid
 
 
 @router.get(
@@ -66,15 +65,13 @@ async def replay(
 
     A reader that connects again with the id of its last event begins with a snapshot of the hull at that event, and
     goes on from there; after "end" it is answered with 204, upon which a browser connects no more. The permission
-    "past" is needed where tokens are used. What ends the stream before its end is an event "problem".
+    "past" is needed where tokens are used. What ends the stream before its end is an event "problem"; one that does not
+    pass, as where the past is damaged, has such an id, too. Who goes on behind it says so with `from`, without an id.
     """
     admit(request)
-    place = None
-    if last_event_id is not None and max_vertices is None:
-        uid, _, over = last_event_id.rpartition(":")
-        if uid and over == OVER:
-            return Response(status_code=204)
-        place = resumed(last_event_id)
+    if is_over(last_event_id):
+        return Response(status_code=204)
+    place = resumed(last_event_id) if max_vertices is None else None
     view = View(token_of(request), name, f or "changes", rate, keys, measures, layer, max_vertices)
     texts = HullTexts(view)
     begin = start if place is None else str(place[1])
@@ -134,12 +131,12 @@ class ReplayTexts(AsyncIterator[bytes]):
             following = coming.result()
         except DynhullError as error:
             self._ended = True
-            return problem(error)
+            return last_problem(error)
         if following is not None:
             return self._texts.take(following)
         self._ended = True
         copy = self._texts.copy
-        return message("end", f"{copy.uid}:{OVER}" if copy.uid else "", {"revision": copy.revision})
+        return message("end", over(copy.uid), {"revision": copy.revision})
 
     async def aclose(self) -> None:
         """End the replay, which may not have been read at all."""

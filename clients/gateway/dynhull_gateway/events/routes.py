@@ -25,7 +25,7 @@ from .feeds import PATIENCE_SECONDS, Feed
 from .fence_events import Reading
 from .fence_events import events as fence_events
 from .many import ManyFeed, ManyView
-from .messages import parted, position_of, resumed
+from .messages import is_over, parted, position_of, resumed
 from .past_fence import PastEvents
 from .shared import begin_at
 from .stream import EventStream
@@ -112,6 +112,11 @@ def events(example: str, *data: type[BaseModel]) -> dict[int | str, dict[str, An
     schema = {"type": "string", "contentMediaType": Described.media_type, "contentSchema": of_one}
     content = {"schema": schema, "example": example}
     return {200: {"description": "Events.", "content": {Described.media_type: content}}}
+
+
+IS_OVER: dict[int | str, dict[str, Any]] = {
+    204: {"description": "The stream has ended with a problem that does not pass."}
+}
 
 
 @router.get("/hulls/{name}/events", response_class=Described, responses=events(documents.OF_HULL, *OF_A_HULL))
@@ -286,7 +291,9 @@ async def fence_events_between(
     return EventStream(past.texts(state.settings.keepalive_seconds), state.health, state.figures)
 
 
-@router.get("/hulls/{name}/feed", response_class=Described, responses=events(documents.OF_FEED, documents.FeedBatch))
+@router.get(
+    "/hulls/{name}/feed", response_class=Described, responses=events(documents.OF_FEED, documents.FeedBatch) | IS_OVER
+)
 async def hull_feed(
     request: Request,
     client: Caller,
@@ -301,13 +308,16 @@ async def hull_feed(
     with `PUT /hulls/{name}/feed/consumers/{consumer}`, and is sent what it has not acknowledged. It needs the right to
     read the past of the hull. The data is JSON, as described by the schema FeedBatch. Also: "lost", with the `first`
     and the `last` revision of batches that are kept no more and were not sent; "replaced", when another hull has the
-    name now, whose batches follow; and "problem", which ends the stream.
+    name now, whose batches follow; and "problem", which ends the stream. One that does not pass, as where the past is
+    damaged, has an id after which a browser that connects again is answered with 204, and connects no more.
     """
+    if is_over(last_event_id):
+        return Response(status_code=204)
     uid, place = _resumed(last_event_id, consumer, after) or ("", after)
     return await _feed(request, client, FeedReading(name, None, uid, place, consumer))
 
 
-@router.get("/feed", response_class=Described, responses=events(documents.OF_FEED, documents.FeedBatch))
+@router.get("/feed", response_class=Described, responses=events(documents.OF_FEED, documents.FeedBatch) | IS_OVER)
 async def feed_of_many(
     request: Request,
     client: Caller,
@@ -323,10 +333,12 @@ async def feed_of_many(
     the prefix. Events without an id belong together with those up to the next id. The data is JSON, as described by the
     schema FeedBatch. Also: "lost", with the `first` and the `last` revision of batches that are kept no more and were
     not sent; "deleted", with a `hull` that was deleted; "hulls" after Last-Event-ID, with the uids of the `hulls` that
-    there are, by name: what a reader has of others is no more; and "problem", which ends the stream.
+    there are, by name: what a reader has of others is no more; and "problem", which ends the stream, as for a hull.
     """
     if consumer is not None and begin:
         raise ValueError("give either consumer, which knows its place, or begin")
+    if is_over(last_event_id):
+        return Response(status_code=204)
     position = None if last_event_id is None or consumer is not None else position_of(last_event_id)
     return await _feed(request, client, FeedReading(None, prefix, "", position or (0 if begin else None), consumer))
 

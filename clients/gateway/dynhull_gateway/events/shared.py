@@ -151,7 +151,11 @@ async def told(place: NumberedPlace, get: Callable[[str], Awaitable[Fence | Alar
 
 
 async def over_restarts(
-    read: Callable[[], AsyncIterator[bytes]], place: Place, kind: str, replaced: type[DynhullError]
+    read: Callable[[], AsyncIterator[bytes]],
+    place: Place,
+    kind: str,
+    replaced: type[DynhullError],
+    end: Callable[[DynhullError], bytes] = problem,
 ) -> AsyncIterator[bytes]:
     """The texts of a watch, and of those that follow it when the server was away, until one ends.
 
@@ -160,6 +164,7 @@ async def over_restarts(
         place: where the reader is.
         kind: what is read, such as "fence".
         replaced: the error that says that another one has the name now: the reader goes to the beginning of that.
+        end: the text of the error that ends them.
     """
     while True:
         try:
@@ -170,7 +175,7 @@ async def over_restarts(
             yield message("replaced", "", {kind: place.name})
         except DynhullError as error:
             if error.code != grpc.StatusCode.UNAVAILABLE:
-                yield problem(error)
+                yield end(error)
                 return
             yield COMMENT
             await asyncio.sleep(RETRY_SECONDS)
