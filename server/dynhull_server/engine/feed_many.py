@@ -6,13 +6,13 @@ the hulls that have changed since then have in the past.
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import aclosing
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heapreplace
 from typing import NamedTuple
 
-from ..state.errors import HullNotFoundError, PositionForgottenError
+from ..state.errors import HullNotFoundError, NotStoredError, PositionForgottenError
 from ..state.records import CommitStamp, Record
 from .feed import HullFeeds
 from .live_hull import LiveHull
@@ -138,9 +138,17 @@ class PrefixFeed:
             last = first + NAMES_TOGETHER >= len(there)
             yield ManyFeedPart(there=there[first : first + NAMES_TOGETHER], position=self._position() if last else b"")
         while True:
+            failure: NotStoredError | None = None
             async with aclosing(self._merged(waiting, settled)) as parts:
-                async for part in parts:
+                try:
+                    async for part in parts:
+                        yield part
+                except NotStoredError as error:
+                    failure = error
+            if failure is not None:
+                for part in self._before_a_hole():
                     yield part
+                raise failure
             self._sent = settled
             if self._part:
                 self._part.position = self._position()
@@ -212,7 +220,11 @@ class PrefixFeed:
                 continue
             record = source.ahead.popleft()
             source.after = record.revision
-            following = await self._following(name, share)
+            try:
+                following = await self._following(name, share)
+            except NotStoredError:  # which may have more of this commit
+                self._part.batches.append(FedBatch(source.hull, record, more=True))
+                raise
             if following is not None and following <= settled.number:
                 heapreplace(order, (following, name))
             else:
@@ -230,6 +242,15 @@ class PrefixFeed:
                 yield part
         for name in names & self._sources.keys():
             self._sources[name].ahead.clear()  # it is read again
+
+    def _before_a_hole(self) -> Iterator[ManyFeedPart]:
+        """What has been read: whole commits, and without a position those batches of one of which there may be more."""
+        part, self._part = self._part, ManyFeedPart()
+        whole = next((place for place in range(len(part.batches), 0, -1) if not part.batches[place - 1].more), 0)
+        rest = ManyFeedPart(part.batches[whole:])
+        del part.batches[whole:]
+        part.position = self._position()
+        yield from (each for each in (part, rest) if each)
 
     async def _following(self, name: str, share: int | None) -> int | None:
         """The number of the commit of the next batch of a hull, None for none; `share` as in `_read`."""

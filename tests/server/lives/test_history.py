@@ -144,6 +144,30 @@ def test_a_feed_ends_at_a_hole_with_its_revisions_and_goes_on_behind_it(tmp_path
             assert [next(feed).revision for _ in range(revision - last)] == list(range(last + 1, revision + 1))
 
 
+def test_a_feed_of_a_prefix_gives_what_is_before_a_hole_and_goes_on_behind_it(tmp_path):
+    with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="str", history="30d")
+        write_until_filed(client, "fleet", 1)
+        revision = write_until_filed(client, "fleet", client.history("fleet").batches + 1)
+        file = sorted(tmp_path.rglob("*.batches.parquet"))[1]
+        first = int(file.name.split("-")[0])
+        content = file.read_bytes()
+        file.unlink()
+        found, position = [], 0
+        with client.feed(prefix="", after=0, timeout=PATIENCE) as feed:
+            for _ in range(1, first):
+                batch = next(feed)
+                found.append(batch.revision)
+                position = batch.after or position
+            with pytest.raises(PastDamagedError, match=f"{first} to"):
+                next(feed)
+        assert found == list(range(1, first))
+        file.write_bytes(content)
+        with client.feed(prefix="", after=position, timeout=PATIENCE) as feed:
+            rest = [each.revision for each in (next(feed) for _ in range(revision - first + 3)) if each.type == "batch"]
+        assert rest[:2] == [first - 1, first], "the commit before the hole might have had more"
+
+
 def test_how_much_is_kept_is_told_changed_and_lost_with_the_hull(tmp_path):
     with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
         begun = datetime.now(UTC)
