@@ -173,7 +173,7 @@ class Filed:
     def _rows(self, segment: StoredSegment) -> RowsByKey:
         reading, begins = self._reading(segment)
         if begins:
-            self._read(segment, reading)
+            self._read(segment, reading, ordered=False)
         with self._named(segment, BATCHES):
             return reading.result()
 
@@ -190,8 +190,11 @@ class Filed:
                 rows -= _count(self._open.popitem(last=False)[1])
             return reading, True
 
-    def _read(self, segment: StoredSegment, reading: "Future[RowsByKey]", *, ordered: bool = False) -> None:
-        """Read a segment. Others wait for it; if it cannot be read, who needs it next tries again."""
+    def _read(self, segment: StoredSegment, reading: "Future[RowsByKey]", ordered: bool) -> None:
+        """Read a segment, perhaps with its batches in order.
+
+        Others wait for it; if it cannot be read, who needs it next tries again.
+        """
         try:
             found = read_rows(self._archive, segment)
             if ordered:
@@ -208,8 +211,7 @@ class Filed:
             return
         reading, begins = self._reading(segment)
         if begins:
-            read = partial(self._read, segment, reading, ordered=ordered)
-            self._ahead = Thread(target=read, name="read ahead")
+            self._ahead = Thread(target=self._read, args=(segment, reading, ordered), name="read ahead")
             self._ahead.start()
 
     def _read_state(self, segment: StoredSegment, keys: Keys | None) -> Kept:
