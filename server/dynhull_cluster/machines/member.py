@@ -33,6 +33,7 @@ from ..divisions.divisions import ServedDivisions
 from ..divisions.peers import Peers, peer_handler
 from ..merged_metrics import merged
 from ..postgres.database import Database
+from ..postgres.marks import DatabaseMarks
 from ..postgres.ownership import Leases
 from ..postgres.processes import is_known_dead
 from ..postgres.storage import PostgresStorage
@@ -353,7 +354,7 @@ class Member:
         self._peers = Peers(self._addresses)
 
     def _owner(self) -> Claimant:
-        return owner_of_database(self._cluster.secret, str(self._database))
+        return owner_of_database(self._cluster.secret, str(self._database), DatabaseMarks(self._database))
 
     async def _let_go(self, number: int, worker: str) -> None:
         """Stop to serve a partition, so that another worker can take it."""

@@ -12,6 +12,7 @@ from dynhull_server.storage.segments.owner import owner_of_database
 
 from ..divisions.divisions import ServedDivisions
 from ..postgres.database import Database
+from ..postgres.marks import DatabaseMarks
 from ..postgres.ownership import Leases
 from ..postgres.processes import this_server
 from ..postgres.schema import divided_otherwise
@@ -74,7 +75,7 @@ class OnlyMember:
         cluster = await asyncio.to_thread(join, self._database, 1)
         if cluster.partitions != 1:
             raise divided_otherwise(self._database, cluster.partitions)
-        owner = owner_of_database(cluster.secret, str(self._database))
+        owner = owner_of_database(cluster.secret, str(self._database), DatabaseMarks(self._database))
         if self._archive is not None:
             self._archive.owner = owner
         await asyncio.to_thread(claim_history, self._settings, owner)

@@ -1,13 +1,19 @@
 """One place has the past of one database: another one is refused at the start, and changes nothing there."""
 
 import shutil
+from contextlib import ExitStack
+from itertools import count
 
 import pytest
+from postgresql import postgresql
 from server_process import run, server_process, shape_options
 
 from dynhull_client import HullClient
+from dynhull_cluster.postgres.database import Database
+from dynhull_cluster.postgres.marks import DatabaseMarks
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.segments.owner import CLAIMS, Claimant, OccupiedError
+from dynhull_server.storage.sqlite.owner import FolderMarks
 
 QUIET = ("--snapshot-points", "50")
 
@@ -37,7 +43,7 @@ def test_a_second_data_folder_is_refused_until_the_first_one_gives_way(tmp_path)
     copy = shutil.copytree(first, tmp_path / "copy")
     for other in (copy, tmp_path / "new"):
         said = refused("--data", other, "--history-dir", past)
-        assert f"{past} has the past of another database, the data folder {tmp_path / 'first'} of " in said
+        assert f"{past} has the past of another database, the data folder {first} of " in said
         assert f"{CLAIMS}/{claim.name}" in said
     assert sorted(past.rglob("*")) == before
 
@@ -69,3 +75,65 @@ def test_of_two_that_claim_a_place_at_the_same_moment_none_goes_on_beside_the_ot
         with pytest.raises(OccupiedError, match="the other one"):
             late.remove("uid/name")
     assert [each.name for each in tmp_path.rglob("*") if each.is_file()] == ["other"]
+
+
+def archive(past, marks):
+    found = Archive(past)
+    found.owner = Claimant("same", "the database", marks)
+    return found
+
+
+def require_noticed(past, first, copied):
+    """Of two databases of one name the one that claims a place later has it, until it gives way."""
+    one = archive(past, first)
+    one.write("uid/name.batches.parquet", b"content")
+    other = archive(past, copied())  # made while the first is served
+    archive(past, first).claim()
+    with pytest.raises(OccupiedError, match="the past of a copy"):
+        other.claim()  # the first was served anew since then
+
+    other = archive(past, copied())
+    one.remove("uid/nothing")
+    other.claim()
+    other.remove("uid/nothing")
+    for attempt in (lambda: one.remove("uid/name"), lambda: archive(past, first).claim()):
+        with pytest.raises(OccupiedError, match=f"the past of a copy of this database.* remove {CLAIMS}/same"):
+            attempt()
+    assert (past / "uid" / "name.batches.parquet").exists()
+    (past / CLAIMS / "same").unlink()
+    one.remove("uid/name")
+    assert not (past / "uid").exists()
+    with pytest.raises(OccupiedError, match="the past of a copy"):
+        other.remove("uid/name")
+
+
+def test_a_copy_of_a_disk_which_has_the_same_name_is_noticed_before_anything_is_removed(tmp_path):
+    first, copies = tmp_path / "first", (tmp_path / f"copy {number}" for number in count())
+    first.mkdir()
+    require_noticed(tmp_path / "past", FolderMarks(first), lambda: FolderMarks(shutil.copytree(first, next(copies))))
+
+
+def test_a_copy_of_the_files_of_postgresql_is_noticed_too(tmp_path):
+    with ExitStack() as stack:
+        original = stack.enter_context(postgresql())
+        original.query("CREATE SCHEMA dynhull", database="postgres")
+
+        def marks(database):
+            return DatabaseMarks(Database(database.url("postgres")))
+
+        require_noticed(
+            tmp_path / "past", marks(original), lambda: marks(stack.enter_context(postgresql(copied=original)))
+        )
+
+
+def test_a_folder_of_an_earlier_version_goes_on(tmp_path):
+    """Its claim has no mark."""
+    data, past = tmp_path / "data", tmp_path / "past"
+    for _ in range(2):
+        with server_process("--data", str(data), "--history-dir", str(past), *QUIET):
+            pass
+        (claim,) = (past / CLAIMS).iterdir()
+        about, _, mark = claim.read_text().partition("\n")
+        assert mark in FolderMarks(data).known()
+        claim.write_text(about)
+        (data / "dynhull.marks").unlink()

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..durable import TEMPORARY, make_durable, write_durably
 from ..port import DamagedError, StorageError
-from .owner import CLAIMS, Claimant, OccupiedError
+from .owner import CLAIMS, MARK_BYTES, Claimant, Marks, OccupiedError
 
 BATCHES, STATE = ".batches.parquet", ".state.parquet"
 HISTORY = "history"  # the folder within a data folder, unless another one is named
@@ -101,20 +101,51 @@ class Archive:
         owner = self.owner
         if owner is None or self._claimed == owner:
             return
+        self._require_alone(owner)
+        if owner.marks is not None:
+            self._mark(owner, owner.marks)
+        self._claimed = owner
+
+    def _require_alone(self, owner: Claimant) -> None:
+        """Claim the place if nobody does. Raises the errors of `claim`."""
         claims = self._claims()
         if not claims:
-            self._put(f"{CLAIMS}/{owner.id}", owner.about.encode())
+            if owner.marks is None:
+                self._put(f"{CLAIMS}/{owner.id}", owner.about.encode())
+            else:
+                self._mark(owner, owner.marks)
             claims = self._claims()
             if claims - {owner.id}:  # it came at the same moment, and may have gone
                 self._drop(f"{CLAIMS}/{owner.id}")
         if others := sorted(claims - {owner.id}):
-            about = self.content(f"{CLAIMS}/{others[0]}").decode(errors="replace")
+            about, _, _ = self.content(f"{CLAIMS}/{others[0]}").decode(errors="replace").partition("\n")
             raise OccupiedError(
                 f"{self.path} has the past of another database, {about}: each of the two would remove what the other "
                 "one needs. Give this one a --history-dir of its own, with a copy of the files if it has a past; or, "
                 f"if the other is never served again, remove {CLAIMS}/{others[0]} there"
             )
-        self._claimed = owner
+        if owner.marks is None:
+            return
+        mark = self.content(f"{CLAIMS}/{owner.id}").decode(errors="replace").partition("\n")[2]
+        if mark and mark not in owner.marks.known():  # earlier versions had none
+            raise OccupiedError(
+                f"{self.path} has the past of a copy of this database, or of what this is a copy of, which was served "
+                "since: each of the two would remove what the other one needs. Give one of them a --history-dir of "
+                "its own, with a copy of the files; or, if the other is never served again, remove "
+                f"{CLAIMS}/{owner.id} there"
+            )
+
+    def _mark(self, owner: Claimant, marks: Marks) -> None:
+        """Put a new mark into the claim, after it is known."""
+        mark = token_hex(MARK_BYTES)
+        marks.add(mark)
+        self._put(f"{CLAIMS}/{owner.id}", f"{owner.about}\n{mark}".encode())
+
+    def _may_remove(self) -> None:
+        """Have this place for the owner alone still. Raises the errors of `claim`."""
+        self.claim()
+        if self.owner is not None and self.owner.marks is not None:
+            self._require_alone(self.owner)
 
     def name(self, uid: str, first: int, last: int, epoch: int = 0) -> str:
         """A name for the files of a segment that no other one has; `epoch` is that of the owner of the hull."""
@@ -219,7 +250,7 @@ class Archive:
             OSError: one cannot be removed.
             OccupiedError: the past of another database is here.
         """
-        self.claim()
+        self._may_remove()
         path = self.path / file
         for end in (BATCHES, STATE):
             for name in (path.name + end, path.name + end + TEMPORARY):

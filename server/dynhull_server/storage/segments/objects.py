@@ -146,7 +146,7 @@ class ObjectArchive(Archive):
         Raises:
             OSError: one cannot be removed.
         """
-        self.claim()
+        self._may_remove()
         for end in (BATCHES, STATE):
             self._drop(file + end)
 

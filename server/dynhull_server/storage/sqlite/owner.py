@@ -8,7 +8,31 @@ from ..durable import TEMPORARY, make_durable
 from ..segments.owner import ID_BYTES, Claimant
 from .birth import birth
 
-NOTE = "dynhull.owner"
+NOTE, MARKS = "dynhull.owner", "dynhull.marks"
+
+
+class FolderMarks:
+    """The marks of a data folder, a line each: several processes may add one at a time.
+
+    Args:
+        data: the folder.
+    """
+
+    def __init__(self, data: Path) -> None:
+        self._file = data / MARKS
+
+    def known(self) -> set[str]:
+        """The marks."""
+        return set(self._file.read_text("ascii", "replace").split()) if self._file.exists() else set()
+
+    def add(self, mark: str) -> None:
+        """Add one, durably."""
+        new = not self._file.exists()
+        with self._file.open("a") as opened:
+            opened.write(f"{mark}\n")
+        make_durable(self._file)
+        if new:
+            make_durable(self._file.parent)
 
 
 def owner_of_folder(data: Path) -> Claimant:
@@ -23,7 +47,7 @@ def owner_of_folder(data: Path) -> Claimant:
     if file.exists():
         known, _, born = file.read_text("ascii", "replace").strip().partition(" ")
         if known and born in ("", str(birth(file) or "")):
-            return Claimant(known, about)
+            return Claimant(known, about, FolderMarks(data))
     part = file.with_name(file.name + TEMPORARY)
     part.unlink(missing_ok=True)  # a file that was there keeps its time
     new = token_hex(ID_BYTES)
@@ -32,4 +56,4 @@ def owner_of_folder(data: Path) -> Claimant:
     make_durable(part)
     part.replace(file)
     make_durable(data)
-    return Claimant(new, about)
+    return Claimant(new, about, FolderMarks(data))
