@@ -160,6 +160,7 @@ inline bool on_chain(const Nodes& nodes, Ref tree, Side side, Point p) {
 template <class Trees>
 void collect(const Trees& trees, Ref tree, Side side, Point lowest, Point highest, std::vector<Point>& points) {
   if (tree == NONE) return;
+  if (lowest == highest) return points.push_back(lowest);
   if (!is_leaf(tree)) {
     const Edge& edge = trees.bridge(tree, side);
     if (edge.a >= lowest) collect(trees, trees.child(tree, 0), side, lowest, std::min(edge.a, highest), points);
