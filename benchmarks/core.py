@@ -12,6 +12,7 @@ libcgal-dev).
 
 import argparse
 import json
+import math
 import platform
 import shutil
 import statistics
@@ -219,8 +220,11 @@ def locate(n, make, random, rivals) -> Iterator[Row]:
 
 
 def build(n, make, random, rivals) -> Iterator[Row]:
-    """Build from an array, and static hulls of it."""
+    """Build from an array, and static hulls of it, beside what it takes one thread to read it once and to copy it."""
     rows = make(n, random)
+    copy = np.ones_like(rows)  # whose pages are there
+    yield "reading the array once", clocked(rows.max)
+    yield "copying it", clocked(lambda: np.copyto(copy, rows))
     dynhull.set_threads(None)
     for name, work in (("DynamicHull", DynamicHull), ("convex_hull", dynhull.convex_hull)):
         began = time.perf_counter()
@@ -306,9 +310,23 @@ def crossover(n, make, random, rivals) -> Iterator[Row]:
 
 
 def call(n, make, random, rivals) -> Iterator[Row]:
-    """One insert called from Python, into a hull that was built at once, whose leaves are alike, and a grown one."""
+    """One insert called from Python, into a hull that was built at once, whose leaves are alike, and a grown one.
+
+    Beside it the loop with a function of C that does next to nothing, and with the kernel's own, which
+    `DynamicHull.insert` calls.
+    """
     points = make(n, random)
     rows = make(2000, random).tolist()
+    for name, insert in (
+        ("math.copysign", math.copysign),
+        ("the kernel's own", DynamicHull(points)._tree.insert),
+    ):
+
+        def call_it(insert=insert):
+            for x, y in rows:
+                insert(x, y)
+
+        yield name, clocked(call_it, len(rows))
     for name, hull in (("built at once", DynamicHull(points)), ("grown", grown(points))):
 
         def work(hull=hull):
