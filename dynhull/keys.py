@@ -21,6 +21,7 @@ KeyType = Literal["str", "int"]
 MOST_KEY_BYTES = 255
 LARGEST_KEY = 2**64 - 1
 MOST_SHOWN = 60  # characters of a value in a message
+FEW = 256  # lengths that are added faster without numpy
 CONTINUATION_MASK, CONTINUATION = 0xC0, 0x80  # the two highest bits of a UTF-8 byte that starts no character
 
 
@@ -56,7 +57,7 @@ class PackedKeys(Sequence[str]):
         self._lengths = _as_bytes(lengths, f"{name}.lengths")
         self._data = _as_bytes(data, f"{name}.data")
         self._starts: npt.NDArray[np.int64] | None = None
-        total = int(np.frombuffer(self._lengths, np.uint8).sum(dtype=np.int64))
+        total = total_length(self._lengths)
         if total != len(self._data):
             raise ValueError(f"{name}.lengths add up to {total} bytes, but {name}.data has {len(self._data)}")
         self._check(name)
@@ -192,6 +193,11 @@ def as_key(key: Any, key_type: KeyType, name: str = "key") -> str | int:
         TypeError: the key is of another kind.
     """
     return str(_as_bytes_of_key(key, name), "utf-8") if _is_str(key_type) else _as_integer(key, name)
+
+
+def total_length(lengths: bytes) -> int:
+    """The sum of lengths of one byte each."""
+    return sum(lengths) if len(lengths) <= FEW else int(np.frombuffer(lengths, np.uint8).sum(dtype=np.int64))
 
 
 def key_list(keys: Keys) -> list[Any]:

@@ -54,7 +54,7 @@ class DividedHull(LiveHull):
     ) -> None:
         super().__init__(driver, hull, recalls, fences, copies)
         self.division = division
-        self.peeling = NoLayers(self, driver.aside, copies)
+        self._peeling = NoLayers(self, driver.aside, copies)
 
     @property
     def size(self) -> int:

@@ -44,12 +44,14 @@ class Housekeeping:
         BURST times as much, because batches came faster than snapshots, the next one does not wait for more batches.
         """
         failure: Exception | None = None
-        for hull in self._hulls:
-            least = max(least_points, hull.size)
-            if hull.unsaved < least and not (hull.settings.history and hull.between >= BURST * least):
+        for hull in list(self._driver.core.hulls.values()):
+            if hull.unsaved < least_points and not hull.row.settings.history:
                 continue
             try:
-                await self._snapshot(hull)
+                live = self._hulls.of(hull)
+                least = max(least_points, live.size)
+                if live.unsaved >= least or (live.settings.history and live.between >= BURST * least):
+                    await self._snapshot(live)
             except HullNotFoundError:
                 continue
             except Exception as error:  # go on with the other hulls

@@ -63,16 +63,11 @@ class LiveHull:
         recalls: reads earlier revisions.
         fences: the fences that compare it.
         copies: limits the copies of hulls that large reads make.
-
-    Attributes:
-        differences: the differences between its vertices at successive reads.
-        peeling: its convex layers.
     """
 
     def __init__(self, driver: Driver, hull: Hull, recalls: Recalls, fences: Fences, copies: asyncio.Semaphore) -> None:
-        self.differences = Differences(driver.aside)
-        self.peeling = Peeling(self, driver.aside, copies)
         self._driver = driver
+        self._copies = copies
         self._fences = fences
         self._hull = hull
         self._recalls = recalls
@@ -81,7 +76,10 @@ class LiveHull:
         self._last_outlined = 0  # when the first caller began to wait for `_outlined`
         self._outline: tuple[Points, Center | None, Outline] | None = None
         self._measures: tuple[Points, HullMeasures] | None = None
-        self._measuring: asyncio.Lock | None = None  # made for those of ten thousand hulls that are measured
+        # Made for those of ten thousand hulls that need one.
+        self._measuring: asyncio.Lock | None = None
+        self._differences: Differences | None = None
+        self._peeling: Peeling | None = None
 
     @property
     def name(self) -> str:
@@ -152,6 +150,20 @@ class LiveHull:
         """Record a snapshot, which includes batches with this number of points."""
         self._hull.unsaved -= points
         self._hull.between = points
+
+    @property
+    def differences(self) -> Differences:
+        """The differences between its vertices at successive reads."""
+        if self._differences is None:
+            self._differences = Differences(self._driver.aside)
+        return self._differences
+
+    @property
+    def peeling(self) -> Peeling:
+        """Its convex layers."""
+        if self._peeling is None:
+            self._peeling = Peeling(self, self._driver.aside, self._copies)
+        return self._peeling
 
     @property
     def keyed(self) -> bool:

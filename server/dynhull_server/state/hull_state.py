@@ -101,7 +101,7 @@ class HullState:
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
         self._changed_at = last
-        self._layers: dict[int, tuple[int, Points]] = {}  # those that fences ask for
+        self._layers: dict[int, tuple[int, Points]] | None = None  # those that fences ask for
         self._vertex_keys: VertexKeys | None = None
         self._keys_as_of = -1
         self._sent = SentVertices(self._limits.resume_bytes, self._vertices, last)
@@ -354,6 +354,8 @@ class HullState:
         """The vertices of a convex layer, from 1; none if the points run out. The same array until they change."""
         if number == 1:
             return self.vertices()
+        if self._layers is None:
+            self._layers = {}
         revision, vertices = self._layers.get(number, (-1, NO_POINTS))
         if revision != self.counts.revision:
             found = layer_of(self.hull, number)

@@ -40,3 +40,14 @@ class AccuracyTable:
     def of(self, keys: Iterable[Key]) -> Accuracies:
         """The error of each key, 0 for a key without one."""
         return np.array([self._of.get(key, 0.0) for key in keys], np.float64)
+
+
+# That of all hulls whose keys never had any: to read and to drop change nothing in it.
+NO_ACCURACIES = AccuracyTable()
+
+
+def given_accuracies(table: AccuracyTable, keys: Iterable[Key], accuracies: Iterable[float]) -> AccuracyTable:
+    """The table once each key has been given its own: the same object, or one in place of NO_ACCURACIES."""
+    own = AccuracyTable() if table is NO_ACCURACIES else table
+    own.set(keys, accuracies)
+    return own

@@ -101,3 +101,14 @@ class Deadlines:
             self._groups = {deadline: group for deadline, group in self._groups.items() if group.keys}
             self._order = sorted(self._groups)
             self._rows = sum(len(group.keys) for group in self._groups.values())
+
+
+# Those of all hulls whose keys never had any: to read, to drop and to pop change nothing in them.
+NO_DEADLINES = Deadlines()
+
+
+def given_deadlines(deadlines: Deadlines, keys: Iterable[Key], times: Iterable[int]) -> Deadlines:
+    """The deadlines once each key has been given its own: the same object, or one in place of NO_DEADLINES."""
+    own = Deadlines() if deadlines is NO_DEADLINES else deadlines
+    own.set(keys, times)
+    return own

@@ -29,8 +29,8 @@ from ..records import (
     Record,
     Times,
 )
-from .accuracies import AccuracyTable
-from .deadlines import Deadlines, Key
+from .accuracies import NO_ACCURACIES, given_accuracies
+from .deadlines import NO_DEADLINES, Key, given_deadlines
 from .gate import NOTHING_HELD, AdmittedPuts, Gate
 from .key_rows import (
     key_at,
@@ -113,8 +113,7 @@ class Keyed:
             self.hull = GeoKeyedHull(self._kind, ordered=settings.by_event_time, center=globe.center)
         self.follows_server = settings.window is None or settings.window.clock == "server"
         self.mirror: Mirror | None = None
-        self._deadlines = Deadlines()
-        self._accuracies = AccuracyTable()
+        self._deadlines, self._accuracies = NO_DEADLINES, NO_ACCURACIES
         self.ended: list[Key] = []
         self._earliest: int | None = None  # no point has an earlier time
         self.timed = settings.window is not None or settings.by_event_time
@@ -341,9 +340,9 @@ class Keyed:
         if stored.times is not None:
             self._note_times(stored.times)
         if stored.deadlines is not None:
-            self._deadlines.set(key_list(keys), stored.deadlines.tolist())
+            self._deadlines = given_deadlines(self._deadlines, key_list(keys), stored.deadlines.tolist())
         if stored.accuracies is not None:
-            self._accuracies.set(key_list(keys), stored.accuracies.tolist())
+            self._accuracies = given_accuracies(self._accuracies, key_list(keys), stored.accuracies.tolist())
 
     def build(self) -> None:
         """Build the hull of what was stored, and of the changes after it that have been replayed. O(n log n)."""
@@ -418,7 +417,7 @@ class Keyed:
         if rows.deadlines is None:
             self._deadlines.drop(keys)
         else:
-            self._deadlines.set(keys, rows.deadlines[written].tolist())
+            self._deadlines = given_deadlines(self._deadlines, keys, rows.deadlines[written].tolist())
         self._deadlines.drop(key_list(rows.removes))
         if len(self._deadlines) > 2 * len(self.hull) + MOST_SPARE:
             keys = self._deadlines.keys()
@@ -430,7 +429,7 @@ class Keyed:
         if rows.accuracies is None:
             self._accuracies.drop(keys)
         else:
-            self._accuracies.set(keys, rows.accuracies[written].tolist())
+            self._accuracies = given_accuracies(self._accuracies, keys, rows.accuracies[written].tolist())
         self._accuracies.drop(key_list(rows.removes))
         if len(self._accuracies) > 2 * len(self.hull) + MOST_SPARE:
             keys = self._accuracies.keys()

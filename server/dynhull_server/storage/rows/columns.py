@@ -3,11 +3,12 @@
 import numpy as np
 
 from dynhull.arrays import Points
-from dynhull.keys import PackedKeys
+from dynhull.keys import PackedKeys, total_length
 
 from ...state.records import Accuracies, Keys, Times
 
 DOUBLE, SIGNED, UNSIGNED = np.dtype("<f8"), np.dtype("<i8"), np.dtype("<u8")
+NO_STRINGS = PackedKeys(b"", b"")
 POINT_BYTES, TIME_BYTES, INTEGER_BYTES, ACCURACY_BYTES = 16, 8, 8, 8
 
 
@@ -80,9 +81,10 @@ class Cursor:
 
     def strings(self, rows: int) -> PackedKeys:
         """String keys; ValueError also if they are not UTF-8."""
-        lengths = self.take(rows)
-        size = int(np.frombuffer(lengths, np.uint8).sum(dtype=np.int64))
-        return PackedKeys(bytes(lengths), bytes(self.take(size)))
+        if not rows:
+            return NO_STRINGS
+        lengths = bytes(self.take(rows))
+        return PackedKeys(lengths, bytes(self.take(total_length(lengths))))
 
     def integers(self, rows: int) -> Keys:
         """(rows,) integer keys."""

@@ -16,7 +16,7 @@ from .batch_rows import commit_columns, is_whole
 from .encoding import checksum, weight
 from .fence_examine import FenceExamination, FoundFences
 from .group import AnyStep, Cut, DropSnapshot, MendSegment
-from .hull_rows import found_hulls, values
+from .hull_rows import found_hulls, row_checksum, settings_text
 from .ledger import HullRows, Ledger, StoredSnapshot
 from .segment_examine import SegmentExamination
 from .tables import COLUMNS, FENCES_SINCE, SEGMENTS_SINCE, Reader
@@ -152,12 +152,16 @@ class _Examination:
         return totals
 
     def _hull_rows(self) -> None:
+        texts: dict[int, str] = {}  # by the identity of settings: rows share them, and the ledger keeps the rows
         for hull in found_hulls(self._reader, self._version):
             row = hull.row
             if not hull.whole:
                 self._findings.damaged.add(row.number)
                 self._findings.fatal.append(f"the row of hull {row.number}, {row.name!r}, is damaged")
-            *_, renewed = values(row)
+            text = texts.get(id(row.settings))
+            if text is None:
+                text = texts[id(row.settings)] = settings_text(row.settings)
+            renewed = row_checksum(row, text)
             if hull.whole:
                 self._renewed += renewed - hull.checksum
             rows = self._ledger.hulls[row.number] = HullRows(row, renewed)

@@ -38,8 +38,12 @@ class FoundHull:
 def values(row: HullRow) -> Values:
     """The values of the columns, with their checksum."""
     settings = settings_text(row.settings)
-    stored = _checksum(row.number, row.name, row.uid, row.created, settings)
-    return row.number, row.name, row.uid, row.created, settings, stored
+    return row.number, row.name, row.uid, row.created, settings, row_checksum(row, settings)
+
+
+def row_checksum(row: HullRow, settings: str) -> int:
+    """The checksum of a row in the present format, whose settings have this text."""
+    return _checksum(row.number, row.name, row.uid, row.created, settings)
 
 
 def settings_text(settings: HullSettings) -> str:
