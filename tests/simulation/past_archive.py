@@ -160,8 +160,8 @@ class FaultyStore(objects.ObjectArchive):
         self._sends = True
         return super().write(file, content)
 
-    def _ask(self, what: str, function: Callable[[], Any], size: int = 0) -> Any:
-        del size
+    def _ask(self, what: str, function: Callable[[], Any], seconds: float, size: int = 0) -> Any:
+        del seconds, size
         sends, self._sends = self._sends, False
         kind = self._at("send" if sends else "call")
         self._kept.called()
