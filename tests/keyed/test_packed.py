@@ -83,6 +83,8 @@ def test_every_call_is_tried():
     native -= {name for name in native if name.startswith("_")}
     elsewhere = {
         "pack": None,
+        "begin_load": None,  # nobody has the hull before it is loaded
+        "end_load": None,
         "load": "update",
         "apply_all": "update",
         "apply_each": "update",
