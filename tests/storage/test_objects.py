@@ -201,6 +201,9 @@ def test_what_an_owner_sends_later_is_removed_after_a_day(fleet):
     [
         ("s3://AKIA1:hush@bucket/prefix", "credentials"),
         ("s3://AKIA1:hu/sh@bucket/prefix", "credentials"),
+        ("s3://AKIA1%3Ahush%40bucket/prefix", "credentials"),
+        ("s3://AKIA1%253Ahush%2540bucket/prefix", "credentials"),
+        ("s3://bucket/AKIA1:hush%40prefix", "credentials"),
         ("s3://bucket/prefix?access_key=AKIA1&secret_key=hush", "more than"),
         ("s3://bucket?endpoint_override=http://AKIA1:hush@localhost", "credentials"),
         ("gs://hush/AKIA1", "neither"),

@@ -1,7 +1,7 @@
 """Where the past may be: in a folder, or in an object store with an address that has no secrets."""
 
 from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, unquote, urlsplit
 
 SCHEME = "s3"
 OPTIONS = ("region", "scheme", "endpoint_override")
@@ -18,7 +18,8 @@ def require_store(place: str) -> None:
     parts = urlsplit(place)
     if parts.scheme != SCHEME or not parts.netloc:
         raise ValueError(f"is neither a folder nor {FORM}")
-    if "@" in place or ":" in parts.netloc:  # a secret may have any character
+    plain = unquote(parts.netloc)
+    if "@" in unquote(place) or ":" in plain or "%" in plain:  # a secret may have any character, also as its number
         raise ValueError(
             "has credentials: leave them out. They come from AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, "
             "from ~/.aws, or from the machine"
