@@ -147,6 +147,8 @@ class PastHulls:
                 oldest = await self.ask(live.name, partial(past.oldest_moment, number, timed=True))
                 at = None if oldest.committed is None else oldest.committed.time
                 raise MomentForgottenError(time, oldest.revision, at, live.counts.revision, f"{field}time")
+            if found.revision > live.counts.revision:  # it was in doubt: the storage knows it before the hull has it
+                await self._driver.whole()
             return found, erasures
         oldest, erasures = await self.ask(live.name, lambda: (past.oldest_moment(number), past.erasures(number)))
         if not oldest.revision <= revision <= newest:

@@ -276,6 +276,7 @@ class PastFences:
             if when is not None and when[0] is not None:
                 reason = "is a prefix, whose hulls have revisions of their own: give a time"
                 raise HullUnsuitableError(config.subjects, reason, field=f"{field}_revision")
+        await self._driver.whole()  # the creation of a hull may be in doubt
         compared = self._compared(config)
         area = None if config.area_hull is None else self._driver.core.get(config.area_hull)
         hulls = list(dict.fromkeys([*compared, *([] if area is None else [area])]))
@@ -340,7 +341,7 @@ class PastFences:
         if end is not None and end[0] is None:
             return [await self._last(hull, end) for hull in hulls], end[1]
         now = self._driver.commit_time()
-        await self._driver.settled()
+        await self._driver.whole()
         newest = [hull.counts.revision for hull in hulls]
         if end is None:
             return newest, now

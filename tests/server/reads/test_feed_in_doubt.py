@@ -1,74 +1,33 @@
 """The feed of a prefix around a commit whose outcome is not known at first: it passes nothing, and waits for nobody."""
 
 import asyncio
-import threading
 from contextlib import aclosing, asynccontextmanager
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from live_engine import LIMITS, NONE
+from doubtful import PATIENCE, doubtful_engine
+from live_engine import NONE
 from patience import until
 
-from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.positions import decode_standings
 from dynhull_server.engine.roster import Roster, RosterLimits
 from dynhull_server.engine.rosters import Choice
-from dynhull_server.engine.supervisor import Supervisor
-from dynhull_server.engine.threads import Machine
 from dynhull_server.rpc.many import HullStates
 from dynhull_server.state.batch import Batch, Write
 from dynhull_server.state.errors import NotStoredError, OutcomeUnknownError, StoppingError
-from dynhull_server.state.records import Append
-from dynhull_server.storage.sqlite.storage import SQLiteStorage
 
 MANY = 10**9
-PATIENCE = 60
-
-
-class Doubtful(SQLiteStorage):
-    """Commits with batches of one hull raise, kept or not; and whoever looks at the hull has to wait, or is refused."""
-
-    number, keeps_it = 0, True
-
-    def __init__(self, folder):
-        super().__init__(folder)
-        self.looked, self.may_look, self.broken = threading.Event(), threading.Event(), False
-
-    def commit(self, changes, now=0):
-        doubted = any(isinstance(each, Append) and each.number == self.number for each in changes)
-        if doubted and not self.keeps_it:
-            raise OSError("an input/output error, as planned")
-        commit = super().commit(changes, now)
-        if doubted:
-            raise OSError("an input/output error, as planned")
-        return commit
-
-    def row(self, number):
-        if number == self.number:
-            self.looked.set()
-            assert self.may_look.wait(PATIENCE)
-            if self.broken:
-                raise OSError("the disk is away, as planned")
-        return super().row(number)
 
 
 @asynccontextmanager
 async def served(folder):
     """An engine with the hulls k1 and k2, of which k2 has commits in doubt."""
-    storage, machine = Doubtful(folder), Machine()
-    supervisor = Supervisor(machine.clock, lambda _: None, pytest.fail)
-    engine = Engine(LIMITS, storage, supervisor, machine)
-    await engine.start(lambda *_: None)
-    for name in ("k1", "k2"):
-        await put(engine, name)
-    storage.number = engine.hulls.get("k2").number
-    try:
+    async with doubtful_engine(folder) as (engine, storage):
+        for name in ("k1", "k2"):
+            await put(engine, name)
+        storage.number = engine.hulls.get("k2").number
         yield engine, storage
-    finally:
-        storage.may_look.set()
-        await supervisor.stop()
-        await engine.close()
 
 
 async def put(engine, name):
