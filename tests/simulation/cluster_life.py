@@ -440,7 +440,7 @@ class World:
         schedule.actor("fates", lambda: self._fates and not self.calm, self._fate)
         model.new_life()
         model.faulty = True
-        past = SharedPast(plan["faults"], lambda: 1e6 * self.now) if "faults" in plan else None
+        past = SharedPast(plan["faults"], lambda: self.now) if "faults" in plan else None
         self._add(Site("north", Postgres(), _store(MemoryStorage(), model), model, past=past), plan["clients"])
 
     def _add(self, site: Site, clients: list[list[Operation]]) -> None:
@@ -643,7 +643,7 @@ class World:
             return Proc(self._acting.entry)
 
         stack.enter_context(small_segments(self._plan.get("segment_rows")))
-        stack.enter_context(simulated_reading(lambda: self._acting._threads))
+        stack.enter_context(simulated_reading(lambda: self._acting._threads, lambda: self.now))
         clock = SimpleNamespace(
             CLOCK_BOOTTIME=0,
             clock_gettime=lambda _: self.now,

@@ -139,18 +139,18 @@ class SharedPast:
     Args:
         faults: how calls of the store fail, for each owner; or it stands still before one, until a fate, or the end,
             lets it go on.
-        clock: the time in microseconds.
+        elapsed: the seconds that have passed.
 
     Attributes:
         faults: the same.
         calm: whether nothing fails any more.
     """
 
-    def __init__(self, faults: Sequence[dict[str, Any]], clock: Callable[[], float]) -> None:
+    def __init__(self, faults: Sequence[dict[str, Any]], elapsed: Callable[[], float]) -> None:
         self.faults, self.calm = faults, False
-        self._clock = clock
+        self._elapsed = elapsed
         self._home = TemporaryDirectory()
-        self._store = Store(Path(self._home.name) / "store", clock)
+        self._store = Store(Path(self._home.name) / "store", elapsed)
         self._rows = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
         for sql in filter(None, SCHEMAS[FORMAT].values()):
             self._rows.execute(sql)
@@ -177,7 +177,7 @@ class SharedPast:
 
     def copied(self) -> "SharedPast":
         """The same as of the last commits, in a database and a store of its own."""
-        other = SharedPast(self.faults, self._clock)
+        other = SharedPast(self.faults, self._elapsed)
         self._rows.backup(other._rows)
         if self._store.folder.is_dir():
             shutil.copytree(self._store.folder, other._store.folder)

@@ -78,7 +78,8 @@ class Loop(asyncio.AbstractEventLoop):
         return self._timers
 
     def _pass(self) -> None:
-        self.now = max(self.now, self._timers[0][0])
+        before, self.now = self.now, max(self.now, self._timers[0][0])
+        self._model.elapsed += self.now - before
         while self._timers and self._timers[0][0] <= self.now:
             self._ready.append(heapq.heappop(self._timers)[2])
 

@@ -178,6 +178,7 @@ class Model:
         consumers: those of feeds.
         wall: what the clock on the wall has when a life begins.
         clock: the server's clock, once it has begun.
+        elapsed: the seconds that have passed in all lives, whatever clocks were set to.
         uids_ever: the uids that there were before a restore.
         finding: the first promise that was broken.
     """
@@ -192,6 +193,7 @@ class Model:
         self.uids_ever: set[str] = set()
         self.commits = self.latest = self._now = 0
         self.wall = 1e9
+        self.elapsed = 0.0
         self.faulty = self.stopping = self.days = self.repeats = self.forgets = self.immediate = False
         self.finding: str | None = None
         self._hulls: dict[int, Truth] = {}

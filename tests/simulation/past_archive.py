@@ -35,11 +35,11 @@ DAMAGE = ("flip", "half", "gone", "other")
 # How a call of a store ends late: it is carried out when nobody waits for it any more, or never, or after a while.
 LATE = ("late", "hung", "slow")
 
-# Microseconds after which a call that was late is carried out, and turns of others while one is slow.
-LATER, SLOW = 1_500_000, 20
-# Seconds, which are calls here, after which files in a store that belong to nobody are removed; microseconds from one
-# look for them to the next; and those after which nothing is carried out that was given up.
-OLD, LOOK, LATEST = 5.0, 2_000_000, 3_000_000
+# Seconds after which a call that was late is carried out, and turns of others while one is slow.
+LATER, SLOW = 1.5, 20
+# Seconds, which are calls here, after which files in a store that belong to nobody are removed; seconds from one look
+# for them to the next; and those after which nothing is carried out that was given up.
+OLD, LOOK, LATEST = 5.0, 2.0, 3.0
 
 At = Callable[[str], str | None]
 
@@ -116,14 +116,14 @@ class Store:
 
     Attributes:
         folder: has the objects as files.
-        clock: the time in microseconds.
+        elapsed: the seconds that have passed. Nobody sets the clock of a store together with that of a server.
         times: the number of calls that had come when each of them was written; a second is a call here.
         late: calls that are carried out later: when, and what they do.
         calls: how many there were.
     """
 
     folder: Path
-    clock: Callable[[], float]
+    elapsed: Callable[[], float]
     times: dict[str, int] = field(default_factory=dict)
     late: list[tuple[float, Callable[[], Any]]] = field(default_factory=list)
     calls: int = 0
@@ -131,7 +131,7 @@ class Store:
     def called(self) -> None:
         """One more call comes; what was late may be carried out now."""
         self.calls += 1
-        now = self.clock()
+        now = self.elapsed()
         due = [call for when, call in self.late if when <= now]
         self.late = [each for each in self.late if each[0] > now]
         for call in due:
@@ -166,7 +166,7 @@ class FaultyStore(objects.ObjectArchive):
         kind = self._at("send" if sends else "call")
         self._kept.called()
         if kind == "late":
-            self._kept.late.append((self._kept.clock() + LATER, lambda: _forgotten(function)))
+            self._kept.late.append((self._kept.elapsed() + LATER, lambda: _forgotten(function)))
         for _ in range(SLOW if kind in LATE else 0):
             self._give_way()
         if kind in ("late", "hung"):
@@ -263,8 +263,8 @@ def names_in(folder: Path) -> set[str]:
 
 
 @contextmanager
-def simulated_reading(threads: Callable[[], SimulatedThreads]) -> Iterator[None]:
-    """Have segments read ahead by simulated threads, named by numbers, and stores cleared within seconds."""
+def simulated_reading(threads: Callable[[], SimulatedThreads], elapsed: Callable[[], float]) -> Iterator[None]:
+    """Have segments read ahead by simulated threads, named by numbers, and stores cleared within simulated seconds."""
     thread, future = reading_ahead(threads)
     numbers = count()
     with (
@@ -272,6 +272,7 @@ def simulated_reading(threads: Callable[[], SimulatedThreads]) -> Iterator[None]
         patch.object(filed, "Thread", thread),
         patch.object(filed, "Future", future),
         patch.object(objects, "ORPHAN_SECONDS", OLD),
+        patch.object(rows_storage, "monotonic", elapsed),
         patch.object(rows_storage, "LOOK", LOOK),
         patch.object(rows_storage, "LATE", LATEST),
     ):

@@ -75,9 +75,9 @@ class SQLiteLives(FaultyStorage):
         self._home = tempfile.TemporaryDirectory(dir=SHARED_MEMORY if SHARED_MEMORY.is_dir() else None)
         self._enter(1)
         self._disk = _FaultyDisk(self._fault_of_disk, self._landed, self.kill)
-        self._store = Store(Path(self._home.name) / "store", lambda: model.clock()) if in_store else None
+        self._store = Store(Path(self._home.name) / "store", lambda: model.elapsed) if in_store else None
         self._patches = ExitStack()
-        self._patches.enter_context(simulated_reading(self._threads_of_life))
+        self._patches.enter_context(simulated_reading(self._threads_of_life, lambda: model.elapsed))
         if one_reader:
             self._patches.enter_context(patch.object(readers, "KEPT_OPEN", 1))
         self._pending: tuple[Sequence[Any], int] = (), 0

@@ -14,7 +14,7 @@ from proxy import Proxy
 from dynhull.keys import PackedKeys
 from dynhull_server.state.records import Delete
 from dynhull_server.storage.port import DamagedError, StorageError
-from dynhull_server.storage.rows.storage import LOOK
+from dynhull_server.storage.rows import storage
 from dynhull_server.storage.segments import objects as store_calls
 from dynhull_server.storage.segments.objects import ORPHAN_SECONDS, ObjectArchive
 from dynhull_server.storage.segments.owner import Claimant, OccupiedError
@@ -175,7 +175,9 @@ def test_an_object_that_was_cut_exchanged_or_lost_is_refused_by_its_name(fleet):
             read_back(fleet.make_reader(), 3)
 
 
-def test_what_an_owner_sends_later_is_removed_after_a_day(fleet):
+def test_what_an_owner_sends_later_is_removed_after_a_day(fleet, monkeypatch):
+    elapsed = 0.0
+    monkeypatch.setattr(storage, "monotonic", lambda: elapsed)
     fleet.fill(2)
     uid = "0123"
     late = [fleet.archive.name(uid, 1, 8, epoch) for epoch in (1, 1, 7)]
@@ -189,7 +191,10 @@ def test_what_an_owner_sends_later_is_removed_after_a_day(fleet):
             os.utime(each, (old, old))
     before = len(objects(fleet))
     fleet.storage.epoch = 7
-    fleet.time += LOOK
+    fleet.time -= 365 * 86_400 * 10**6  # the clock is set back
+    fleet.file()
+    assert len(objects(fleet)) == before
+    elapsed += storage.LOOK
     fleet.file()
     assert len(objects(fleet)) == before - 1
     assert not (fleet.objects / f"{late[0]}.batches.parquet{OBJECT}").exists()

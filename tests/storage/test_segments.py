@@ -595,7 +595,9 @@ class LateArchive(Archive):
 
 
 @pytest.mark.parametrize("again", [False, True], ids=["the server goes on", "the server starts again"])
-def test_what_a_store_takes_late_of_a_deleted_hull_is_removed(tmp_path, again):
+def test_what_a_store_takes_late_of_a_deleted_hull_is_removed(tmp_path, monkeypatch, again):
+    elapsed = 0.0
+    monkeypatch.setattr(storage, "monotonic", lambda: elapsed)
     fleet = Fleet(tmp_path, archive=LateArchive(tmp_path / "history")).fill(2)
     fleet.put(4)
     fleet.snapshot()
@@ -610,10 +612,12 @@ def test_what_a_store_takes_late_of_a_deleted_hull_is_removed(tmp_path, again):
     fleet.storage.commit([Delete(1)], fleet.time)
     fleet.file()
     assert fleet.files == []
+    fleet.time += 365 * 86_400 * 10**6  # the clock is set, while the store is as late as before
+    fleet.file()
     fleet.archive.arrive()
     fleet.file()
     assert fleet.files
-    fleet.time += storage.LATE
+    elapsed += storage.LATE
     fleet.file()
     assert fleet.files == []
     assert not fleet.storage._ledger.dead["segments"]

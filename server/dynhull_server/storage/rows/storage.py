@@ -6,7 +6,9 @@ from array import array
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
+from math import inf
 from threading import Lock
+from time import monotonic
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -68,8 +70,9 @@ log = logging.getLogger(__name__)
 
 DROPPED_BYTES, DROPPED_ROWS = 2**19, 1000  # per step
 SEGMENT = ", ".join(f"segments.{column}" for column in COLUMNS["segments"])
-LOOK = 3_600_000_000  # microseconds between looks for files that belong to nobody
-LATE = 86_400_000_000  # microseconds after which a store carries out nothing of what a server has given up
+# Seconds between looks for files that belong to nobody, and those after which a store carries out nothing of what a
+# server has given up: by a clock that is never set, as the one on the wall may be while a call is late.
+LOOK, LATE = 3600.0, 86_400.0
 
 Picked = TypeVar("Picked")
 Found = TypeVar("Found")
@@ -100,8 +103,8 @@ class RowStorage(ABC):
         self._unsettled = False
         self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
         self._filing: set[int] = set()  # rows of segments that are being written
-        self._late: dict[int, int] = {}  # of rows whose files may come yet: when they are removed once more, or 0
-        self._looked = 0  # when it was looked for files that belong to nobody
+        self._late: dict[int, float] = {}  # of rows whose files may come yet: when they are removed once more, or 0
+        self._looked = -inf  # when it was looked for files that belong to nobody
 
     @property
     @abstractmethod
@@ -435,7 +438,7 @@ class RowStorage(ABC):
         numbers = self._with_past()
         if numbers:
             load()  # before there are batches to wait for it
-        yield from self._remove_files(archive, now)
+        yield from self._remove_files(archive)
         damage: DamagedError | None = None
         for number in numbers:
             try:
@@ -455,9 +458,9 @@ class RowStorage(ABC):
                     extra={"hull": number, "first": segment.first, "last": segment.last, "bytes": segment.size},
                 )
                 yield RetireSegment(number, segment)
-        yield from self._remove_files(archive, now)
-        if now - self._looked >= LOOK:
-            self._looked = now
+        yield from self._remove_files(archive)
+        if monotonic() - self._looked >= LOOK:
+            self._looked = monotonic()
             self._remove_orphans(archive)
         if damage is not None:
             raise damage
@@ -501,7 +504,7 @@ class RowStorage(ABC):
             found = self._settled().hulls.get(number)
         if found is not None:
             yield from self._erase(Erasing(found.copy(), keys, until, archive), now)
-        yield from self._remove_files(archive, now)
+        yield from self._remove_files(archive)
 
     def _erase(self, erasing: Erasing, now: int) -> Iterator[StorageStep]:
         """Write what takes the place of segments with the keys, then replace them all at once."""
@@ -543,12 +546,13 @@ class RowStorage(ABC):
         self._ledger.dead["segments"].extend(places)
         self._late.update(dict.fromkeys(places, 0))
 
-    def _remove_files(self, archive: Archive, now: int) -> Iterator[StorageStep]:
+    def _remove_files(self, archive: Archive) -> Iterator[StorageStep]:
         """Remove the files that no segment has, and then the rows that name them.
 
         Of what a server gave up, or was writing when it ended, the row stays, so that what a store takes late is
         removed, too, whatever has become of the hull.
         """
+        now = monotonic()
         while ids := [
             each
             for each in self._ledger.dead["segments"]
@@ -569,7 +573,7 @@ class RowStorage(ABC):
                     if self._filed is not None:
                         self._filed.forget(file)
             if rows and archive.takes_late and self._late.get(ids[0]) == 0:
-                self._late[ids[0]] = now + LATE
+                self._late[ids[0]] = monotonic() + LATE
                 continue
             yield DropDeadSegment(ids[0])
             self._late.pop(ids[0], None)
