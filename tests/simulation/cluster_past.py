@@ -239,7 +239,7 @@ class Filer:
                 kept = self._read(hull)
                 self._carry_out(self._storage.snapshot(hull.row.number, kept))
                 self._kept[hull.row.number] = kept.revision
-        self._carry_out(self._storage.file_history(core.time()))
+        self._carry_out(self._storage.file_history(core.commit_time()))
 
     def _read(self, hull: "Hull") -> Kept:
         core = self._process.core

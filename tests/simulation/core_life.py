@@ -324,6 +324,9 @@ class CoreServer:
     def time(self) -> int:
         return self._time.now()
 
+    def commit_time(self) -> int:
+        return self._commit_time.now()
+
     async def create(self, name: str, settings: HullSettings) -> str:
         uid: str = (await self._ask(CreateHull(Answer(), name, self.birth(), settings, self.time()))).uid
         return uid

@@ -59,7 +59,8 @@ class Filing:
     async def round(self) -> None:
         """Make segments of what the journal need not have any longer, and remove those that are not to be kept."""
         async with self._turn:
-            steps = self._storage.file_history(self._driver.time())
+            # By the time that commits have: what is kept has it, and it may be ahead of the server's after a restart.
+            steps = self._storage.file_history(self._driver.commit_time())
             await self._driver.commit_steps(steps, self._driver.in_history, PAUSE)
         for hull in list(self.unsure):
             with suppress(KeyError):
@@ -112,7 +113,7 @@ class Filing:
                     await self._driver.commit_steps(steps, self._driver.on_disk)
                 hull.saved(unsaved)
                 before = await self._erasures(hull)
-                steps = self._storage.erase(hull.number, keys, found.revision, self._driver.time())
+                steps = self._storage.erase(hull.number, keys, found.revision, self._driver.commit_time())
                 await self._driver.commit_steps(steps, self._driver.in_history)
                 after = await self._erasures(hull)
         except KeyError:

@@ -12,6 +12,7 @@ from command_line import dynhull
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
 from server_process import run, server_process, shape_options
+from wall_clock import at
 
 from dynhull_client import (
     DynhullError,
@@ -48,6 +49,22 @@ def write_until_filed(client, name, batches):
 
     wait_until(filed)
     return revision
+
+
+def test_the_past_is_dropped_by_the_time_of_its_commits_after_the_clock_was_set_back(tmp_path):
+    with (
+        server_process("--data", str(tmp_path), *SNAPSHOTS, wrap=at("+1h")) as server,
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("fleet", keyed="str", history=1)
+        ahead = write_until_filed(client, "fleet", 1)
+    with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
+
+        def dropped():
+            write_until_filed(client, "fleet", 0)
+            return client.history("fleet").first_revision > ahead
+
+        wait_until(dropped)
 
 
 def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_path):
