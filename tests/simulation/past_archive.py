@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from io import BytesIO
+from io import BytesIO, IOBase
 from itertools import count
 from pathlib import Path
 from time import time
@@ -19,7 +19,7 @@ from dynhull_server.storage.durable import TEMPORARY
 from dynhull_server.storage.rows import filed
 from dynhull_server.storage.rows import storage as rows_storage
 from dynhull_server.storage.segments import archive, objects
-from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive, Parts, Written
+from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive, Written
 
 from .machine import SimulatedThreads, reading_ahead
 
@@ -75,7 +75,7 @@ class FaultyArchive(Archive):
             return super().content(file, size)
 
     @contextmanager
-    def parts(self, file: str, wrote: Written) -> Iterator[Parts]:
+    def parts(self, file: str, wrote: Written) -> Iterator[IOBase]:
         """Read a file in parts."""
         with self._damage(file, self._at("fetch")), super().parts(file, wrote) as parts:
             yield parts

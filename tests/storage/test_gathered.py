@@ -2,6 +2,7 @@
 
 import dataclasses
 import struct
+from io import BytesIO
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,7 +28,6 @@ from dynhull_server.storage.rows.encoding import STRINGS, encode
 from dynhull_server.storage.rows.past_rows import gathered_after
 from dynhull_server.storage.segments import by_key, parquet
 from dynhull_server.storage.segments import gathered as gathering
-from dynhull_server.storage.segments.archive import Parts
 from dynhull_server.storage.segments.columns import Batches, columns_of, joined
 from dynhull_server.storage.segments.gathered import gathered, key_codes
 from dynhull_server.storage.segments.parquet import from_parquet, keys_from_parquet, rows_from_parquet, to_parquet
@@ -245,7 +245,7 @@ def test_rows_of_keys_that_are_wanted_say_the_same_of_these(kind, steps, wanted)
     found = columns_of_rows(rows, hull.identity, keys)
     same(changes_of_keys(found, keys), expected)
     assert np.unique(found.revision).tolist() == [each.revision for each in records]
-    file = Parts(memoryview(to_parquet(columns_of(records, hull.identity), {})))
+    file = BytesIO(to_parquet(columns_of(records, hull.identity), {}))
     same(changes_of_keys(keys_from_parquet(file, "a file", keys)[0], keys), expected)
 
 

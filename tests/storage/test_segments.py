@@ -35,7 +35,7 @@ from dynhull_server.state.records import (
     Record,
 )
 from dynhull_server.storage.durability import Durability
-from dynhull_server.storage.port import NEWEST, DamagedError, TakenOverError
+from dynhull_server.storage.port import NEWEST, DamagedError, StorageError, TakenOverError
 from dynhull_server.storage.rows import filed, filing, past_rows, storage
 from dynhull_server.storage.rows.filed import Filed
 from dynhull_server.storage.segments import archive, parquet
@@ -398,6 +398,22 @@ def test_what_is_read_of_a_few_keys_is_as_it_was_written_or_refused(tmp_path, bl
         path.write_bytes(content)
     assert read() == whole
     fleet.storage.close()
+
+
+def test_a_disk_that_fails_while_a_part_is_read_is_not_told_as_damage(fleet, monkeypatch):
+    fleet.fill()
+    storage, keys = fleet.make_reader(), PackedKeys.pack(KEYS[:1])
+    file = storage._ledger.hulls[1].segments[0].file
+
+    def fail(*_):
+        raise OSError(errno.EIO, "it failed")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(archive.os, "pread", fail)
+        with pytest.raises(StorageError, match=f"{file}.*cannot be read: .*it failed") as caught:
+            storage.key_changes(1, keys, 0, NEWEST)
+    assert type(caught.value) is StorageError
+    assert storage.key_changes(1, keys, 0, NEWEST)[0] > 0
 
 
 def test_what_is_before_a_hole_is_read_of_a_key_and_then_the_hole_is_named(fleet):

@@ -12,8 +12,6 @@ from pathlib import Path
 from secrets import token_hex
 from typing import NamedTuple
 
-import numpy as np
-
 from ..durable import TEMPORARY, make_durable, write_durably
 from ..port import DamagedError, StorageError
 from .owner import CLAIMS, MARK_BYTES, Claimant, Marks, OccupiedError
@@ -35,30 +33,46 @@ class Written(NamedTuple):
     blocks: str
 
 
-class Parts:
-    """The bytes of a file, of which parts are loaded and checked, whole blocks of it at a time; elsewhere are zeros.
+class Parts(io.RawIOBase):
+    """A file that is read in parts. What is read is checked before, whole blocks of it at a time.
 
     Args:
-        content: the bytes; of a file, room for them.
-        load: loads the block with a number, and checks it; None where all are there.
-
-    Attributes:
-        content: the same.
+        size: the bytes of the file.
+        load: returns the block with a number, after it is checked.
     """
 
-    def __init__(self, content: memoryview, load: Callable[[int], None] | None = None) -> None:
-        self.content = content
+    def __init__(self, size: int, load: Callable[[int], bytes]) -> None:
+        self._size = size
         self._load = load
-        self._loaded: set[int] = set()
+        self._blocks: dict[int, bytes] = {}
+        self._place = 0
 
-    def load(self, start: int, end: int) -> None:
-        """Have the bytes from one place up to another one. Raises the errors of `Archive.parts`."""
-        if self._load is None or start >= end:
-            return
-        for number in range(start // BLOCK, (end - 1) // BLOCK + 1):
-            if number not in self._loaded:
-                self._load(number)
-                self._loaded.add(number)
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def tell(self) -> int:
+        """The place in the file."""
+        return self._place
+
+    def seek(self, place: int, whence: int = io.SEEK_SET) -> int:
+        """Go to a place."""
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self._size}[whence]
+        self._place = min(max(base + place, 0), self._size)
+        return self._place
+
+    def read(self, size: int = -1) -> bytes:
+        """The bytes from the place on. Raises the errors of `Archive.parts`."""
+        start = self._place
+        self._place = end = self._size if size < 0 else min(start + size, self._size)
+        first = start // BLOCK
+        some = b"".join(map(self._block, range(first, -(-end // BLOCK))))
+        return some[start - first * BLOCK : end - first * BLOCK]
+
+    def _block(self, number: int) -> bytes:
+        if number not in self._blocks:
+            self._blocks[number] = self._load(number)
+        return self._blocks[number]
 
 
 def is_installed() -> bool:
@@ -194,40 +208,39 @@ class Archive:
         return content
 
     @contextmanager
-    def parts(self, file: str, wrote: Written) -> Iterator[Parts]:
-        """A file that is read in parts. What is loaded of it is checked; and all, where its blocks have no hashes.
+    def parts(self, file: str, wrote: Written) -> Iterator[io.IOBase]:
+        """A file that is read in parts. What is read of it is checked; and all, where its blocks have no hashes.
 
         Raises:
-            DamagedError: the bytes are not those that were written.
+            DamagedError: the bytes are not those that were written; also when they are read.
             StorageError: the file cannot be read at present.
         """
         if not self.has_parts or not wrote.blocks:
-            yield Parts(memoryview(self.read(file, wrote)))
+            yield io.BytesIO(self.read(file, wrote))
             return
         path, digests = self.path / file, b64decode(wrote.blocks)
         with self._reading(file), _opened(path) as opened:
             if os.fstat(opened.fileno()).st_size != wrote.bytes:
                 raise _changed(path)
-            content = np.zeros(wrote.bytes, np.uint8).data  # memory is taken where something is loaded
 
-            def load(number: int) -> None:
-                block = content[number * BLOCK : (number + 1) * BLOCK]
-                os.preadv(opened.fileno(), [block], number * BLOCK)
+            def load(number: int) -> bytes:
+                with self._reading(file):
+                    block = os.pread(opened.fileno(), BLOCK, number * BLOCK)
                 if _digests_of(block) != digests[number * BLOCK_DIGEST_BYTES : (number + 1) * BLOCK_DIGEST_BYTES]:
                     raise _changed(path)
+                return block
 
-            yield Parts(content, load)
+            yield Parts(wrote.bytes, load)
 
     @contextmanager
     def _reading(self, file: str) -> Iterator[None]:
-        path = self.path / file
         try:
             yield
         except FileNotFoundError:
-            raise DamagedError(f"{path} is missing: restore a backup") from None
+            raise DamagedError(f"{self.path / file} is missing: restore a backup") from None
         except OSError as error:
             why = WAITED.format(error.strerror) if error.errno == errno.ETIMEDOUT else "cannot be read at present"
-            raise StorageError(f"{path} cannot be read: {error}", for_callers=why) from error
+            raise StorageError(f"{self.path / file} cannot be read: {error}", for_callers=why) from error
 
     def _for_reader(self, file: str, size: int) -> bytes:
         """The same as `content`, for who waits for it."""
@@ -316,7 +329,7 @@ def digest_of(content: bytes) -> str:
     return blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
 
 
-def _digests_of(content: bytes | memoryview) -> bytes:
+def _digests_of(content: bytes) -> bytes:
     """The hashes of the blocks of a file, or of some of them."""
     blocks = (content[start : start + BLOCK] for start in range(0, len(content), BLOCK))
     return b"".join(blake2b(block, digest_size=BLOCK_DIGEST_BYTES).digest() for block in blocks)

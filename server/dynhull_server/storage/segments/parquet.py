@@ -25,6 +25,7 @@ from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns
 from .gathered import key_codes
 
 if TYPE_CHECKING:
+    import io
     from collections.abc import Callable, Iterator, Sequence
 
     import numpy.typing as npt
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     import pyarrow.parquet as pq
 
     from dynhull.keys import Keys
-
-    from .archive import Parts
 
     Rows = npt.NDArray[np.intp]
 
@@ -77,7 +76,6 @@ CODED = ("key", "cause", "kind", "op", "detail")  # what is read as places in a 
 # Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
 SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
 MOVES = ("put", "remove")
-FOOTER = 2**13  # bytes at the end of a file that are read at first
 TOGETHER = 4  # groups that are read at once where one after the other is needed
 SHARED = 4  # rows of a commit, on average, from which on its time is an index into those of all
 
@@ -204,48 +202,27 @@ def rows_from_parquet(data: bytes, name: str) -> tuple[RowsByKey, dict[str, str]
         raise DamagedError(f"{name} is damaged: {error}") from error
 
 
-def keys_from_parquet(parts: Parts, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
+def keys_from_parquet(source: io.IOBase, name: str, keys: Keys) -> tuple[SegmentColumns, dict[str, str], bytes]:
     """The same with the rows of some keys, and of none, alone: no more is read than the groups that have these.
 
     Raises:
         DamagedError: it is no file of ours, or of a newer version.
+        StorageError: those of the source.
     """
     import pyarrow as pa
 
     try:
-        _load_footer(parts)
-        file = _opened(pa.BufferReader(parts.content), name)
-        schema, metadata = file.schema_arrow, file.metadata
+        file = _opened(source, name)
+        schema = file.schema_arrow
         values = sorted(key_list(keys))
-        groups = _groups(metadata, schema.names.index("key"), values)
-        some = [metadata.row_group(group) for group in groups]
-        same = _same(some) if some else {}
+        groups = _groups(file.metadata, schema.names.index("key"), values)
+        same = _same([file.metadata.row_group(group) for group in groups]) if groups else {}
         columns = _unknown(schema.names, same)
-        for group in some:
-            _load_columns(parts, group, [schema.names.index(each) for each in columns])
         table = _rows_of(file.read_row_groups(groups, columns=columns, use_threads=False), values)
         found = schema.metadata
         return _columns(table, same, found), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
-
-
-def _load_footer(parts: Parts) -> None:
-    """Have what Parquet has at the end of a file: its metadata, four bytes with their size, and four others."""
-    size = len(parts.content)
-    parts.load(max(size - FOOTER, 0), size)
-    length = int.from_bytes(parts.content[max(size - 8, 0) : size - 4], "little")
-    parts.load(max(size - 8 - length, 0), size)
-
-
-def _load_columns(parts: Parts, group: pq.RowGroupMetaData, places: Sequence[int]) -> None:
-    """Have some columns of a group of rows."""
-    for place in places:
-        column = group.column(place)
-        start = column.data_page_offset
-        if column.has_dictionary_page:
-            start = min(start, column.dictionary_page_offset)
-        parts.load(start, start + column.total_compressed_size)
 
 
 def ways_from_parquet(data: bytes, name: str, after: int, until: int) -> Iterator[KeyWays] | None:
@@ -330,11 +307,11 @@ def _stamps(file: pq.ParquetFile, groups: Sequence[int], rows: slice | Rows) -> 
     return Stamps(*(_integers(table, each, NO_TIME)[rows] for each in ("revision", "commit", "committed")))
 
 
-def _opened(source: pa.NativeFile, name: str) -> pq.ParquetFile:
+def _opened(source: pa.NativeFile | io.IOBase, name: str) -> pq.ParquetFile:
     """A file whose words are read as places in a list of them. DamagedError if it is none of ours, or too new."""
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(source, read_dictionary=CODED)
+    file = pq.ParquetFile(source, read_dictionary=CODED, pre_buffer=False)  # all bytes are near
     found = file.schema_arrow.metadata or {}
     if FORMAT not in found:
         raise DamagedError(f"{name} is a Parquet file of another program")
