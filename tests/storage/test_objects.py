@@ -19,6 +19,7 @@ from dynhull_server.storage.segments import objects as store_calls
 from dynhull_server.storage.segments.objects import ORPHAN_SECONDS, ObjectArchive
 from dynhull_server.storage.segments.owner import Claimant, OccupiedError
 from dynhull_server.storage.sqlite import copies
+from dynhull_server.storage.sqlite.owner import FolderMarks
 
 DAY = 2 * ORPHAN_SECONDS
 with_all_objects = pytest.mark.only_with("OBJECTS_CASES")
@@ -92,6 +93,29 @@ def test_a_place_is_claimed_once_it_can_be_seen_that_nobody_else_has_it(fleet):
         with pytest.raises(OccupiedError, match=r"another database, the first one: .* remove dynhull\.owners/first"):
             change()
     assert objects(fleet) == before
+
+
+def test_a_store_that_keeps_something_else_than_a_claim_is_named_and_is_taken_for_no_other_database(fleet, monkeypatch):
+    def claim(data):
+        archive = ObjectArchive(place(fleet.address, fleet.folder.name))
+        archive.owner = Claimant("same", "the data folder", FolderMarks(data))
+        return archive.claim
+
+    name = "AWS_REQUEST_CHECKSUM_CALCULATION"
+    monkeypatch.delenv(name)
+    for _ in range(2):
+        wrong = claim(fleet.folder)
+        for _ in range(2):
+            with pytest.raises(OSError, match="does not keep what it is sent"):
+                wrong()
+    monkeypatch.setenv(name, CREDENTIALS[name])
+    copy = fleet.folder / "copy"
+    copy.mkdir()
+    with pytest.raises(OccupiedError, match="a copy of this database"):
+        claim(copy)()
+    claim(fleet.folder)()
+    with pytest.raises(OccupiedError, match="a copy of this database"):
+        claim(copy)()
 
 
 @pytest.mark.parametrize("fault", ["silent", "refusing", pytest.param("away", marks=with_all_objects)])

@@ -20,7 +20,7 @@ from time import monotonic, time
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from .archive import BATCHES, STATE, Archive, Written, written
+from .archive import BATCHES, STATE, Archive
 from .owner import CLAIMS
 from .place import is_store, require_store
 
@@ -77,25 +77,20 @@ class ObjectArchive(Archive):
         self._made: FileSystem | None = None
         self._away: tuple[float, OSError] | None = None  # until when reads are refused, and why
 
-    def write(self, file: str, content: bytes) -> Written:
-        """Write an object, and read it: what comes back is what was sent.
+    def _put(self, file: str, content: bytes) -> None:
+        """Write an object, and read it: what comes back is what was sent, also of a claim.
 
         Raises:
             OSError: the store refuses it, does not answer, or keeps something else.
-            OccupiedError: the past of another database is here.
         """
-        self.claim()
-        self._put(file, content)
-        if self.content(file, len(content)) != content:
-            raise OSError(errno.EIO, "the object store does not keep what it is sent", file)
-        return written(content)
 
-    def _put(self, file: str, content: bytes) -> None:
         def put() -> None:
             with self._store().open_output_stream(self._key(file)) as stream:
                 stream.write(content)
 
         self._ask(file, put, self._seconds, len(content))
+        if self.content(file, len(content)) != content:
+            raise OSError(errno.EIO, "the object store does not keep what it is sent", file)
 
     def _drop(self, file: str) -> None:
         self._ask(file, partial(self._removed, self._key(file)), self._seconds)
