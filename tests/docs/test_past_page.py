@@ -24,6 +24,9 @@ def test_segments_are_read_with_duckdb_and_geopandas(
 ) -> None:
     program = take_program("how-to/past", "moves.py")
     monkeypatch.chdir(tmp_path)
+    Path("empty").mkdir()
+    none = finished([sys.executable, str(program), "empty", "d3739201dc74bc27"])
+    assert (none.returncode, none.stderr) == (1, "there is no segment so far: the journal has it all\n")
     put: dict[tuple[str, int], tuple[float, float]] = {}
     rng = np.random.default_rng(5)
     with server_process("--data", "before", *SNAPSHOTS) as server, HullClient(server.address) as client:
