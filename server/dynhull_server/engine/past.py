@@ -28,7 +28,7 @@ from ..state.hull_state import Counts, HullState
 from ..state.records import CommitStamp, Kept, Keys, Record
 from ..state.root_state import state_of
 from ..state.tracks import Moves, Tracker
-from ..storage.past import Erasure, Hole, Moment, Past, created
+from ..storage.past import Erasure, Hole, Moment, Past, created, erased_since
 from ..storage.port import NEWEST
 from .divided_hull import DividedHull
 from .driver import Driver
@@ -203,7 +203,7 @@ class PastHulls:
 
     def _read(self, live: LiveHull, after: int, until: int, erasures: tuple[Erasure, ...] | None) -> list[Record]:
         records = self._past.batches(live.number, after, until)
-        if erasures is not None and self._past.erasures(live.number) != erasures:
+        if erasures is not None and erased_since(erasures, self._past.erasures(live.number)):
             raise NotStoredError("keys were erased from the past meanwhile: begin again")
         return records
 
@@ -385,7 +385,7 @@ class PastHulls:
     def _gathered(self, number: int, after: int, until: int, erasures: tuple[Erasure, ...]) -> list[Record]:
         """What the next batches come to, for a state that was read when these were the erasures."""
         found = self._past.gathered(number, after, until)
-        if self._past.erasures(number) != erasures:
+        if erased_since(erasures, self._past.erasures(number)):
             raise _ErasedMeanwhileError
         return found
 

@@ -15,7 +15,7 @@ from ..state.fences.sieve import Sieve, Sifted
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.records import CommitStamp, HullRow, Record
-from ..storage.past import Erasure, Moment, Past
+from ..storage.past import Erasure, Moment, Past, erased_since
 from ..storage.port import DamagedError
 from .driver import Driver
 from .fences import Fences
@@ -101,7 +101,7 @@ class _Batches:
         number, after = self.hull.row.number, self._after
         try:
             found = read(number)
-            if self._past.erasures(number) != self.hull.erasures:
+            if erased_since(self.hull.erasures, self._past.erasures(number)):
                 raise NotStoredError("keys were erased from the past meanwhile: begin again")
             return found
         except DamagedError:

@@ -1,6 +1,7 @@
 """The port to the past: what a reader of earlier revisions asks of whatever keeps them."""
 
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -55,6 +56,11 @@ class Erasure:
     def concerns(self, revision: int) -> bool:
         """Whether the hull may lack keys as of a revision."""
         return self.first <= revision <= self.last
+
+
+def erased_since(before: Sequence[Erasure], now: Sequence[Erasure]) -> bool:
+    """Whether keys were erased meanwhile. An erasure that is gone has changed nothing: its revisions were dropped."""
+    return not Counter(now) <= Counter(before)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +149,8 @@ class Past(Protocol):
     def erasures(self, number: int) -> tuple[Erasure, ...]:
         """The erasures that concern what is there of a hull, the oldest first.
 
-        Who reads a state and the batches after it begins anew when these differ afterwards from what they were before:
-        otherwise a key might be in the state, and not in the batch that removes it.
+        Who reads a state and the batches after it begins anew when others have come (`erased_since`): otherwise a key
+        might be in the state, and not in the batch that removes it.
         """
 
     def history(self, number: int) -> StoredHistory:
