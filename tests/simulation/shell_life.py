@@ -42,9 +42,9 @@ from .store import FaultyStorage, KilledError
 # Simulated seconds within which every waiting actor has to be answered, once nothing fails.
 FOREVER = 600.0
 # Turns, too: time may pass much faster than threads get on.
-MANY_TURNS = 20_000
+MANY_TURNS = 40_000
 # Turns after which a wait is given up whatever the time is: somebody goes on without a pause.
-ENDLESS = 10 * MANY_TURNS
+ENDLESS = 5 * MANY_TURNS
 
 SNAPSHOT_POINTS = 2
 SYNC_SECONDS = 0.5
