@@ -1,5 +1,6 @@
 """The past of hulls on the dashboard, in a real browser, on real servers that keep it."""
 
+import json
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 from dashboard_process import PARTS, dashboard_process, opened, wait_for_vertices
 from patience import wait_until
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Route, expect
 from server_process import Server, run, server_process
 
 from dynhull_client import HullClient
@@ -16,6 +17,7 @@ from dynhull_client import HullClient
 pytestmark = pytest.mark.long  # first, so that one worker, and one browser, has all of them
 CORNERS = [[0, 0], [4, 0], [4, 4], [0, 4]]
 KEYS = ["a", "b", "c", "d"]
+REFUSALS = 8  # more than the client of the page asks again
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
 
 
@@ -238,6 +240,34 @@ def test_a_hole_is_said_and_heals(browser: Browser, url: str, client: HullClient
         page.wait_for_function("() => time_bar.holes.length > 0")
         segment.write_bytes(content)
         wait_for_vertices(page, fleet, corners(1))
+
+
+def test_a_server_that_cannot_answer_for_some_time_is_asked_again(
+    browser: Browser, url: str, client: HullClient, fleet: str
+) -> None:
+    problem = {
+        "type": "about:blank",
+        "title": "Service Unavailable",
+        "status": 503,
+        "detail": "x",
+        "reason": "STARTING",
+    }
+    refused = 0
+
+    def refuse(route: Route) -> None:
+        nonlocal refused
+        if refused == REFUSALS or "/replay" not in (route.request.post_data or ""):
+            route.continue_()
+            return
+        refused += 1
+        route.fulfill(status=503, content_type="application/problem+json", body=json.dumps(problem))
+
+    with opened(browser, url, fleet) as page:
+        wait_for_vertices(page, fleet, corners(3))
+        page.route(re.compile("/streams"), refuse)
+        go(page, client, fleet, 2)
+        wait_for_vertices(page, fleet, corners(1))
+        assert refused == REFUSALS
 
 
 def test_a_hull_whose_past_begins_later(browser: Browser, url: str, client: HullClient, name: str, fleet: str) -> None:

@@ -1,4 +1,5 @@
 // The past of hulls, played from a moment on.
+import { DynhullError } from "../dynhull/errors.js"
 import { HullCopy } from "../dynhull/hull-copy.js"
 import { isoTime } from "../dynhull/json.js"
 import { HullState, SAMPLE_SIZE } from "./hull_state.js"
@@ -52,6 +53,11 @@ class PastHull extends HullState {
   get is_hole() {
     return ["PAST_DAMAGED", "STORAGE_FAILED"].includes(this.failure?.reason)
   }
+  // Whether it may be otherwise later at the same moment.
+  get may_heal() {
+    const {failure} = this
+    return failure != null && (this.is_hole || !(failure instanceof DynhullError) || failure.passing || failure.unknown)
+  }
   // Again where it ends: the hull may have moved on meanwhile, or a hole lies behind.
   async #run(signal) {
     while (!signal.aborted) {
@@ -64,7 +70,7 @@ class PastHull extends HullState {
         this.failure = error
       }
       this.ready = true
-      if (!this.clock.speed && !this.failure?.unknown && !this.is_hole) return
+      if (!this.clock.speed && !this.may_heal) return
       await rest(RETRY, signal)
     }
   }
