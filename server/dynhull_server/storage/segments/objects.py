@@ -120,7 +120,7 @@ class ObjectArchive(Archive):
     def _for_reader(self, file: str, size: int) -> bytes:
         away = self._away
         if away is not None and monotonic() < away[0]:
-            raise away[1]
+            raise away[1].with_traceback(None)  # else it gets longer with each reader
         try:
             found = self._ask(file, partial(self._get, file, size), min(READ_SECONDS, self._seconds), size)
         except OSError as error:
