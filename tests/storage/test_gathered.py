@@ -267,7 +267,7 @@ def test_last_places_lead_to_the_same_state(kind, steps, together, after, less):
         rows.append((some[0].revision, some[-1].revision, 0, encode(some), first, 10 * first))
     of_hull = SimpleNamespace(
         row=HullRow(1, "hull", "uid", 0.0, hull),
-        oldest=0,
+        start=0,
         last=len(records),
         between=lambda after, until: [row for row in rows if row[1] > after and row[0] <= until],
     )

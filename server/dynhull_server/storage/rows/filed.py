@@ -163,7 +163,7 @@ class Filed:
         """
         segment = _segment(hull, after + 1)
         rows = self._rows(segment)
-        if segment.last < min(until, hull.oldest):
+        if segment.last < min(until, hull.start):
             self._read_ahead(_segment(hull, segment.last + 1), ordered=ordered)
         return rows
 
@@ -309,7 +309,7 @@ def _begins(hull: HullRows, until: int) -> StoredSegment:
 def _usable(hull: HullRows) -> list[StoredSegment]:
     """The segments that lead to the journal without a gap, from one on that begins with a state."""
     found: list[StoredSegment] = []
-    expected = hull.oldest
+    expected = hull.start
     for segment in reversed(hull.segments):
         if segment.last != expected and not (not found and segment.last >= expected):
             break

@@ -78,7 +78,18 @@ class HullRows:
 
     @property
     def oldest(self) -> int:
-        """The oldest revision that the journal can read: what is before it is dropped, once segments have it."""
+        """The oldest revision that the journal can read: one of a snapshot, or 0."""
+        limit = self._limit
+        return next((each.revision for each in reversed(self.snapshots) if each.revision <= limit), self.beginning)
+
+    @property
+    def start(self) -> int:
+        """The revision after which the journal has all batches; segments have those before, as far as they are kept."""
+        return min(self.oldest, self._limit)
+
+    @property
+    def _limit(self) -> int:
+        """The revision up to which the journal need not have batches, apart from those after a snapshot before it."""
         if len(self.snapshots) < KEPT:
             return self.beginning
         base = self.snapshots[-KEPT].revision
@@ -136,8 +147,8 @@ class HullRows:
         """The rows that no readable revision needs."""
         if len(self.snapshots) < KEPT:
             return array("q")
-        oldest = self.oldest
-        return self.ids[:] if self.last <= oldest else self.ids[: max(0, bisect_right(self.firsts, oldest + 1) - 1)]
+        start = self.start
+        return self.ids[:] if self.last <= start else self.ids[: max(0, bisect_right(self.firsts, start + 1) - 1)]
 
     def outlived(self) -> StoredSnapshot | None:
         """A snapshot that neither a read nor a segment needs any more; None for none."""

@@ -65,21 +65,21 @@ def moment_at(reader: Reader, hull: HullRows, time: int) -> Moment | None:
                 high = middle
         if low:
             _, last, committed = _row(reader, hull, low - 1)
-            return None if committed is None or last < hull.oldest else Moment(last, committed)
+            return None if committed is None or last < hull.start else Moment(last, committed)
         oldest = oldest_moment(reader, hull, timed=False)
     return oldest if oldest.committed is not None and oldest.committed.time <= time else None
 
 
 def state_until(reader: Reader, hull: HullRows, until: int) -> Kept:
     """The newest snapshot of a revision not after `until`; the empty hull where there is none."""
-    require_kept(hull, until)
+    _require_kept(hull, until, hull.oldest)
     with as_damage(hull):
         return newest_snapshot(reader, hull, until)
 
 
 def batches_after(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:
     """The batches after a revision, as many as are read and applied in some milliseconds."""
-    require_kept(hull, after)
+    require_batches(hull, after)
     found: list[Record] = []
     points = 0
     with as_damage(hull):
@@ -101,7 +101,7 @@ def batches_after(reader: Reader, hull: HullRows, after: int, until: int) -> lis
 
 def gathered_after(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:
     """What the batches after a revision come to, as many as are read and applied in some tenths of a second."""
-    require_kept(hull, after)
+    require_batches(hull, after)
     last = min(until, hull.last)
     if after >= last:
         return []
@@ -201,9 +201,13 @@ def _few_bytes(rows: Iterator[tuple[Any, ...]]) -> Iterator[list[tuple[Any, ...]
         yield some
 
 
-def require_kept(hull: HullRows, revision: int) -> None:
-    """Raise DamagedError if a revision is no longer kept."""
-    if revision < hull.oldest:
+def require_batches(hull: HullRows, after: int) -> None:
+    """Raise DamagedError if batches after a revision are no longer kept."""
+    _require_kept(hull, after, hull.start)
+
+
+def _require_kept(hull: HullRows, revision: int, oldest: int) -> None:
+    if revision < oldest:
         raise DamagedError(f"revision {revision} of hull {hull.row.name!r} is no longer kept")
 
 

@@ -58,7 +58,7 @@ from .past_rows import (
     gathered_after,
     moment_at,
     oldest_moment,
-    require_kept,
+    require_batches,
     state_until,
 )
 from .reading import commit_of, read_each, read_hull, read_records
@@ -224,7 +224,7 @@ class RowStorage(ABC):
         """The batches that follow a revision."""
         return self._of_past(
             number,
-            lambda filed, hull: filed.batches(hull, after, until) if after < hull.oldest else None,
+            lambda filed, hull: filed.batches(hull, after, until) if after < hull.start else None,
             lambda reader, hull: batches_after(reader, hull, after, until),
         )
 
@@ -232,7 +232,7 @@ class RowStorage(ABC):
         """What the batches that follow a revision come to."""
         return self._of_past(
             number,
-            lambda filed, hull: filed.gathered(hull, after, until) if after < hull.oldest else None,
+            lambda filed, hull: filed.gathered(hull, after, until) if after < hull.start else None,
             lambda reader, hull: gathered_after(reader, hull, after, until),
         )
 
@@ -249,13 +249,13 @@ class RowStorage(ABC):
         """What some of the batches after a revision do to some keys."""
 
         def in_journal(reader: Reader, hull: HullRows) -> tuple[int, KeyChanges]:
-            require_kept(hull, after)
+            require_batches(hull, after)
             columns = columns_between(reader, hull, after, min(until, hull.last), GATHERED_ROWS, keys)
             return int(columns.revision[-1]), changes_of_keys(columns, keys)
 
         return self._of_past(
             number,
-            lambda filed, hull: filed.key_changes(hull, keys, after, until) if after < hull.oldest else None,
+            lambda filed, hull: filed.key_changes(hull, keys, after, until) if after < hull.start else None,
             in_journal,
         )
 
@@ -265,14 +265,14 @@ class RowStorage(ABC):
         """What a function makes of the moves of keys of some batches."""
 
         def in_journal(reader: Reader, hull: HullRows) -> tuple[int, Found | None]:
-            require_kept(hull, after)
+            require_batches(hull, after)
             columns = columns_between(reader, hull, after, min(until, hull.last), GATHERED_ROWS)
             ways = ways_of(columns)
             return int(columns.revision[-1]), None if ways is None else read(iter([ways]))
 
         return self._of_past(
             number,
-            lambda filed, hull: filed.ways(hull, after, until, read) if after < hull.oldest else None,
+            lambda filed, hull: filed.ways(hull, after, until, read) if after < hull.start else None,
             in_journal,
         )
 
@@ -304,7 +304,7 @@ class RowStorage(ABC):
             except DamagedError:
                 with self._visible:
                     now = self._settled().hulls[number]
-                if (now.segments, now.oldest) == (hull.segments, hull.oldest):
+                if (now.segments, now.oldest, now.start) == (hull.segments, hull.oldest, hull.start):
                     raise
 
     def _of_hull(self, number: int) -> AbstractContextManager[tuple[Reader, HullRows]]:
