@@ -134,6 +134,34 @@ def test_a_segment_has_no_more_than_its_rows_and_those_read_together(tmp_path, m
     fleet.storage.close()
 
 
+@pytest.mark.parametrize("damaged", [False, True])
+def test_every_revision_is_there_while_a_segment_ends_between_two_snapshots(tmp_path, monkeypatch, damaged):
+    """Also if the snapshot before is damaged: then the journal begins at a later one; segments have what is before."""
+    monkeypatch.setattr(filing, "MOST_ROWS", 20)
+    monkeypatch.setattr(past_rows, "STEP_BYTES", 1)  # one commit, which has at most 8 rows
+    fleet = Fleet(tmp_path).fill(2)
+    for _ in range(2):
+        fleet.put(8)
+        fleet.snapshot()
+    steps, between = fleet.storage.file_history(fleet.time), 0
+    for step in steps:
+        fleet.storage.commit([step], fleet.time)
+        rows = fleet.storage._ledger.hulls[1]
+        if damaged:
+            before = [each for each in rows.snapshots[:-2] if each.revision < rows.filed]
+            fleet.storage.commit([storage.DropSnapshot(1, each) for each in before], fleet.time)
+        between += rows.filed not in {each.revision for each in rows.snapshots}
+        fleet.snapshot()  # which drops what the journal need not have any longer
+        require_all(fleet.storage, fleet.records)
+        oldest = fleet.storage.oldest(1)
+        kept = fleet.storage.read(1, oldest)
+        assert kept.last_revision == oldest
+        same(replayed(kept, SETTINGS).stored(), replayed(Kept(records=fleet.records[:oldest]), SETTINGS).stored())
+    require_all_of_keys(fleet.storage, fleet.records)
+    assert between > 1
+    fleet.storage.close()
+
+
 @pytest.mark.parametrize(("rows", "again"), [(filed.KEPT_ROWS, 0), (0, 1)])
 def test_segments_that_are_read_in_turn_are_decoded_once_if_they_are_small(tmp_path, monkeypatch, rows, again):
     fleet = Fleet(tmp_path).fill()
