@@ -43,7 +43,7 @@ async def _run(end: socket.socket) -> None:
     return_large_blocks()
     share_processors(settings)
     allow_connections(settings.max_connections)
-    with stop_signal() as stop:
+    with stop_signal() as stop, few_collections():
         served: asyncio.Future[Serving] = asyncio.get_running_loop().create_future()
         listening = asyncio.create_task(_listen(line, served))
         try:
@@ -52,12 +52,11 @@ async def _run(end: socket.socket) -> None:
             if server is None:
                 return
             served.set_result(server)
-            with few_collections():
-                try:
-                    line.send({"serving": server.address})
-                    await stop.wait()
-                finally:
-                    await server.drain()
+            try:
+                line.send({"serving": server.address})
+                await stop.wait()
+            finally:
+                await server.drain()
         finally:
             listening.cancel()
 

@@ -87,19 +87,18 @@ def allow_connections(most: int) -> None:
 
 
 async def _serve(settings: Settings, make: Callable[[], Awaitable[Alone]]) -> None:
-    with stop_signal() as stop:
+    with stop_signal() as stop, few_collections():
         with progress_bar("hulls read") as progress:
             server = await started(make, lambda made: made.start(progress), stop, settings.start_patience)
         if server is None:
             return
-        with few_collections():
-            try:
-                print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # output of the command
-                if server.metrics_url:
-                    print(f"metrics on {server.metrics_url}", flush=True)  # noqa: T201  # likewise
-                await stop.wait()
-            finally:
-                await server.drain()
+        try:
+            print(f"dynhull serving on {server.address}", flush=True)  # noqa: T201  # output of the command
+            if server.metrics_url:
+                print(f"metrics on {server.metrics_url}", flush=True)  # noqa: T201  # likewise
+            await stop.wait()
+        finally:
+            await server.drain()
 
 
 @contextmanager

@@ -73,3 +73,16 @@ def test_all_cycles_are_collected() -> None:
         assert later() is None
     assert (gc.get_threshold(), gc.get_freeze_count(), len(gc.callbacks)) == (before, 0, 0)
     """)
+
+
+def test_what_is_made_at_the_start_is_not_looked_at() -> None:
+    run("""
+    with garbage.few_collections():
+        gc.callbacks.append(look)
+        with garbage.without_collections():
+            hulls = [[] for _ in range(100_000)]
+        in_flight(9_000)
+        assert gc.isenabled()
+        gc.callbacks.remove(look)
+    assert all(objects < 50_000 for _, objects in looked), looked
+    """)
