@@ -6,6 +6,7 @@ from contextlib import closing
 
 import pytest
 from command_line import dynhull
+from filed_fleet import Fleet
 from folders import (
     DATABASE,
     OLD_FOLDERS,
@@ -25,6 +26,8 @@ from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
 from dynhull_server.state.records import Contents, Kept
 from dynhull_server.storage.rows.tables import COLUMNS
+from dynhull_server.storage.segments.archive import Archive
+from dynhull_server.storage.segments.owner import Claimant
 from dynhull_server.storage.worker_folders import divide, worker_folder, write_manifest
 
 LAST = 6  # revision of the hull
@@ -68,8 +71,8 @@ def moved(source, target, counts="1 hull, 1 fence,"):
     return done
 
 
-def refused(source, target, words, code=2):
-    done = dynhull("move", source, target)
+def refused(source, target, words, code=2, history=None):
+    done = dynhull("move", source, target, *(["--history-dir", history] if history else []))
     assert done.exit_code == code, done.stdout
     assert words in done.stderr
     assert "Traceback" not in done.stderr
@@ -144,3 +147,23 @@ def test_what_cannot_be_moved_is_said(folder, url, tmp_path):
     old = tmp_path / "old"
     shutil.copytree(OLD_FOLDERS / "format6" / "stopped", old)
     refused(old, url, "has format 6: copy it with `dynhull restore")
+
+
+def test_a_move_that_is_refused_for_the_past_leaves_nothing(url, postgres, tmp_path):
+    history, back, other = tmp_path / "past", tmp_path / "back", postgres.new_database()
+    fleet = Fleet(tmp_path).fill()
+    fleet.storage.close()
+    source = shutil.move(tmp_path / "data", tmp_path / "source")
+    shutil.move(fleet.archive.path, source / "history")
+    assert dynhull("move", source, url, "--history-dir", history).exit_code == 0
+    refused(url, back, "of past: say with --history-dir")
+    assert not back.exists()
+    archive = Archive(history)
+    archive.owner = Claimant("0123", "the database url")
+    archive.claim()
+    before = sorted(history.rglob("*"))
+    refused(source, other, "has the past of another database, the database url", history=history)
+    assert (sorted(history.rglob("*")), query(other, "SELECT to_regnamespace('dynhull')")) == (before, [(None,)])
+    min(history.rglob("*.batches.parquet")).unlink()
+    refused(url, back, "of its past cannot be read", code=1, history=history)
+    assert not back.exists()

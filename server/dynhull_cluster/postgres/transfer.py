@@ -14,11 +14,11 @@ from pathlib import Path
 from dynhull_server.storage.port import DamagedError, LockedError, Progress, StorageError
 from dynhull_server.storage.rows.divided import DatabaseView, latest_epoch
 from dynhull_server.storage.rows.examine import Findings
-from dynhull_server.storage.rows.filed_check import adopting, history_bytes
-from dynhull_server.storage.rows.ledger import Ledger
+from dynhull_server.storage.rows.filed_check import bring_all
 from dynhull_server.storage.rows.tables import COLUMNS, Insert, Reader
 from dynhull_server.storage.rows.totals import STOPPED
 from dynhull_server.storage.segments.archive import HISTORY
+from dynhull_server.storage.segments.objects import archive_at
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.worker_folders import parts_of, worker_folder, write_manifest
 
@@ -74,11 +74,13 @@ def to_database(folder: Path, database: Database, progress: Progress, history: s
         history: the folder for the past of the hulls in the database; None if there is none.
 
     Raises:
-        StorageError: one of them cannot be used.
+        StorageError: one of them cannot be used, or another database has its past in the folder for it.
         DamagedError: the folder cannot be served, or the copy differs from it.
     """
     moved = Moved(str(folder), str(database))
     parts = parts_of(folder)
+    if history is not None:
+        archive_at(history).require_free()
     with closing(database.connect("dynhull move")) as connection, as_storage_errors(), connection.transaction():
         hold(connection, database)
         if partitions_of(connection, database) is not None:
@@ -91,7 +93,7 @@ def to_database(folder: Path, database: Database, progress: Progress, history: s
                     for sql, values in queries_of(partition, rows):
                         connection.execute(sql, values)
                 totals = findings.ledger.totals._replace(mode=STOPPED)
-                _move_history(findings.ledger, part / HISTORY, history)
+                bring_all(findings.ledger, part / HISTORY, history)
             put_totals(connection, partition, totals)
             copy = examined(connection, partition, lambda *_: None)
             _require_same(findings, copy, str(database))
@@ -133,27 +135,12 @@ def to_folder(database: Database, folder: Path, progress: Progress, history: str
                 raise DamagedError(f"{database}: {'; '.join(findings.fatal)}: restore a backup")
             target = folder if partitions == 1 else worker_folder(folder, partition)
             rows = _while_owned(owner, _rows(PostgresReader(connection, partition), progress))
-            copy = copies.write(str(database), target, rows, findings.ledger.totals)
+            copy = copies.write(str(database), target, rows, findings.ledger.totals, history)
             _require_same(findings, copy, str(target))
-            _move_history(findings.ledger, history, target / HISTORY)
             moved.add(findings)
         if partitions > 1:
             write_manifest(folder, partitions, complete=True)  # at the end: without it, the copy is refused
     return moved
-
-
-def _move_history(ledger: Ledger, source: str | Path | None, target: str | Path | None) -> None:
-    """Copy the files of all segments. Raises StorageError if there are some, and no folder, or one is damaged."""
-    size = history_bytes(ledger)
-    if not size:
-        return
-    if source is None or target is None:
-        raise StorageError(
-            f"the hulls have {size:,} bytes of past: say with --history-dir where those of a database are"
-        )
-    notes: list[str] = []
-    if list(adopting(ledger, source, target, notes)):
-        raise DamagedError("; ".join(notes))
 
 
 def _partitions(connection: Connection, database: Database) -> int:

@@ -81,3 +81,17 @@ def adopting(ledger: Ledger, source: Path | str, target: Path | str, notes: list
             yield RetireSegment(number, segment)
     if copied:
         after.sync()
+
+
+def bring_all(ledger: Ledger, source: Path | str | None, target: Path | str | None) -> None:
+    """Copy the files of all segments. Raises StorageError if there are some, and no folder, or one is damaged."""
+    size = history_bytes(ledger)
+    if not size:
+        return
+    if source is None or target is None:
+        raise StorageError(
+            f"the hulls have {size:,} bytes of past: say with --history-dir where those of a database are"
+        )
+    notes: list[str] = []
+    if list(adopting(ledger, source, target, notes)):
+        raise DamagedError("; ".join(notes))

@@ -131,13 +131,7 @@ class Archive:
             claims = self._claims()
             if claims - {owner.id}:  # it came at the same moment, and may have gone
                 self._drop(f"{CLAIMS}/{owner.id}")
-        if others := sorted(claims - {owner.id}):
-            about, _, _ = self.content(f"{CLAIMS}/{others[0]}").decode(errors="replace").partition("\n")
-            raise OccupiedError(
-                f"{self.path} has the past of another database, {about}: each of the two would remove what the other "
-                "one needs. Give this one a --history-dir of its own, with a copy of the files if it has a past; or, "
-                f"if the other is never served again, remove {CLAIMS}/{others[0]} there"
-            )
+        self._require_nobody(claims - {owner.id})
         if owner.marks is None:
             return
         content = self.content(f"{CLAIMS}/{owner.id}").decode(errors="replace")
@@ -148,6 +142,19 @@ class Archive:
                 "since: each of the two would remove what the other one needs. Give one of them a --history-dir of "
                 "its own, with a copy of the files; or, if the other is never served again, remove "
                 f"{CLAIMS}/{owner.id} there"
+            )
+
+    def require_free(self) -> None:
+        """Raise OccupiedError if any database has its past here."""
+        self._require_nobody(self._claims())
+
+    def _require_nobody(self, others: set[str]) -> None:
+        for other in sorted(others):
+            about, _, _ = self.content(f"{CLAIMS}/{other}").decode(errors="replace").partition("\n")
+            raise OccupiedError(
+                f"{self.path} has the past of another database, {about}: each of the two would remove what the other "
+                "one needs. Give this one a --history-dir of its own, with a copy of the files if it has a past; or, "
+                f"if the other is never served again, remove {CLAIMS}/{other} there"
             )
 
     def _mark(self, owner: Claimant, marks: Marks) -> None:

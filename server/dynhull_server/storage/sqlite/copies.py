@@ -14,7 +14,7 @@ from ..rows import divided
 from ..rows.divided import DatabaseView, NoLongerKeptError, Whole, dropping
 from ..rows.examine import Findings
 from ..rows.fence_check import FenceReport, check_fences
-from ..rows.filed_check import adopting, damaged_segments, history_bytes, leaving_out
+from ..rows.filed_check import adopting, bring_all, damaged_segments, history_bytes, leaving_out
 from ..rows.group import AnyStep
 from ..rows.incarnation import new_incarnation, renewing
 from ..rows.ledger import Ledger
@@ -237,12 +237,21 @@ def reading(path: Path, progress: Progress) -> Iterator[tuple[SQLiteReader, Find
         yield opened.reader, findings
 
 
-def write(source: str, target: Path, rows: Iterable[Insert], totals: Totals) -> Findings:
+def write(
+    source: str, target: Path, rows: Iterable[Insert], totals: Totals, history: Path | str | None = None
+) -> Findings:
     """Make a folder with the rows of a source, as a whole or not at all. Returns what an examination finds.
 
+    Args:
+        source: the source, for people.
+        target: the folder.
+        rows: the rows.
+        totals: those of the source.
+        history: the folder with the past of the source; None if there is none.
+
     Raises:
-        StorageError: the target is not empty.
-        DamagedError: the rows do not agree with the totals.
+        StorageError: the target is not empty, or there is a past, and no folder with it.
+        DamagedError: the rows do not agree with the totals, or the past is damaged.
     """
     with _new(source, target) as connection:
         connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
@@ -254,6 +263,7 @@ def write(source: str, target: Path, rows: Iterable[Insert], totals: Totals) -> 
         findings = examine(connection, FORMAT, None, lambda *_: None)
         if findings.fatal:
             raise DamagedError(f"the data is damaged and was not copied: {'; '.join(findings.fatal)}")
+        bring_all(findings.ledger, history, target / HISTORY)
         connection.execute("COMMIT")
         connection.execute("PRAGMA journal_mode = WAL")
     return findings
