@@ -239,6 +239,7 @@ class Model:
         self.fences.new_life()
         self._open.clear()
         for truth in self._hulls.values():
+            truth.past.gone = truth.past.erased
             self._see(truth.row.name, (truth.row.number, DELETED if truth.deleted else truth.revision))
         for number, fence in self.fences.ever.items():
             self._see(PREFIX + fence.row.name, (number, fence.last if fence.deleted is None else DELETED))

@@ -40,6 +40,7 @@ class PastTruth:
         waiting: the positions in quarantine at each revision.
         whole: whether it was to be kept for ever from the beginning on.
         erased: the revision up to which `ERASED` was erased.
+        gone: the one up to which who has erased it knows that.
     """
 
     times: list[int]
@@ -47,6 +48,7 @@ class PastTruth:
     records: list[Record] = field(default_factory=list)
     waiting: list[dict["Key", "Waiting"]] = field(default_factory=lambda: [{}])
     erased: int = 0
+    gone: int = 0
 
     def add(self, record: Record, time: int, waiting: dict["Key", "Waiting"]) -> None:
         """A revision has been committed."""
@@ -63,8 +65,12 @@ class PastTruth:
         self.whole = self.whole and _for_ever(settings)
 
     def batch(self, revision: int) -> object:
-        """The batch of a revision as it must be read, as `plain`."""
+        """The batch of a revision as it is kept, as `plain`."""
         return plain(self.records[revision - 1], erased=revision <= self.erased)
+
+    def batches(self, revision: int) -> list[object]:
+        """What may be read of it: what was read before `ERASED` was erased, until who has erased it knows that."""
+        return [self.batch(revision), plain(self.records[revision - 1], erased=revision <= self.gone)]
 
 
 class ConsumerTruths:

@@ -231,9 +231,10 @@ class PastReader:
                 f"the feed of {truth.row.name} has revision {record.revision} of {record.committed}, "
                 f"and should have {revision} of {time}"
             )
-        if plain(record) != truth.past.batch(revision):
+        expected = truth.past.batches(revision)
+        if plain(record) not in expected:
             raise self._model.finds(
-                f"revision {revision} of {truth.row.name} is {plain(record)} in the feed: {truth.past.batch(revision)}"
+                f"revision {revision} of {truth.row.name} is {plain(record)} in the feed: {expected}"
             )
 
     async def _replay(self, live: LiveHull, truth: Truth, first: int, last: int) -> None:
@@ -291,7 +292,10 @@ class PastReader:
         """Erase a key from the past."""
         live.require_keys("keys")
         key = str(ERASED) if TIMED[live.name] == "str" else ERASED
-        await self._engine.hulls.filing.erase(live, _keys(live, [key]))
+        found = await self._engine.hulls.filing.erase(live, _keys(live, [key]))
+        if found is not None:
+            past = self._model.truth_of(live.number).past
+            past.gone = max(past.gone, found.last)
 
     async def probe(self, name: str) -> None:
         """After all faults, the whole past that is to be there is there."""

@@ -47,12 +47,16 @@ class HullFeeds:
         driver: has the threads.
         past: keeps the batches.
         keeps: whether any are kept.
+
+    Attributes:
+        erasures: how often keys were erased from the past of any: what was read before may have them.
     """
 
     def __init__(self, driver: Driver, past: Past, *, keeps: bool) -> None:
         self._driver = driver
         self._past = past
         self._keeps = keeps
+        self.erasures = 0
 
     async def follow(
         self, hull: LiveHull, after: int | None, progress_interval: float | None = None
@@ -155,7 +159,7 @@ class HullFeeds:
         if isinstance(hull, DividedHull):
             return FeedPart(newest, lost=(after + 1, newest))
         try:
-            records: list[Record] = await self._ask(hull, partial(_batches, self._past, after, newest))
+            records = await self._batches(hull, after, newest)
         except NotStoredError as error:
             if not isinstance(error.__cause__, DamagedError):
                 raise
@@ -164,6 +168,19 @@ class HullFeeds:
                 raise
             return FeedPart(oldest.revision, lost=(after + 1, oldest.revision))
         return FeedPart(records[-1].revision, records)
+
+    async def batch(self, hull: LiveHull, revision: int) -> Record:
+        """The batch that made a revision. Raises HullNotFoundError or NotStoredError."""
+        (found,) = await self._batches(hull, revision - 1, revision)
+        return found
+
+    async def _batches(self, hull: LiveHull, after: int, until: int) -> list[Record]:
+        """Some batches, without the keys that were erased before this returns."""
+        while True:
+            erasures = self.erasures
+            found: list[Record] = await self._ask(hull, partial(_batches, self._past, after, until))
+            if erasures == self.erasures:
+                return found
 
     async def _ask(self, hull: LiveHull, function: Callable[[int], Any]) -> Any:
         try:

@@ -105,6 +105,7 @@ class PrefixFeed:
         self._sources: dict[str, _Source] = {}
         self._sent = BEGINNING
         self._part = ManyFeedPart()
+        self._erasures = feeds.erasures
         self._begun = False
 
     async def follow(
@@ -146,10 +147,12 @@ class PrefixFeed:
                 except NotStoredError as error:
                     failure = error
             if failure is not None:
+                await self._without_erased()
                 for part in self._before_a_hole():
                     yield part
                 raise failure
             self._sent = settled
+            await self._without_erased()
             if self._part:
                 self._part.position = self._position()
                 yield self._part
@@ -210,6 +213,7 @@ class PrefixFeed:
                 order.append((number, name))
         heapify(order)
         while order:
+            await self._without_erased()
             number, name = order[0]
             source = self._sources.get(name)
             if source is not None and not source.ahead:
@@ -237,11 +241,42 @@ class PrefixFeed:
                 self._sent = record.committed
             enough = part.points >= POINTS_TOGETHER or len(part.batches) >= BATCHES_TOGETHER
             if part.points >= POINTS_OF_A_COMMIT or (enough and not more):
+                await self._without_erased()
                 part.position = b"" if more else self._position()
                 self._part = ManyFeedPart()
                 yield part
         for name in names & self._sources.keys():
             self._sources[name].ahead.clear()  # it is read again
+
+    async def _without_erased(self) -> None:
+        """Read again what was read before keys were erased from the past of a hull. Raises NotStoredError."""
+        while self._erasures != self._feeds.erasures:
+            self._erasures = self._feeds.erasures
+            for source in self._sources.values():
+                source.ahead.clear()
+            batches, self._part.batches = self._part.batches, []
+            try:
+                found = [each for batch in batches for each in await self._again(batch)]
+            except NotStoredError:
+                self._part = ManyFeedPart()  # the reader begins again after the one before
+                raise
+            after = [*(_number(each.record) for each in found[1:]), None]
+            if batches and batches[-1].more:
+                after[-1] = _number(batches[-1].record)
+            self._part.batches = [
+                each._replace(more=_number(each.record) == number) for each, number in zip(found, after, strict=False)
+            ]
+
+    async def _again(self, batch: FedBatch) -> list[FedBatch]:
+        """The batch as it is now; none if the hull is gone."""
+        source = self._sources.get(batch.hull.name)
+        if source is None or source.hull != batch.hull:
+            return []
+        try:
+            record = await self._feeds.batch(source.live, batch.record.revision)
+        except HullNotFoundError:
+            return []
+        return [batch._replace(record=record)]
 
     def _before_a_hole(self) -> Iterator[ManyFeedPart]:
         """What has been read: whole commits, and without a position those batches of one of which there may be more."""

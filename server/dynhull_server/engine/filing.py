@@ -23,6 +23,7 @@ from ..state.records import Kept, Keys
 from ..storage.past import Erasure
 from ..storage.port import NotCommittedError, Storage
 from .driver import Driver
+from .feed import HullFeeds
 from .live_hull import LiveHull
 from .past import PastHulls
 from .recalls import UNREADABLE
@@ -41,6 +42,7 @@ class Filing:
         driver: has the threads, and commits.
         storage: keeps them.
         pasts: reads them.
+        feeds: read them, too.
 
     Attributes:
         unsure: hulls of which it is not known whether their settings have been changed as was asked.
@@ -48,10 +50,11 @@ class Filing:
 
     SECONDS = 1.0
 
-    def __init__(self, driver: Driver, storage: Storage, pasts: PastHulls) -> None:
+    def __init__(self, driver: Driver, storage: Storage, pasts: PastHulls, feeds: HullFeeds) -> None:
         self._driver = driver
         self._storage = storage
         self._pasts = pasts
+        self._feeds = feeds
         self._turn = asyncio.Lock()
         self._erasing: set[asyncio.Task[Erasure | None]] = set()
         self.unsure: set[Hull] = set()
@@ -128,6 +131,7 @@ class Filing:
             raise OutcomeUnknownError(words_for_callers(error)) from error
         finally:
             self._pasts.forget()
+            self._feeds.erasures += 1
         return next((each for each in after if each not in before), None)
 
     async def _erasures(self, hull: LiveHull) -> tuple[Erasure, ...]:

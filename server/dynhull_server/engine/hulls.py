@@ -76,7 +76,7 @@ class Hulls:
         self._changing: set[asyncio.Task[None]] = set()
         self._turn_of_settings = asyncio.Lock()
         self.pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
-        self.filing = Filing(driver, storage, self.pasts)
+        self.filing = Filing(driver, storage, self.pasts, self.feeds)
         self._live: dict[Hull, LiveHull] = {}
         self._incarnation = driver.machine.token()  # that of hulls in memory; others find theirs in the storage
         self._standing = standing(self._incarnation, driver.published)

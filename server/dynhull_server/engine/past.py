@@ -59,7 +59,7 @@ class _Rebuilt:
         state: its state at a revision.
         rows: about the number of rows that it takes.
         erasures: the erasures from its past before it was read.
-        round: how often everything had been forgotten before.
+        round: how often keys of any hull had been erased before.
     """
 
     hull: Hull
@@ -109,6 +109,7 @@ class PastHulls:
 
     Attributes:
         outcomes: how often a hull was rebuilt anew, or from one that was kept; and how often it could not be read.
+        erasures: how often keys were erased from the past of any: what was read before may have them.
     """
 
     def __init__(self, driver: Driver, past: Past, *, keeps: bool, max_rows: int) -> None:
@@ -119,7 +120,7 @@ class PastHulls:
         self._kept: list[_Rebuilt] = []  # the last used at the end
         self._turns: WeakValueDictionary[tuple[int, int], asyncio.Lock] = WeakValueDictionary()
         self.outcomes: Counter[Outcome] = Counter()
-        self._round = 0
+        self.erasures = 0
 
     async def moment(self, live: LiveHull, revision: int | None, time: int, field: str = "at_") -> Moment:
         """The revision that is asked for: a number, or None for the last one committed at or before a time.
@@ -203,9 +204,17 @@ class PastHulls:
 
     def _read(self, live: LiveHull, after: int, until: int, erasures: tuple[Erasure, ...] | None) -> list[Record]:
         records = self._past.batches(live.number, after, until)
-        if erasures is not None and erased_since(erasures, self._past.erasures(live.number)):
-            raise NotStoredError("keys were erased from the past meanwhile: begin again")
+        if erasures is not None:
+            self._require_unerased(live, erasures)
         return records
+
+    async def require_unerased(self, live: LiveHull, erasures: tuple[Erasure, ...]) -> None:
+        """Raise NotStoredError if keys were erased from the past of a hull after these erasures."""
+        await self.ask(live.name, partial(self._require_unerased, live, erasures))
+
+    def _require_unerased(self, live: LiveHull, erasures: tuple[Erasure, ...]) -> None:
+        if erased_since(erasures, self._past.erasures(live.number)):
+            raise NotStoredError("keys were erased from the past meanwhile: begin again")
 
     async def outlined(
         self, live: LiveHull, state: HullState, ahead: deque[Record], until: int, erasures: tuple[Erasure, ...]
@@ -346,7 +355,7 @@ class PastHulls:
 
         And others after these, which are read while the hull is built of both.
         """
-        number, round_, settings = hull.row.number, self._round, hull.row.settings
+        number, round_, settings = hull.row.number, self.erasures, hull.row.settings
         limits, now = self._driver.limits, self._driver.machine.clock.monotonic()
 
         def read() -> list[Record]:
@@ -434,11 +443,11 @@ class PastHulls:
 
     def forget(self) -> None:
         """Forget what was rebuilt: keys have been erased that it may have."""
-        self._round += 1
+        self.erasures += 1
         self._kept.clear()
 
     def _keep(self, rebuilt: _Rebuilt) -> None:
-        if rebuilt.state.torn or rebuilt.round != self._round:
+        if rebuilt.state.torn or rebuilt.round != self.erasures:
             return
         rebuilt.rows = rebuilt.state.counts.points
         self._kept.append(rebuilt)

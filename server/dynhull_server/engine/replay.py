@@ -93,6 +93,7 @@ class ReplayedHull(LiveHull):
         self._pasts = pasts
         self._state = state
         self._erasures = erasures
+        self._seen = -1  # of the erasures of all hulls
         self._last = last
         self._ahead: deque[Record] = deque()
         # Where only vertices are asked for, the state is ahead of them: these are here, those that follow, and those
@@ -182,8 +183,11 @@ class ReplayedHull(LiveHull):
     async def advance(self, until: int | None) -> None:
         """Go to the next revision; and over those after it that were committed by a time, as far as they are at hand.
 
-        It is due.
+        It is due. Raises NotStoredError if keys were erased meanwhile that the state, or what is at hand, may have.
         """
+        if self._seen != self._pasts.erasures:
+            self._seen = self._pasts.erasures
+            await self._pasts.require_unerased(self._live, self._erasures)
         if self._at is not None:
             self._at = self._outlines.popleft()
             return
