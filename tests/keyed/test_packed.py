@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from inspect import getattr_static
+from itertools import pairwise, takewhile
 from threading import Event
 
 import numpy as np
@@ -130,6 +131,18 @@ def test_empty_and_at_one_place():
     assert hull.oldest() is None
 
 
+def test_keys_that_begin_alike_or_not():
+    long = "x" * 255
+    keys = [long, long[:254] + "y", "x", "xy", "y", "yé", "yè", "y\0", "\0", "zz", "z", long[:128], long[:129]]
+    hull, twin = KeyedHull(), KeyedHull()
+    for each in (hull, twin):
+        each.update(keys, PLACES[: len(keys)])
+    assert hull.pack()
+    assert hull == twin
+    assert [hull.position(key) for key in keys] == [tuple(place) for place in PLACES[: len(keys)].tolist()]
+    hull.check()
+
+
 def test_idle_is_since_the_last_call():
     hull = filled()
     assert not hull.pack(idle=True)
@@ -156,12 +169,15 @@ def test_not_while_an_index_compares_them():
 
 
 def test_memory():
-    """A third of it, and what the columns take."""
+    """A third of it, and what the columns take, of each key what the one before has not."""
     hull = filled()
     _, before = hull._tree.memory
     assert hull.pack()
     used, packed = hull._tree.memory
-    assert used == packed == 100 * (16 + 1) + sum(map(len, NAMES))
+    in_common = sum(
+        len(list(takewhile(lambda pair: pair[0] == pair[1], zip(*two, strict=False)))) for two in pairwise(NAMES)
+    )
+    assert used == packed == 100 * (16 + 2) + sum(map(len, NAMES)) - in_common
     assert packed < before / 2.5
     hull.locate(ANY)
     assert hull._tree.memory[1] <= before

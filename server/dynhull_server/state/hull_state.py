@@ -79,6 +79,24 @@ class HullState:
         contents: what `begun` has made of the points of `kept`, which then belongs to this; None to begin here.
     """
 
+    __slots__ = (
+        "_changed_at",
+        "_keys_as_of",
+        "_layers",
+        "_limits",
+        "_outline",
+        "_producers",
+        "_sent",
+        "_vertex_keys",
+        "_vertices",
+        "_vertices_as_of",
+        "committed",
+        "contents",
+        "counts",
+        "hull",
+        "torn",
+    )
+
     def __init__(
         self, limits: Limits, settings: HullSettings, kept: Kept, now: float, contents: LiveContents | None = None
     ) -> None:
@@ -104,7 +122,7 @@ class HullState:
         self._layers: dict[int, tuple[int, Points]] | None = None  # those that fences ask for
         self._vertex_keys: VertexKeys | None = None
         self._keys_as_of = -1
-        self._sent = SentVertices(self._limits.resume_bytes, self._vertices, last)
+        self._sent: SentVertices | None = None  # the vertices since `_changed_at`, and no others
         self._outline: tuple[Points, Center | None, GlobeOutline] | None = None
 
     @property
@@ -315,8 +333,8 @@ class HullState:
         center = None if globe is None else globe.center
         revision, outlined = before.revision + 1 if revision is None else revision, before.outlined
         if hull_changed:
+            self._sent_vertices().changed(revision)
             outlined = self._changed_at = revision
-            self._sent.changed(revision)
         if center is not before.center and center != before.center:
             outlined = revision
         self.counts = self._counted(revision, points, cause, center, outlined)
@@ -344,10 +362,11 @@ class HullState:
     def vertices(self) -> Points:
         """The vertices; the same array object while the hull has not changed."""
         if self._vertices_as_of != self.hull.changes:
+            sent = self._sent_vertices()
             self._vertices = self.hull.vertices()
             self._vertices.setflags(write=False)
             self._vertices_as_of = self.hull.changes
-            self._sent.record(self._changed_at, self._vertices)
+            sent.record(self._changed_at, self._vertices)
         return self._vertices
 
     def layer(self, number: int) -> Points:
@@ -399,7 +418,12 @@ class HullState:
 
     def earlier_vertices(self, revision: int) -> Points | None:
         """The vertices at an earlier revision, None where they were never sent; raises RevisionForgottenError."""
-        return self._sent.at(revision, self.counts.revision)
+        return self._sent_vertices().at(revision, self.counts.revision)
+
+    def _sent_vertices(self) -> SentVertices:
+        if self._sent is None:
+            self._sent = SentVertices(self._limits.resume_bytes, self._vertices, self._changed_at)
+        return self._sent
 
     def last_sequence(self, producer: str) -> int:
         """The last sequence number applied of a producer, 0 where there is none."""

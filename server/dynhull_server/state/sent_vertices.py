@@ -30,6 +30,8 @@ class SentVertices:
         first: the first revision that is remembered.
     """
 
+    __slots__ = ("_bytes", "_entries", "_most_bytes")
+
     def __init__(self, most_bytes: int, vertices: Points, first: int = 0) -> None:
         self._most_bytes = most_bytes
         self._entries = [Entry(first, None, vertices)]  # a deque takes 600 bytes, and most hulls need one entry

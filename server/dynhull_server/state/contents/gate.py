@@ -71,6 +71,8 @@ class Gate:
         quarantine: the positions that break rules; None for a hull that has never had any rule.
     """
 
+    __slots__ = ("_kind", "_settings", "quarantine")
+
     def __init__(self, settings: HullSettings, rules: QuarantineRules | None, held: HeldRows | None) -> None:
         assert settings.identity != "multiset"
         self._settings = settings

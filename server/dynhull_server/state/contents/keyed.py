@@ -1,6 +1,6 @@
 """Points with keys."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import compress
 
@@ -90,6 +90,24 @@ class Keyed:
         ended: the keys whose deadline had come when points last left.
     """
 
+    __slots__ = (
+        "_accuracies",
+        "_deadlines",
+        "_earliest",
+        "_gate",
+        "_kind",
+        "_loader",
+        "_most_points",
+        "_settings",
+        "clock",
+        "ended",
+        "follows_server",
+        "globe",
+        "hull",
+        "mirror",
+        "timed",
+    )
+
     def __init__(
         self,
         settings: HullSettings,
@@ -114,7 +132,7 @@ class Keyed:
         self.follows_server = settings.window is None or settings.window.clock == "server"
         self.mirror: Mirror | None = None
         self._deadlines, self._accuracies = NO_DEADLINES, NO_ACCURACIES
-        self.ended: list[Key] = []
+        self.ended: Sequence[Key] = ()
         self._earliest: int | None = None  # no point has an earlier time
         self.timed = settings.window is not None or settings.by_event_time
         if stored.keys is not None:
