@@ -38,7 +38,7 @@ __all__ = [
 
 _MODULES = {
     *("arrays", "convex", "decompose", "defects", "envelope", "gjk", "globe", "keys", "margin", "measure", "polygons"),
-    *("crs", "range_search", "ray", "robust", "trace"),
+    *("crossings", "crs", "range_search", "ray", "robust", "trace"),
 }
 
 __version__: str

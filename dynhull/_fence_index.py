@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ._crossings import NO_CROSSINGS, Crossings, PackedCrossings, only_shared, pack
 from ._entities import Entities
 from ._fences import Fences
 from ._implementation import kernel
@@ -15,9 +15,8 @@ from ._keyed import KeyedHull
 from ._metres import MOST_METRES, Metres
 from ._predicates import orient2d
 from ._rings import as_polygons
-from ._value import Value
 from .arrays import as_coordinate, as_points
-from .keys import Keys, PackedKeys, as_keys, key_list, take_keys
+from .keys import Keys, as_keys, key_list, take_keys
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -25,60 +24,8 @@ if TYPE_CHECKING:
     from . import _kernel
     from ._globe import Gnomonic
     from .arrays import Points
-    from .keys import KeyType
 
 LEAST_FENCE, GREATEST_FENCE = -(2**63), 2**63 - 1
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Crossings(Value):
-    """Who crossed which fence between two states of a hull: n rows, in the order of fences, then of keys.
-
-    Attributes:
-        fences: (n,) numbers of fences.
-        changes: (n,) +1 entered; -1 left; 0 crossed: outside before and after, but the straight way between meets the
-            area as it is now; 2 was inside as an entity of another hull, and stays inside (see `FenceIndex.carry`).
-        causes: (n,) sums of `MOVED` (the subject changed its place), `AREA` (the area changed), `APPEARED` (the key is
-            new), `REMOVED` (the key was removed) and `EXPIRED` (the key left by `expire` or `evict`).
-        keys: n keys, `PackedKeys` or an array of uint64.
-        points: (n, 2) places now; NaN if the key is gone.
-        previous: (n, 2) places before; NaN if the key is new.
-        distances: (n,) distances of the places now to the area now, each the exact value rounded once: 0.0 inside and
-            on the boundary, inf from an empty area, NaN if the key is gone. With a `frame`, metres.
-    """
-
-    MOVED = 1
-    AREA = 2
-    APPEARED = 4
-    REMOVED = 8
-    EXPIRED = 16
-
-    fences: npt.NDArray[np.int64]
-    changes: npt.NDArray[np.int8]
-    causes: npt.NDArray[np.uint8]
-    keys: Keys
-    points: Points
-    previous: Points
-    distances: npt.NDArray[np.float64]
-
-    def __len__(self) -> int:
-        """The number of rows."""
-        return len(self.fences)
-
-
-def _no_crossings(key_type: KeyType) -> Crossings:
-    return Crossings(
-        np.empty(0, np.int64),
-        np.empty(0, np.int8),
-        np.empty(0, np.uint8),
-        PackedKeys.pack([]) if key_type == "str" else np.empty(0, np.uint64),
-        np.empty((0, 2)),
-        np.empty((0, 2)),
-        np.empty(0),
-    )
-
-
-NO_CROSSINGS = {"str": _no_crossings("str"), "int": _no_crossings("int")}
 
 
 class FenceIndex:
@@ -411,14 +358,17 @@ class FenceIndex:
         Raises:
             MemoryError: memory does not suffice. No crossing is lost: the next call returns it.
         """
+        packed = self.take_packed()
+        return NO_CROSSINGS[self._subjects.key_type] if packed is None else packed.unpack()
+
+    def take_packed(self) -> PackedCrossings | None:
+        """The crossings as `take` has them, packed: for who passes many on and looks at few. None if there are none."""
         taken = self._fences.take()
-        carried, self._carried = self._carried, {}
-        if taken is None:
-            return NO_CROSSINGS[self._subjects.key_type]
-        for column in taken:
-            if isinstance(column, np.ndarray):
-                column.setflags(write=False)  # nobody else has it
-        return _only_shared(Crossings(*taken), carried) if carried else Crossings(*taken)
+        if self._carried:
+            carried, self._carried = self._carried, {}
+            if taken is not None:
+                taken = pack(only_shared(PackedCrossings._make(taken).unpack(), carried))
+        return None if taken is None else PackedCrossings._make(taken)
 
     def _margin(self, margin: float) -> float:
         length = as_length(margin, "margin")
@@ -434,30 +384,6 @@ class FenceIndex:
         if not self._fences.has(number):
             raise KeyError(f"there is no fence {number}")
         return number
-
-
-def _only_shared(crossings: Crossings, carried: dict[str | int, FenceIndex]) -> Crossings:
-    """The crossings; in a fence that the index does not have from which a subject was carried, this is new."""
-    keys, fences = key_list(crossings.keys), crossings.fences.tolist()
-    new = np.array(
-        [key in carried and fence not in carried[key] for key, fence in zip(keys, fences, strict=True)], np.bool_
-    )
-    new &= crossings.causes & Crossings.MOVED != 0  # not so around the own hull
-    if not new.any():
-        return crossings
-    causes, previous = crossings.causes.copy(), crossings.previous.copy()
-    causes[new] ^= np.uint8(Crossings.MOVED | Crossings.APPEARED)
-    previous[new] = np.nan
-    rows = np.flatnonzero(~new | (crossings.changes != 0))  # who is new has come no way
-    return Crossings(
-        fences=crossings.fences[rows],
-        changes=crossings.changes[rows],
-        causes=causes[rows],
-        keys=take_keys(crossings.keys, rows),
-        points=crossings.points[rows],
-        previous=previous[rows],
-        distances=crossings.distances[rows],
-    )
 
 
 def _number(fence: int) -> int:

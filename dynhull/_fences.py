@@ -31,15 +31,7 @@ MOVED, AREA, APPEARED = 1, 2, 4  # causes, beside those of `Journal.gone`
 ENTERED, LEFT, CROSSED, STAYED = 1, -1, 0, 2
 UNDECIDED = object()  # the area of a fence whose keys were given, not decided
 
-Taken = tuple[
-    "npt.NDArray[np.int64]",
-    "npt.NDArray[np.int8]",
-    "npt.NDArray[np.uint8]",
-    "Keys",
-    "Points",
-    "Points",
-    "npt.NDArray[np.float64]",
-]
+Taken = tuple[bytes, bytes | None, bytes]
 
 
 @dataclass(slots=True)
@@ -199,7 +191,7 @@ class Fences:
         return carried
 
     def take(self) -> Taken | None:
-        """What has crossed since the last call: fences, changes, causes, keys, places, previous, distances."""
+        """What has crossed since the last call, as in `PackedCrossings`."""
         rows: list[tuple[int, int, int, Key, Point, Point, float]] = []
         nowhere = nan, nan
         places = self._entities.places()
@@ -271,15 +263,13 @@ class Fences:
 
     def _columns(self, rows: list[tuple[int, int, int, Key, Point, Point, float]]) -> Taken:
         fences, changes, causes, keys, points, previous, distances = zip(*rows, strict=True)
-        return (
-            np.array(fences, np.int64),
-            np.array(changes, np.int8),
-            np.array(causes, np.uint8),
-            self._packed(keys),
-            np.array(points, np.float64),
-            np.array(previous, np.float64),
-            np.array(distances, np.float64),
-        )
+        wide = np.array(fences, np.int64), *(np.array(each, np.float64) for each in (points, previous, distances))
+        narrow = np.array(changes, np.int8), np.array(causes, np.uint8)
+        columns = b"".join([column.tobytes() for column in (*wide, *narrow)])
+        packed = self._packed(keys)
+        if isinstance(packed, PackedKeys):
+            return columns, packed.lengths, packed.data
+        return columns, None, packed.tobytes()
 
     def _packed(self, keys: Any) -> Keys:
         return PackedKeys.pack(keys) if self._entities.key_type == "str" else np.array(keys, np.uint64)

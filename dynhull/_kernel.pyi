@@ -351,9 +351,9 @@ class Fences:
     def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]:
         """Let keys that were removed there and are new here have moved."""
 
-    def take(self) -> Any:
+    def take(self) -> tuple[bytes, bytes | None, bytes] | None:
         """
-        What has crossed since the last call: fences, changes, causes, keys, places, previous, distances.
+        What has crossed since the last call, as in `PackedCrossings`; None if nothing has.
         """
 
     def check(self) -> None:

@@ -2,6 +2,7 @@
 Events of fences, batches of the past and messages in C++, with the same results as in Python.
 """
 
+from typing import Any
 
 
 class Numbers:
@@ -19,9 +20,9 @@ class Numbers:
 
     def pop(self, key: int) -> int: ...
 
-def numbered(waiting: list[tuple[object, ...]], types: bytes, places: Numbers, lasts: object, times: object) -> tuple[bytes, bytes, bytes]:
+def numbered(waiting: list[Any], names: tuple[str, ...], types: bytes, places: Numbers, lasts: object, times: object) -> tuple[bytes, bytes, bytes, bytes]:
     """
-    The events of crossings: the bytes of their runs, of themselves, and of what they say of their fences.
+    The events of crossings: the bytes of their runs, of themselves, of their keys, and of what they say of their fences.
     """
 
 def encoded(runs: object, rows: object, keys: bytes, own: object, names: tuple[str, ...], more: int) -> bytes:

@@ -51,13 +51,14 @@ class Native(Protocol):
 
     def numbered(
         self,
-        waiting: "list[tuple[Any, ...]]",
+        waiting: "list[Any]",
+        names: "tuple[str, ...]",
         types: bytes,
         places: "Any",
         lasts: "npt.NDArray[Any]",
         times: "npt.NDArray[Any]",
-    ) -> "tuple[bytes, bytes, bytes]":
-        """The bytes of the runs, the rows and what is said of the fences: `numbered_natively` in state/fences."""
+    ) -> "tuple[bytes, bytes, bytes, bytes]":
+        """The bytes of runs, rows, keys and what is said of the fences: `numbered_natively` in state/fences."""
 
     def encoded(
         self,

@@ -9,6 +9,20 @@
 
 namespace dynhull {
 
+// New bytes, not initialised.
+class NewBytes {
+ public:
+  explicit NewBytes(std::size_t size)
+      : bytes_(nb::steal(PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size)))) {
+    if (!bytes_.is_valid()) throw nb::python_error();
+  }
+  char* data() const { return PyBytes_AS_STRING(bytes_.ptr()); }
+  const nb::object& bytes() const { return bytes_; }
+
+ private:
+  nb::object bytes_;
+};
+
 class FenceIndex {
   template <class Work>
   auto alone(std::size_t rows, Work work) {
@@ -143,7 +157,7 @@ class FenceIndex {
     return nb::cast(carried.array());
   }
 
-  // Fences, changes, causes, keys, points, previous and distances; None if there are no rows.
+  // The columns in one, the lengths of keys that are strings, or None, and the keys; None if there are no rows.
   nb::object take() {
     std::size_t work = 0;
     const bool idle = alone(0, [&](Fences& fences) {
@@ -156,24 +170,36 @@ class FenceIndex {
         hull_->alone(work, [&](Entities& entities, FramedTree& tree) { return entities.take(tree, *fences_); });
     if (crossings.rows.empty()) return nb::none();
     const std::size_t count = crossings.rows.size();
-    const Output<std::int64_t> fences(count);
-    const Output<std::int8_t> changes(count);
-    const Output<std::uint8_t> causes(count);
-    const Output<double, 2> points(count), previous(count);
-    const Output<double> distances(count);
+    const NewBytes columns(count * (sizeof(std::int64_t) + 2 * sizeof(Point) + sizeof(double) + 2));
+    auto* const fences = reinterpret_cast<std::int64_t*>(columns.data());
+    auto* const points = reinterpret_cast<Point*>(fences + count);
+    Point* const previous = points + count;
+    auto* const distances = reinterpret_cast<double*>(previous + count);
+    auto* const changes = reinterpret_cast<std::int8_t*>(distances + count);
+    auto* const causes = reinterpret_cast<std::uint8_t*>(changes + count);
+    std::size_t size = 0;
+    for (const Crossing& row : crossings.rows) size += hull_->strings() ? row.length : sizeof row.key;
+    const NewBytes keys(size), lengths(hull_->strings() ? count : 0);
     beside_others(count, [&] {
+      char* key = keys.data();
       for (std::size_t i = 0; i < count; ++i) {
         const Crossing& row = crossings.rows[i];
-        fences.data()[i] = row.fence;
-        changes.data()[i] = row.change;
-        causes.data()[i] = row.cause;
-        reinterpret_cast<Point*>(points.data())[i] = row.now;
-        reinterpret_cast<Point*>(previous.data())[i] = row.before;
-        distances.data()[i] = row.distance;
+        fences[i] = row.fence;
+        points[i] = row.now;
+        previous[i] = row.before;
+        distances[i] = row.distance;
+        changes[i] = row.change;
+        causes[i] = row.cause;
+        if (hull_->strings()) {
+          lengths.data()[i] = static_cast<char>(row.length);
+          key = std::copy_n(crossings.strings.data() + row.key, row.length, key);
+        } else {
+          std::memcpy(key, &row.key, sizeof row.key);
+          key += sizeof row.key;
+        }
       }
     });
-    return nb::make_tuple(fences.array(), changes.array(), causes.array(), packed(crossings), points.array(),
-                          previous.array(), distances.array());
+    return nb::make_tuple(columns.bytes(), hull_->strings() ? lengths.bytes() : nb::none(), keys.bytes());
   }
 
   void check() {

@@ -242,8 +242,8 @@ void add_fences(nb::module_& module) {
       .def("carry", &FenceIndex::carry,
            nb::sig("def carry(self, source: Fences, keys: dynhull.keys.Keys) -> numpy.typing.NDArray[numpy.bool_]"),
            "source"_a, "keys"_a, "Let keys that were removed there and are new here have moved.")
-      .def("take", &FenceIndex::take, nb::sig("def take(self) -> typing.Any"),
-           "What has crossed since the last call: fences, changes, causes, keys, places, previous, distances.")
+      .def("take", &FenceIndex::take, nb::sig("def take(self) -> tuple[bytes, bytes | None, bytes] | None"),
+           "What has crossed since the last call, as in `PackedCrossings`; None if nothing has.")
       .def("check", &FenceIndex::check, "Raise AssertionError if an invariant is broken.")
       .def_prop_ro("memory", &FenceIndex::memory, "The bytes that the index uses.");
 }

@@ -72,34 +72,36 @@ class Room {
   Py_buffer buffer_ = {};
 };
 
-// The columns of crossings of one revision, in the order of `Crossed` there and here.
+// Crossings of one revision: the columns of PackedCrossings, and what else `Crossed` has.
 class Columns {
+  static constexpr std::size_t ROW = 6 * sizeof(double) + 2;
+
  public:
-  explicit Columns(const nb::tuple& columns)
-      : fences_(columns[0]),
-        changes_(columns[1], fences_.size()),
-        causes_(columns[2], fences_.size()),
-        points_(columns[4], 2 * fences_.size()),
-        previous_(columns[5], 2 * fences_.size()),
-        distances_(columns[6], fences_.size()) {
-    crossed.count = fences_.size();
-    crossed.fences = fences_.data();
-    crossed.changes = changes_.data();
-    crossed.causes = causes_.data();
-    if (!columns[3].is_none()) crossed.lengths = lengths_.emplace(columns[3], crossed.count).data();
-    crossed.points = points_.data();
-    crossed.previous = previous_.data();
-    crossed.distances = distances_.data();
-    if (!columns[7].is_none()) crossed.event_times = event_times_.emplace(columns[7], crossed.count).data();
-    crossed.meant = nb::cast<std::uint8_t>(columns[8]);
-    crossed.stands_for = nb::cast<std::uint8_t>(columns[9]);
-    crossed.now = nb::cast<std::int64_t>(columns[10]);
-    crossed.hull = nb::cast<std::int64_t>(columns[11]);
-    crossed.kind = nb::cast<std::uint8_t>(columns[12]);
-    crossed.revision = nb::cast<std::int64_t>(columns[13]);
-    if (!columns[14].is_none())
-      for (const auto [fence, revision] : nb::cast<nb::dict>(columns[14]))
+  // `hull`: the place of the name of its hull among all.
+  Columns(const nb::tuple& of_revision, std::int64_t hull) : columns_(nb::cast<nb::tuple>(of_revision[0])[0]) {
+    const auto packed = nb::cast<nb::tuple>(of_revision[0]);
+    const std::size_t count = crossed.count = columns_.size() / ROW;
+    if (columns_.size() != count * ROW) throw nb::value_error("the columns have no whole number of rows");
+    crossed.fences = reinterpret_cast<const std::int64_t*>(columns_.data());
+    crossed.points = reinterpret_cast<const double*>(crossed.fences + count);
+    crossed.previous = crossed.points + 2 * count;
+    crossed.distances = crossed.previous + 2 * count;
+    crossed.changes = reinterpret_cast<const std::int8_t*>(crossed.distances + count);
+    crossed.causes = reinterpret_cast<const std::uint8_t*>(crossed.changes + count);
+    crossed.kind = packed[1].is_none() ? INTEGER_KEY : STRING_KEY;
+    if (!packed[1].is_none()) crossed.lengths = lengths_.emplace(packed[1], count).data();
+    crossed.hull = hull;
+    crossed.revision = nb::cast<std::int64_t>(of_revision[2]);
+    if (!of_revision[3].is_none())
+      for (const auto [fence, revision] : nb::cast<nb::dict>(of_revision[3]))
         crossed.areas.emplace(nb::cast<std::int64_t>(fence), nb::cast<std::int64_t>(revision));
+    if (!of_revision[4].is_none()) crossed.event_times = event_times_.emplace(of_revision[4], count).data();
+    if (!of_revision[5].is_none()) {
+      const auto swap = nb::cast<nb::tuple>(of_revision[5]);
+      crossed.meant = nb::cast<std::uint8_t>(nb::int_(swap[0]));
+      crossed.stands_for = nb::cast<std::uint8_t>(nb::int_(swap[1]));
+    }
+    crossed.now = nb::cast<std::int64_t>(of_revision[6]);
     for (std::size_t row = 0; row < crossed.count; ++row)
       if (crossed.changes[row] < -1 || crossed.changes[row] > 1) throw nb::value_error("no change of side");
   }
@@ -107,10 +109,7 @@ class Columns {
   Crossed crossed;
 
  private:
-  View<std::int64_t> fences_;
-  View<std::int8_t> changes_;
-  View<std::uint8_t> causes_;
-  View<double> points_, previous_, distances_;
+  View<char> columns_;
   std::optional<View<std::uint8_t>> lengths_;
   std::optional<View<std::int64_t>> event_times_;
 };
@@ -137,15 +136,26 @@ void look_up(Told& told, const Numbers& places, const nb::object& lasts, const n
   }
 }
 
-nb::tuple numbered(const nb::list& waiting, const nb::bytes& types, const Numbers& places, const nb::object& lasts,
-                   const nb::object& times) {
+// The place of an object in a tuple.
+std::int64_t place_in(const nb::tuple& names, nb::handle name) {
+  for (std::size_t place = 0; place < names.size(); ++place)
+    if (names[place].is(name) || names[place].equal(name)) return static_cast<std::int64_t>(place);
+  throw nb::value_error("a hull that is not among the names");
+}
+
+nb::tuple numbered(const nb::list& waiting, const nb::tuple& names, const nb::bytes& types, const Numbers& places,
+                   const nb::object& lasts, const nb::object& times) {
   if (types.size() != 3) throw nb::value_error("there are three changes of side");
   std::vector<Columns> columns;
   columns.reserve(waiting.size());
   std::vector<Crossed> crossed;
+  std::string keys;
   std::size_t count = 0;
   for (const nb::handle each : waiting) {
-    columns.emplace_back(nb::cast<nb::tuple>(each));
+    const auto of_revision = nb::cast<nb::tuple>(each);
+    const auto more = nb::cast<nb::bytes>(nb::cast<nb::tuple>(of_revision[0])[2]);
+    keys.append(more.c_str(), more.size());
+    columns.emplace_back(of_revision, place_in(names, of_revision[1]));
     crossed.push_back(columns.back().crossed);
     count += crossed.back().count;
   }
@@ -163,7 +173,8 @@ nb::tuple numbered(const nb::list& waiting, const nb::bytes& types, const Number
   std::vector<std::int64_t> table;
   for (const auto* column : {&told.fences, &told.places, &told.lasts, &told.times, &told.made, &told.changes})
     table.insert(table.end(), column->begin(), column->end());
-  return nb::make_tuple(bytes(runs.data(), runs.size()), rows, bytes(table.data(), table.size()));
+  return nb::make_tuple(bytes(runs.data(), runs.size()), rows, bytes(keys.data(), keys.size()),
+                        bytes(table.data(), table.size()));
 }
 
 nb::bytes encoded(const nb::object& runs, const nb::object& rows, const nb::bytes& keys, const nb::object& own,
@@ -397,10 +408,11 @@ NB_MODULE(_native, module) {
             return taken ? *taken : dynhull_server::value_of(numbers, key);  // KeyError
           },
           "key"_a);
-  module.def("numbered", &dynhull_server::numbered, "waiting"_a, "types"_a, "places"_a, "lasts"_a, "times"_a,
-             nb::sig("def numbered(waiting: list[tuple[object, ...]], types: bytes, places: Numbers, "
-                     "lasts: object, times: object) -> tuple[bytes, bytes, bytes]"),
-             "The events of crossings: the bytes of their runs, of themselves, and of what they say of their fences.");
+  module.def("numbered", &dynhull_server::numbered, "waiting"_a, "names"_a, "types"_a, "places"_a, "lasts"_a, "times"_a,
+             nb::sig("def numbered(waiting: list[typing.Any], names: tuple[str, ...], types: bytes, places: Numbers, "
+                     "lasts: object, times: object) -> tuple[bytes, bytes, bytes, bytes]"),
+             "The events of crossings: the bytes of their runs, of themselves, of their keys, and of what they say of "
+             "their fences.");
   module.def("encoded", &dynhull_server::encoded, "runs"_a, "rows"_a, "keys"_a, "own"_a, "names"_a, "more"_a,
              nb::sig("def encoded(runs: object, rows: object, keys: bytes, own: object, names: tuple[str, ...], "
                      "more: int) -> bytes"),

@@ -158,12 +158,12 @@ class Trip:
                     request.result = self._do(request)
             except Exception as error:  # any error is the answer to the caller
                 refuse(request, error)
-            if self.fences is not None:
-                self.applied |= self.fences.applied
-                self.torn |= self.fences.torn
+                if self.fences is not None:
+                    self.torn |= self.fences.torn
             if self.torn:  # later requests would see a part of a batch
                 break
         if self.fences is not None:
+            self.applied |= self.fences.applied
             self.fences.settle(self.requests)
 
     def alarmed(self, request: WriteBatch, applied: Applied, records: list[Record] | None) -> None:

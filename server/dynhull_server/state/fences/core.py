@@ -76,8 +76,8 @@ class FenceCore:
         places = {name: self._registry.reserve_hull() for name in sorted(births) if name not in hulls}
         legs = {name: Leg(name, hulls.get(name), keeps=self._keeps, fenced=True) for name in names}
         lines = [queue.line for queue in queues if queue.line is not None]
-        watched = sum(_watches(request) for request in requests if isinstance(request, CreateFence))
-        watched += sum(line.watches_new(name) for line in lines for name in places)
+        watched = sum([_watches(request) for request in requests if isinstance(request, CreateFence)]) if numbers else 0
+        watched += sum([line.watches_new(name) for line in lines for name in places]) if places else 0
         room = self._registry.reserve_watched(watched)
         ground = Ground(legs, lines, fences, numbers, self._registry.tallies, self._registry.limits.fences, room)
         return Trip(legs, requests, now, pause, places, FencePart(ground, requests))
@@ -140,13 +140,14 @@ class FenceCore:
             self._registry.give_back(0, part.creates)
         self._leave_room(part)
         looked_at = [request.fence for request in trip.requests if isinstance(request, PassTime)]  # perhaps too early
-        for fence in (*(leg.fence for leg in part.legs.values()), *looked_at):
+        for fence in (*[leg.fence for leg in part.legs.values()], *looked_at):
             if self._registry.fences.get(fence.name) is fence:
                 self._schedule.plan_fence(fence)
 
     def _leave_room(self, part: FencePart) -> None:
-        self._registry.give_back(0, watched=part.room)
-        part.room = 0
+        if part.room:
+            self._registry.give_back(0, watched=part.room)
+            part.room = 0
 
     # Commits
 

@@ -130,7 +130,7 @@ class PastFence:
         hull.state.repeat(record)
         hull.counts = hull.state.counts
         crossings = self._fence.subjects[hull.name].take()
-        assert not crossings.changes.any(), "no key changes sides"
+        assert crossings is None or not crossings.unpack().changes.any(), "no key changes sides"
 
     def _part(self, *requests: CreateFence | PassTime) -> FencePart:
         """What a trip with these requests does to the fence."""

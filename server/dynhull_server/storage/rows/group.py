@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...state.changes import Change
 from ...state.feed_consumers import ConsumerId, DropFeedConsumer, FeedConsumer, PutFeedConsumer
+from ...state.fences.events.block import AppendEvents
 from ...state.records import Append, CommitStamp, Create, Delete, HullRow, HullSettings
 from ..port import NotCommittedError
 from .batch_rows import batch_checksum
@@ -225,6 +226,8 @@ class Group:
         match change:
             case Append():
                 self._append(change)
+            case AppendEvents():
+                self._fences.take(change)
             case Create():
                 self._create(change.row)
             case Delete():

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dynhull import Crossings
+from dynhull.crossings import PackedCrossings
 
 from ....compiled import native
 from ..index.subjects import Subjects
@@ -35,7 +35,7 @@ class EventLog:
     def add(
         self,
         subjects: Subjects,
-        crossings: Crossings,
+        packed: PackedCrossings,
         area_revisions: Mapping[str, int],
         swap: Swap | None,
         now: int,
@@ -43,8 +43,14 @@ class EventLog:
         """Make an event of each crossing; `swap` is a cause, and the one that it stands for."""
         if self._waiting and now < self._waiting[-1].now:  # of one fence the time of events never goes back
             self.settle()
-        revision, times = subjects.hull.state.counts.revision, subjects.times(crossings.keys)
-        self._waiting.append(Crossed(subjects, crossings, revision, area_revisions, times, swap, now))
+        hull, areas = subjects.hull, None
+        if area_revisions:
+            areas = {}
+            for number in packed.unpack().fences.tolist():
+                area = subjects.fences[number].area
+                areas[number] = 0 if area is None else area_revisions.get(area.name, 0)
+        times = subjects.times(packed.unpack().keys) if subjects.timed else None
+        self._waiting.append(Crossed(packed, hull.row.name, hull.state.counts.revision, areas, times, swap, now))
 
     def settle(self) -> None:
         """Give the events their numbers. O(n log n) for n events."""

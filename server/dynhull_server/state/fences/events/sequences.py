@@ -1,15 +1,16 @@
 """Crossings become events: they get their numbers and times, those of each fence after its last one."""
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynhull import Crossings
+from dynhull.crossings import PackedCrossings
 
 from ....compiled import Native
 from ...records import NO_TIME, Times
-from ..index.subjects import Subjects
 from ..model.records import Cause, EventType
 from ..model.tallies import Column, Tallies
 from .block import EVENT, RUN, Bytes, EventBlock, Integers, key_columns
@@ -19,7 +20,7 @@ Swap = tuple[Cause, Cause]
 # The type of an event by its change of side, -1 for the last one.
 TYPES = bytes((EventType.CROSS, EventType.ENTER, EventType.EXIT))
 TYPE_COLUMN = np.frombuffer(TYPES, np.uint8)
-NO_SWAP = 0, 0
+NO_AREAS: Mapping[int, int] = MappingProxyType({})
 
 
 class Told(NamedTuple):
@@ -50,30 +51,25 @@ class Told(NamedTuple):
 
 
 class Crossed(NamedTuple):
-    """Crossings of one revision, by fence, whose events have no numbers yet.
+    """Crossings of one revision, by fence, whose events have no numbers yet. The C++ of `numbered` takes it as it is.
 
     Attributes:
-        subjects: the hull of the subjects.
-        crossings: the crossings, at least one.
+        packed: the crossings.
+        hull: the name of the hull of the subjects.
         revision: the revision of that hull.
-        area_revisions: those of the hulls that are areas of its fences, by name.
+        areas: those of the hulls that are areas, by the numbers of the fences; None where none is.
         event_times: the times of the positions, or None.
         swap: a cause, and the one that it stands for.
         now: the time.
     """
 
-    subjects: Subjects
-    crossings: Crossings
+    packed: PackedCrossings
+    hull: str
     revision: int
-    area_revisions: Mapping[str, int]
+    areas: dict[int, int] | None
     event_times: Times | None
     swap: Swap | None
     now: int
-
-    def area_revision(self, number: int) -> int:
-        """The revision of the area of a fence, 0 where that is no hull."""
-        area = self.subjects.fences[number].area if self.area_revisions else None
-        return 0 if area is None else self.area_revisions.get(area.name, 0)
 
 
 def numbered(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> tuple[EventBlock, Told]:
@@ -83,9 +79,10 @@ def numbered(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> 
         waiting: the crossings, in the order in which they came.
         before: what was known of some fences, by ascending numbers.
     """
-    counts = [len(each.crossings) for each in waiting]
-    fences, changes = _column(waiting, "fences"), _column(waiting, "changes")
-    points, previous = _column(waiting, "points"), _column(waiting, "previous")
+    found = [each.packed.unpack() for each in waiting]
+    counts = [len(each) for each in found]
+    fences, changes = _column(found, "fences"), _column(found, "changes")
+    points, previous = _column(found, "points"), _column(found, "previous")
     n = len(fences)
     # Of each fence the events follow each other.
     order = fences.argsort(kind="stable")
@@ -110,27 +107,27 @@ def numbered(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> 
     ends = np.cumsum(counts)
     first = first_rows(fences, ends[:-1])
     moments = ends.searchsorted(first, "right")  # of each run, which crossings it is part of
-    names = tuple({each.subjects.hull.name: None for each in waiting})
-    keys = [key_columns(each.crossings.keys) for each in waiting]
+    names = tuple({each.hull: None for each in waiting})
+    keys = [key_columns(each.keys) for each in found]
     runs = np.empty(len(first), RUN)
     runs["fence"] = fences[first]
     runs["first"] = sequences[first]
     runs["count"] = sizes(first, n)
-    runs["hull"] = np.array([names.index(each.subjects.hull.name) for each in waiting])[moments]
+    runs["hull"] = np.array([names.index(each.hull) for each in waiting])[moments]
     runs["kind"] = np.array([kind for kind, _, _ in keys])[moments]
     runs["subject_revision"] = np.array([each.revision for each in waiting])[moments]
     runs["area_revision"] = 0
-    if any(each.area_revisions for each in waiting):
+    if any(each.areas for each in waiting):
         pairs = zip(fences[first].tolist(), moments.tolist(), strict=True)
-        runs["area_revision"] = [waiting[moment].area_revision(number) for number, moment in pairs]
+        runs["area_revision"] = [(waiting[moment].areas or NO_AREAS).get(number, 0) for number, moment in pairs]
     runs["time"] = times[first]
     rows = np.empty(n, EVENT)
     rows["type"] = TYPE_COLUMN[changes]
-    rows["causes"] = _joined([_caused(each.crossings.causes, each.swap) for each in waiting])
+    rows["causes"] = _joined([_caused(each.causes, of.swap) for each, of in zip(found, waiting, strict=True)])
     rows["length"] = np.frombuffer(b"".join([lengths for _, lengths, _ in keys]), np.uint8)
     rows["x"], rows["y"] = points.T
     rows["before_x"], rows["before_y"] = previous.T
-    rows["distance"] = np.where(np.isnan(points[:, 0]), np.nan, _column(waiting, "distances"))
+    rows["distance"] = np.where(np.isnan(points[:, 0]), np.nan, _column(found, "distances"))
     rows["event_time"] = rows["first_time"] = NO_TIME
     if any(each.event_times is not None for each in waiting):
         columns = (each.event_times for each in waiting)
@@ -140,45 +137,18 @@ def numbered(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> 
     return EventBlock(runs, rows, b"".join([data for _, _, data in keys]), names), told
 
 
-def numbered_natively(native: Native, waiting: Sequence[Crossed], tallies: Tallies) -> tuple[EventBlock, Told]:
+def numbered_natively(native: Native, waiting: list[Crossed], tallies: Tallies) -> tuple[EventBlock, Told]:
     """As `numbered`, after what is counted of the fences. O(n + runs log n)."""
-    names: dict[str, int] = {}
-    columns, keys = [], []
-    for each in waiting:
-        crossings, (meant, stands_for) = each.crossings, each.swap or NO_SWAP
-        kind, lengths, data = key_columns(crossings.keys)
-        keys.append(data)
-        areas = None
-        if each.area_revisions:
-            numbers = crossings.fences[first_rows(crossings.fences)].tolist()
-            areas = {number: each.area_revision(number) for number in numbers}
-        columns.append(
-            (
-                crossings.fences,
-                crossings.changes,
-                crossings.causes,
-                lengths,
-                crossings.points,
-                crossings.previous,
-                crossings.distances,
-                each.event_times,
-                int(meant),
-                int(stands_for),
-                each.now,
-                names.setdefault(each.subjects.hull.name, len(names)),
-                kind,
-                each.revision,
-                areas,
-            )
-        )
-    counted = tallies.columns
-    runs, rows, told = native.numbered(columns, TYPES, tallies.at, counted[Column.LAST], counted[Column.TIME])
-    block = EventBlock(np.frombuffer(runs, RUN), np.frombuffer(rows, EVENT), b"".join(keys), tuple(names))
+    names, counted = tuple(dict.fromkeys([each.hull for each in waiting])), tallies.columns
+    runs, rows, keys, told = native.numbered(
+        waiting, names, TYPES, tallies.at, counted[Column.LAST], counted[Column.TIME]
+    )
+    block = EventBlock(np.frombuffer(runs, RUN), np.frombuffer(rows, EVENT), keys, names)
     return block, Told(*np.frombuffer(told, np.int64).reshape(len(Told._fields), -1))
 
 
-def _column(waiting: Sequence[Crossed], name: str) -> Any:
-    return _joined([getattr(each.crossings, name) for each in waiting])
+def _column(found: Sequence[Crossings], name: str) -> Any:
+    return _joined([getattr(each, name) for each in found])
 
 
 def _joined(columns: list[Any]) -> Any:

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
-from dynhull import Crossings
 from dynhull.arrays import Points
+from dynhull.crossings import PackedCrossings
 
 from ...alarms.watched import Watched
 from ...batch import Applied
@@ -248,13 +248,17 @@ class Line:
 
     def alone(self, name: str) -> Subjects | None:
         """The keys of a hull, if fences compare them and nothing else of the line depends on it."""
-        return None if name in self.areas or name in self.pairs or name in self.alarms else self.subjects.get(name)
+        if (self.areas or self.pairs or self.alarms) and (
+            name in self.areas or name in self.pairs or name in self.alarms
+        ):
+            return None
+        return self.subjects.get(name)
 
     def area_revisions(self) -> dict[str, int]:
         """The revisions of the hulls that are areas of keys, by name."""
-        return {name: area.hull.state.counts.revision for name, area in self.areas.items()}
+        return {name: area.hull.state.counts.revision for name, area in self.areas.items()} if self.areas else {}
 
-    def changed(self, hulls: Iterable[Hull], doubting: dict[Fence, bool]) -> Iterator[tuple[Subjects, Crossings]]:
+    def changed(self, hulls: Iterable[Hull], doubting: dict[Fence, bool]) -> Iterator[tuple[Subjects, PackedCrossings]]:
         """The subjects whose side has changed, now that these hulls have; who has nothing to say costs nothing.
 
         Fences that may now be certain of others are added to those `doubting`, with whether their area has moved. It
@@ -277,7 +281,7 @@ class Line:
                 touched |= fence.subjects
         for _, subjects in sorted(touched.items()):
             crossings = subjects.take()
-            if len(crossings):
+            if crossings is not None:
                 yield subjects, crossings
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import Crossings, FenceIndex, KeyedHull
+from dynhull import FenceIndex, KeyedHull
 from dynhull.arrays import Points
+from dynhull.crossings import PackedCrossings, pack
 from dynhull.globe import Boundary, Gnomonic, project_hull
 from dynhull.keys import PackedKeys, key_list
 
@@ -79,24 +80,27 @@ class Subjects:
         """Add the area of a fence, or replace it; ValueError if it is invalid."""
         lay(self.index, number, config, vertices, frame=frame_of(self.hull.state), checked=checked)
 
-    def take(self, replaced: FenceConfig | None = None, area: Hull | None = None) -> Crossings:
-        """The crossings since they were last taken: in degrees and metres if the hull is geographic.
+    def take(self, replaced: FenceConfig | None = None, area: Hull | None = None) -> PackedCrossings | None:
+        """The crossings since they were last taken, None for none: in degrees and metres if the hull is geographic.
 
         Args:
             replaced: the settings of the only fence that may have been crossed, if it has new ones.
             area: the hull that is its area, None for other areas.
         """
-        crossings = self.index.take()
+        packed = self.index.take_packed()
         contents = self.hull.state.contents
         assert isinstance(contents, Keyed)
         if contents.mirror is None:
-            return crossings
+            return packed
         previous, strangers = contents.mirror.take_previous()
+        if packed is None:
+            return None
+        crossings = packed.unpack()
         if strangers:
             passed = np.array([key in strangers for key in key_list(crossings.keys)], np.bool_)
             crossings = some(crossings, np.flatnonzero((crossings.changes != 0) | ~passed))
         if not len(crossings):
-            return crossings
+            return None
         points = contents.hull.positions(crossings.keys)
         before = np.where(np.isnan(crossings.previous), np.nan, points)
         for row, key in enumerate(key_list(crossings.keys)):
@@ -110,7 +114,7 @@ class Subjects:
             away = (crossings.fences == number) & (distances == np.inf)
             if away.any():
                 distances[away] = self._metres(number, config, hull, points[away])
-        return replace(crossings, points=points, previous=before, distances=distances)
+        return pack(replace(crossings, points=points, previous=before, distances=distances))
 
     def bring(self, source: "Subjects", keys: Collection[Key]) -> None:
         """Take over where keys of another hull, which the index has carried, were on the globe."""
@@ -132,6 +136,13 @@ class Subjects:
         contents = self.hull.state.contents
         assert isinstance(contents, Keyed)
         return stored_times(contents.hull.times(keys)) if contents.timed else None
+
+    @property
+    def timed(self) -> bool:
+        """Whether the positions have times."""
+        contents = self.hull.state.contents
+        assert isinstance(contents, Keyed)
+        return contents.timed
 
     def clear(self, leg: "FenceLeg", keys: Keys, points: Points) -> npt.NDArray[np.bool_]:
         """Which keys that are there are on their side of a fence, which has been laid, by more than their accuracy.

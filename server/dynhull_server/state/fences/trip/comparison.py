@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynhull import Crossings
+from dynhull.crossings import PackedCrossings, pack
 from dynhull.keys import key_list
 
 from ...hull import Hull
@@ -104,16 +105,16 @@ class Comparison:
         """
         try:
             for line in self._lines:
-                alone = line.alone(hulls[0].name) if len(hulls) == 1 else None
+                alone = line.alone(hulls[0].row.name) if len(hulls) == 1 else None
                 if alone is not None:
                     found = alone.take()
-                    if len(found) or alone.delaying:
-                        self.cross(alone, found, line.area_revisions(), swap, now, changed.get(alone.hull.name))
+                    if found is not None or alone.delaying:
+                        self.cross(alone, found, line.area_revisions(), swap, now, changed.get(alone.hull.row.name))
                     continue
                 carried = carry(line.subjects, changed) if len(changed) > 1 else {}
                 for name, origins in carried.items():
                     self._take_over(line.subjects[name], origins)
-                crossed: dict[str, tuple[Subjects, Crossings | None]] = {
+                crossed: dict[str, tuple[Subjects, PackedCrossings | None]] = {
                     name: (line.subjects[name], None) for name in changed if name in line.subjects
                 }
                 doubting: dict[Fence, bool] = {}
@@ -142,7 +143,7 @@ class Comparison:
     def cross(
         self,
         subjects: Subjects,
-        crossings: Crossings | None,
+        packed: PackedCrossings | None,
         areas: Mapping[str, int],
         swap: Swap | None,
         now: int,
@@ -154,9 +155,11 @@ class Comparison:
 
         Those `doubting` may be certain of others now, with whether their areas have moved.
         """
-        crossed = set()
-        if crossings is not None and len(crossings):
-            if changed is not None and changed.expired and swap is not EXPIRY:  # which says it of all
+        crossed: set[Fence] = set()
+        expired = changed is not None and changed.expired and swap is not EXPIRY  # which says it of all
+        if packed is not None and (self._tallies.ruled or self.legs or origins or expired):
+            crossings = packed.unpack()
+            if changed is not None and expired:
                 crossings = with_expiries(crossings, changed.expired)
             apart = self._apart(crossings, origins)
             if apart is not None:
@@ -171,8 +174,9 @@ class Comparison:
                     else:
                         delay(leg, subjects, crossings, rows, swap, now, changed, own, moved=doubting.get(fence))
                 crossings = some(crossings, np.flatnonzero(~apart))
-            if len(crossings):
-                self.log.add(subjects, crossings, areas, swap, now)
+            packed = pack(crossings)
+        if packed is not None:
+            self.log.add(subjects, packed, areas, swap, now)
         for fence in list(subjects.delaying):
             if fence not in crossed and (
                 changed is not None or fence in doubting

@@ -163,8 +163,11 @@ class FencePart:
             if hull is not leg.after:  # it was not created after all
                 self._dismiss(hull.name)
         elif not applied.duplicate:
-            compared = any(hull.name in line.subjects for line in self.lines)
-            changed = {hull.name: of_batch(hull, applied, leg.records or ())} if compared else {}
+            name, changed = hull.row.name, {}
+            if self._ground.tallies.ruled or self._comparison.legs:  # nobody else asks what a batch has done to keys
+                for line in self.lines:
+                    if name in line.subjects:
+                        changed[name] = of_batch(hull, applied, leg.records or ())
             self._comparison.compare([hull], now, None, changed)
 
     def expired(self, hull: Hull, now: int) -> None:
@@ -282,10 +285,11 @@ class FencePart:
 
     def settle(self, requests: list[Request]) -> None:
         """Number the events, and remove the requests that are left for a later trip."""
-        for leg in self.legs.values():
+        legs = self._comparison.legs.values()
+        for leg in legs:
             follow(leg, leg.time(NO_TIME))
         self._comparison.log.settle()
-        self.events = self._block(self.legs.values())
+        self.events = self._block(legs)
         if self.left:
             del requests[-len(self.left) :]
 
@@ -304,10 +308,10 @@ class FencePart:
     def _block(self, legs: Iterable[FenceLeg]) -> EventBlock | None:
         """The events of crossings, then those of these legs; None for none."""
         crossed, of_legs = self._comparison.log.block(), {leg.fence.number: leg.events for leg in legs if leg.events}
+        if not of_legs:
+            return crossed
         found = [crossed] if crossed is not None else []
-        if of_legs:
-            found.append(block_of(of_legs))
-        return joined(found) if found else None
+        return joined([*found, block_of(of_legs)])
 
     def landed(self, fences: list[KeptFence | None]) -> bool:
         """Whether its changes were committed, given what the storage has of the examined fences."""
