@@ -5,11 +5,13 @@
 #include <string>
 #include <unordered_map>
 
+#include "../memory/hash.hpp"
 #include "strips.hpp"
 
 namespace dynhull {
 
-using Places = std::unordered_map<std::string, std::optional<Point>>;  // by key; none where the key is missing
+using Places =
+    std::unordered_map<std::string, std::optional<Point>, HashOfKey>;  // by key; none where the key is missing
 
 struct alignas(LINE) Fence {
   std::int64_t number = 0;

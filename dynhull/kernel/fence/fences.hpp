@@ -19,7 +19,7 @@ struct Departure {
   Point before;
   std::vector<std::int64_t> inside;
 };
-using Departures = std::unordered_map<std::string, Departure>;  // by key, as bytes
+using Departures = std::unordered_map<std::string, Departure, HashOfKey>;  // by key, as bytes
 // A subject that may be new, and where it comes from.
 struct Arrival {
   std::uint32_t slot;
@@ -106,7 +106,7 @@ class Fences {
     reports_.ready();
     Departures found;
     if (reports_.absent.empty()) return found;
-    const std::unordered_set<std::string_view> asked(keys.begin(), keys.end());
+    const std::unordered_set<std::string_view, HashOfKey> asked(keys.begin(), keys.end());
     for (const Reports::Gone& gone : reports_.absent) {
       if (gone.cause != REMOVED || gone.done || gone.given || (gone.fresh && !gone.carried)) continue;
       std::string key = reports_.key_of(gone);

@@ -360,10 +360,10 @@ class Reports {
   // Gives subjects that have come back under their key what was known of them.
   void return_gone() {
     if (absent.empty()) return;
-    std::unordered_map<std::string, std::uint32_t> slots;
+    std::unordered_map<std::string, std::uint32_t, HashOfKey> slots;
     for (std::size_t i = 0; i < changes.size(); ++i)
       if (changes[i].fresh && current(i)) slots.emplace(key_of(changes[i].slot), changes[i].slot);
-    std::unordered_map<std::string, std::size_t> last;
+    std::unordered_map<std::string, std::size_t, HashOfKey> last;
     for (std::size_t i = 0; i < absent.size(); ++i) last[key_of(absent[i])] = i;
     // All is kept by the last time that the key was there, the first place included.
     for (std::size_t i = absent.size(); i-- > 0;) {

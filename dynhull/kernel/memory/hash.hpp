@@ -1,10 +1,11 @@
-// Seeded hashes of keys and places. Nobody outside can choose keys that collide, because the seed differs from process
-// to process.
+// Seeded hashes of keys and places. Nobody outside can choose keys that collide, because the seeds differ from process
+// to process. There is one on each side of a product: who knows one side can make it zero, whatever is on the other.
 //
 // The mixing step, a product of 128 bits folded to 64, and the way to read short strings are those of wyhash (Wang Yi
 // 2019).
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -33,19 +34,19 @@ inline std::uint64_t folded_product(std::uint64_t a, std::uint64_t b) {
 
 class Hash {
  public:
-  static std::uint32_t of(std::uint64_t key) { return shortened(folded_product(key ^ seed_, ODD[0])); }
+  static std::uint32_t of(std::uint64_t key) { return shortened(folded_product(key ^ seeds_[0], seeds_[1])); }
 
   static std::uint32_t of(Point place) {
     const auto x = std::bit_cast<std::uint64_t>(place.x), y = std::bit_cast<std::uint64_t>(place.y);
-    return shortened(folded_product(x ^ seed_, std::rotl(y, 32) ^ ODD[0]));
+    return shortened(folded_product(x ^ seeds_[0], std::rotl(y, 32) ^ seeds_[1]));
   }
 
   static std::uint32_t of(std::string_view key) {
     const char* data = key.data();
     const std::size_t size = key.size();
-    std::uint64_t state = seed_;
+    std::uint64_t state = seeds_[0];
     for (std::size_t rest = size; rest > 16; rest -= 16, data += 16)
-      state = folded_product(eight(data) ^ ODD[1], eight(data + 8) ^ state);
+      state = folded_product(eight(data) ^ seeds_[2], eight(data + 8) ^ state);
     const char* const end = key.data() + size;
     std::uint64_t a = 0, b = 0;
     if (size >= 16) {
@@ -60,11 +61,11 @@ class Hash {
     } else if (size > 0) {
       a = byte(data) << 16 | byte(data + size / 2) << 8 | byte(end - 1);
     }
-    return shortened(folded_product(a ^ ODD[0] ^ size, b ^ state));
+    return shortened(folded_product(a ^ seeds_[1] ^ size, b ^ state));
   }
 
  private:
-  static constexpr std::uint64_t ODD[] = {0xa0761d6478bd642f, 0xe7037ed1a0b428db};
+  using Seeds = std::array<std::uint64_t, 3>;
 
   static std::uint64_t eight(const char* data) {
     std::uint64_t value;
@@ -81,14 +82,22 @@ class Hash {
   static std::uint32_t shortened(std::uint64_t hash) { return static_cast<std::uint32_t>(hash ^ (hash >> 32)); }
 
 #ifdef DYNHULL_HASH_SEED
-  static constexpr std::uint64_t seed_ = DYNHULL_HASH_SEED;  // the fuzzer's, so that a life can be lived again
+  // The fuzzer's, so that a life can be lived again.
+  static constexpr Seeds seeds_ = {DYNHULL_HASH_SEED, 0xa0761d6478bd642f, 0xe7037ed1a0b428db};
 #else
-  static std::uint64_t random_seed() {
+  static Seeds random_seeds() {
     std::random_device entropy;
-    return std::uint64_t{entropy()} << 32 | entropy();
+    Seeds seeds;
+    for (std::uint64_t& seed : seeds) seed = std::uint64_t{entropy()} << 32 | entropy() | 1;
+    return seeds;
   }
-  static inline const std::uint64_t seed_ = random_seed();
+  static inline const Seeds seeds_ = random_seeds();
 #endif
+};
+
+// For the tables of the standard library, whose own hash has a seed that everybody knows.
+struct HashOfKey {
+  std::size_t operator()(std::string_view key) const { return Hash::of(key); }
 };
 
 }  // namespace dynhull

@@ -12,6 +12,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "../../../dynhull/kernel/memory/hash.hpp"
 #include "records.hpp"
 
 namespace dynhull_server {
@@ -51,7 +52,7 @@ class Wanted {
     return static_cast<std::size_t>((last ^ key.size()) * 0x9e3779b97f4a7c15 >> (64 - HOLES));
   }
 
-  std::unordered_set<std::string_view> keys_;
+  std::unordered_set<std::string_view, dynhull::HashOfKey> keys_;
   std::bitset<std::size_t(1) << HOLES> sieve_;
 };
 

@@ -3,9 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <string_view>
 #include <vector>
+
+#include "../../../dynhull/kernel/memory/hash.hpp"
 
 namespace dynhull_server {
 
@@ -20,9 +21,8 @@ class KeyCodes {
 
   // The number of a key: 0 for the first one, and one more for each that is new.
   std::int32_t code(std::string_view key) {
-    const std::size_t hash = std::hash<std::string_view>{}(key);
-    const auto tag = static_cast<std::uint32_t>(hash >> 32);
-    for (std::size_t at = hash & (slots_.size() - 1);; at = (at + 1) & (slots_.size() - 1)) {
+    const std::uint32_t tag = dynhull::Hash::of(key);
+    for (std::size_t at = tag & (slots_.size() - 1);; at = (at + 1) & (slots_.size() - 1)) {
       Slot& slot = slots_[at];
       if (slot.code < 0) {
         slot = {tag, static_cast<std::int32_t>(keys_.size())};

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -114,10 +113,9 @@ class LastPlaces {
     const std::size_t length = kind_ == OF_STRINGS ? static_cast<std::uint8_t>(lengths[row]) : sizeof(std::uint64_t);
     const std::string_view key = text.substr(at, length);
     at += length;
-    const std::size_t hash = std::hash<std::string_view>{}(key);
     texts_.push_back(key);
     Move& move = moves_.emplace_back();
-    move.hash = static_cast<std::uint32_t>(hash ^ hash >> 32);
+    move.hash = dynhull::Hash::of(key);
     move.op = op;
     return move;
   }
