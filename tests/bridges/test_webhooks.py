@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import slow
 from command_line import dynhull
 from metrics import scrape
 from patience import PATIENCE, wait_until
@@ -264,6 +265,7 @@ def test_sigterm_ends_a_pause(client: HullClient, address: str, name: str, endpo
     assert acknowledged(client, name) == 0
 
 
+@slow
 @pytest.mark.long
 def test_a_watcher_that_the_server_gave_up_delivers_nothing_twice(tmp_path: Path, endpoint: Receiver) -> None:
     hold, total = threading.Event(), 4000

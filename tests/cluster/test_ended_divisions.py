@@ -3,6 +3,7 @@
 import asyncio
 
 import numpy as np
+import pytest
 from live_engine import engine_in_memory, insert
 from patience import PATIENCE
 
@@ -29,6 +30,8 @@ async def left_when_closed(turns: int) -> list[str]:
     return [str(each.get_coro()) for each in asyncio.all_tasks() - {asyncio.current_task()}]
 
 
-def test_whenever_it_is_closed_nothing_goes_on() -> None:
-    for turns in range(0, 400, 2):
+@pytest.mark.every(4)
+@pytest.mark.parametrize("first", range(0, 8, 2))
+def test_whenever_it_is_closed_nothing_goes_on(first: int) -> None:
+    for turns in range(first, 400, 8):
         assert asyncio.run(left_when_closed(turns)) == [], f"closed after {turns} turns"

@@ -11,7 +11,7 @@ from subprocess import CompletedProcess
 
 import grpc
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from cluster import processes
 from command_line import dynhull
 from forked import COMMAND
@@ -59,6 +59,7 @@ def joined(wrap: Sequence[str], url: str, *options: str) -> CompletedProcess[str
     return finished([*wrap, COMMAND, "serve", "--port", "0", *machine(url, *options)])
 
 
+@slow
 def test_a_machine_that_others_cannot_reach_or_whose_clock_is_wrong_does_not_join(postgres: PostgreSQL) -> None:
     url = postgres.new_database()
     with server_process(*machine(url)) as server, HullClient(server.address) as client:

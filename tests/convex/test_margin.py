@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import slow
 
 from dynhull import DynamicHull
 from dynhull.margin import max_margin
@@ -17,6 +18,7 @@ def hard_margin(a, b):
     return 2 / size, weights / size, -machine.intercept_[0] / size
 
 
+@slow
 @pytest.mark.every(3)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(10))

@@ -356,7 +356,7 @@ def test_the_kernel_accepts_the_rings_that_the_reference_accepts(monkeypatch):
     """Rings on a small grid: most of them cross, touch, overlap or repeat corners."""
     random = np.random.default_rng(3)
     accepted = 0
-    for _ in range(3000):
+    for _ in range(1000):
         ring = random.integers(0, 4, (random.integers(2, 7), 2)).astype(float)
         if random.random() < 0.3:
             ring = np.vstack([ring, ring[:1]])
@@ -366,7 +366,7 @@ def test_the_kernel_accepts_the_rings_that_the_reference_accepts(monkeypatch):
             found.append(_outcome(ring))
         assert found[0] == found[1], ring
         accepted += isinstance(found[0], list)
-    assert accepted > 300
+    assert accepted > 100
 
 
 def _outcome(ring):

@@ -7,8 +7,8 @@ from collections import Counter
 import numpy as np
 import oracle
 import pytest
+from cases import one_of
 from globes import GEO_KEYED_HULLS, GEO_WINDOW_HULLS
-from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
@@ -224,7 +224,7 @@ def test_random_lives_of_windows(kind):
 
 def live(machine, make):
     case = type("Lives", (machine,), {"make": staticmethod(make)}).TestCase
-    case.settings = settings(stateful_step_count=20)
+    case.settings = one_of(2, stateful_step_count=20)
     case("runTest").runTest()
 
 

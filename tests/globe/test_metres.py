@@ -95,7 +95,7 @@ def test_fences_of_the_kernel_and_of_the_reference(kind):
     indexes = [FenceIndex(hull, frame) for hull in hulls]
     keys, seen = np.arange(150, dtype=np.uint64), 0
     places = middle + random.normal(size=(150, 2)) * 2e-3 * stretch
-    for step in range(24):
+    for step in range(12):
         for fence in range(3):
             if step % 4 == fence:
                 corners = middle + random.normal(size=(30, 2)) * 1e-3 * stretch

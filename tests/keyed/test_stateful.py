@@ -6,8 +6,8 @@ from math import isnan, nan
 import numpy as np
 import oracle
 import pytest
+from cases import one_of
 from hulls import KEYED_HULLS
-from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from inputs import point
@@ -233,7 +233,7 @@ class KeyedMachine(RuleBasedStateMachine):
 
 def machine(make):
     case = type("Case", (KeyedMachine,), {"make": make}).TestCase
-    case.settings = settings(stateful_step_count=30)
+    case.settings = one_of(2, stateful_step_count=30)
     return case
 
 

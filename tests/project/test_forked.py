@@ -9,6 +9,7 @@ from typing import Any
 
 import forked
 import pytest
+from cases import slow
 
 from dynhull_cluster import child_process
 from dynhull_cluster.storages.choice import storage_kind
@@ -28,6 +29,7 @@ main()
 """
 
 
+@slow
 def test_a_server_imports_nothing_of_ours_after_the_fork() -> None:
     """Once a module that it runs was missing there: each of a thousand servers took three times as long."""
     command = [sys.executable, "-X", "importtime", "-c", SERVE]
@@ -66,6 +68,7 @@ print([module for module in sys.modules if module not in before and module.start
 """
 
 
+@slow
 @pytest.mark.parametrize(
     ("settings", "roles"),
     [

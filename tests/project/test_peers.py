@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cases import slow
 
 ROOT = Path(__file__).parents[2]
 NEEDY = ["tests/deploy/test_kit.py", "-k", "configuration or alerts", "-n", "0", "-p", "no:cacheprovider"]
@@ -14,6 +15,7 @@ NEEDY = ["tests/deploy/test_kit.py", "-k", "configuration or alerts", "-n", "0",
 NAMED = "no promtool: install Debian's package prometheus (see `make peers`)"
 
 
+@slow
 @pytest.mark.parametrize(("required", "code", "counted"), [("", 0, f"Skipped: {NAMED}: 2 tests"), ("1", 1, "2 failed")])
 def test_without_promtool(tmp_path: Path, required: str, code: int, counted: str) -> None:
     environment = {**os.environ, "PATH": str(tmp_path), "DYNHULL_REQUIRE_PEERS": required}

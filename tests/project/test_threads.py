@@ -37,6 +37,7 @@ finally:
 """
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("before", "call"),
     [

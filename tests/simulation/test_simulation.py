@@ -18,8 +18,8 @@ from simulation.schedule import Schedule
 from simulation.shrink import LEAST, shrunk
 
 FINDINGS = sorted((Path(__file__).parent / "findings").glob("*.json"))
-# Plans of each layer, two seconds together; `make simulate` has more.
-PLANS = {"core": 60, "shell": 12, "sqlite": 3, "past": 12, "cluster": 20, "links": 10}
+# Plans of each layer, a few seconds together; `make simulate` has more.
+PLANS = {"core": 30, "shell": 6, "sqlite": 2, "past": 6, "cluster": 10, "links": 5}
 # The first seed: other plans than those of the command line.
 FIRST = 5 * 10**6
 # Faults that are found in a second, one in the pure state and one in a cluster; `make soak` has all of them.

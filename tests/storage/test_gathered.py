@@ -7,8 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from cases import one_of
 from folders import same
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dynhull.keys import PackedKeys
@@ -139,7 +140,7 @@ def require_same(hull, records, after, batches):
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(steps=STEPS, after=st.integers(0, 10))
-@settings(max_examples=10, deadline=None)
+@one_of(6)
 def test_gathered_batches_lead_to_the_same_state(kind, steps, after):
     hull = KINDS[kind]
     records = lived(hull, steps)
@@ -156,7 +157,7 @@ def test_gathered_batches_lead_to_the_same_state(kind, steps, after):
     group_rows=st.sampled_from([1, 2, 3, 5, 2**14]),
     few=st.sampled_from([0, by_key.FEW, 2**20]),
 )
-@settings(max_examples=15, deadline=None)
+@one_of(6)
 def test_rows_by_key_lead_to_the_same_state(kind, steps, after, less, group_rows, few):
     """From any revision to any other one, wherever a group of rows ends, which may be amid those of a key."""
     hull = KINDS[kind]
@@ -252,7 +253,7 @@ def test_rows_of_keys_that_are_wanted_say_the_same_of_these(kind, steps, wanted)
 @pytest.mark.skipif(native is None, reason="C++ is not built")
 @pytest.mark.parametrize("kind", KINDS)
 @given(steps=STEPS, together=st.integers(1, 4), after=st.integers(0, 10), less=st.integers(0, 3))
-@settings(max_examples=15, deadline=None)
+@one_of(6)
 def test_last_places_lead_to_the_same_state(kind, steps, together, after, less):
     """From any revision to any other one, whatever the journal has in one row."""
     hull = KINDS[kind]

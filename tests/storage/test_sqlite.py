@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from cases import slow
 from folders import (
     DATABASE,
     LOG,
@@ -451,6 +452,7 @@ def test_many_that_are_inside_are_all_inside_after_a_start(folder):
     storage.close()
 
 
+@slow
 def test_fences_keep_the_order_of_their_events_over_many_commits(folder):
     """Beyond 131,072 runs of events, which are kept together at first. One fence is read earlier, one is deleted."""
     storage, _ = opened(folder)

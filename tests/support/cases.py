@@ -3,7 +3,13 @@
 import os
 
 import pytest
+from hypothesis import settings
 
 ALL_CASES = os.environ.get("CLUSTER_CASES") == "all"
 with_all_cases = pytest.mark.only_with("CLUSTER_CASES")  # many servers start, or again and again
 slow = pytest.mark.only_with("SLOW_CASES")  # tortures, fuzzers and the like, in short runs
+
+
+def one_of(many: int, **more: int) -> settings:
+    """One of so many examples of the profile, for properties whose examples take long: `make properties` has more."""
+    return settings(max_examples=max(settings.default.max_examples // many, 1), **more)

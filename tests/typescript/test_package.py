@@ -156,6 +156,7 @@ def test_points_beside_edges(count: int, tmp_path: Path) -> None:
     assert np.array_equal(sides, expected)
 
 
+@slow
 @pytest.mark.parametrize("way", ["gateway", "grpc"])
 def test_a_writer_and_a_watch_outlive_servers(way: str, server: MortalServer, gateway: Gateway) -> None:
     name = f"typescript/kills/{way}"

@@ -6,7 +6,7 @@ from math import inf, nextafter
 import numpy as np
 import oracle
 import pytest
-from hypothesis import settings
+from cases import one_of
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from inputs import point, points
@@ -156,7 +156,7 @@ class WindowMachine(RuleBasedStateMachine):
 
 def machine(make):
     case = type("Case", (WindowMachine,), {"make": make}).TestCase
-    case.settings = settings(stateful_step_count=30)
+    case.settings = one_of(2, stateful_step_count=30)
     return case
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from google.rpc.error_details_pb2 import ErrorInfo
 from google.rpc.status_pb2 import Status
 from grpc_status import rpc_status
@@ -408,6 +409,7 @@ def test_a_client_that_takes_too_long_is_told() -> None:
         assert (code, info.metadata["limit"]) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "max_watch_lag")
 
 
+@slow
 @pytest.mark.long
 @needs_proc
 def test_callers_that_leave_in_the_middle_leave_nothing_behind() -> None:

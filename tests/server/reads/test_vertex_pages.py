@@ -18,6 +18,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.engine.live_hull import LiveHull
 from dynhull_server.engine.steps import at_once
 from dynhull_server.engine.threads import Clock
+from dynhull_server.rpc import vertex_pages
 from dynhull_server.rpc.vertex_pages import VertexPages, page_token
 from dynhull_server.state.errors import PagesForgottenError
 
@@ -221,15 +222,16 @@ def test_pages_are_kept_for_a_minute_after_the_last() -> None:
     asyncio.run(check())
 
 
-def test_what_is_kept_for_pages_is_bounded() -> None:
-    """Of 64 MiB of vertices, those of the last revisions are kept."""
+def test_what_is_kept_for_pages_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a MiB of vertices, those of the last revisions are kept."""
+    monkeypatch.setattr(vertex_pages, "KEPT_BYTES", 2**20)
 
     async def check() -> None:
         pages, following = VertexPages(Clock()), []
         async with engine_in_memory() as engine:
-            await insert(engine, "a", parabola(2**19))
+            await insert(engine, "a", parabola(2**13))
             hull = engine.hulls.get("a")
-            for row in range(9):  # 8 MiB each
+            for row in range(9):  # 128 KiB each
                 following.append(await first_page(pages, hull))
                 await insert(engine, "a", np.array([[1.0, row + 2.0]]))
             with pytest.raises(PagesForgottenError):

@@ -24,7 +24,7 @@ from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 
 # `make fuzz-server` sends more.
-EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "8"))
+EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "4"))
 
 METHODS = list(pb.DESCRIPTOR.services_by_name["HullService"].methods)
 CODES = {

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from cases import one_of
 from hypothesis import given
 from hypothesis import strategies as st
 from quarantine_rules import SECOND, Model
@@ -99,6 +100,7 @@ def batches(draw):
     return rows, draw(st.lists(st.sampled_from(free), unique=True, max_size=1)) if free else []
 
 
+@one_of(2)
 @given(
     st.sampled_from([None, 0.5, 2.0, 0.1]),
     st.sampled_from([None, 1.0, 1.5, 4.0]),
