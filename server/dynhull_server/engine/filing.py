@@ -26,7 +26,7 @@ from .driver import Driver
 from .feed import HullFeeds
 from .live_hull import LiveHull
 from .past import PastHulls
-from .recalls import UNREADABLE
+from .recalls import UNREADABLE, past_refusal
 
 # The journal keeps what is after the older of two snapshots.
 SNAPSHOTS = 2
@@ -88,6 +88,7 @@ class Filing:
             HullUnsuitableError: the hull has one of the keys at present, or keeps its newest ones, or nothing of its
                 past is kept.
             NotStoredError: the storage has failed, and the past has the keys, as before.
+            PastDamagedError: a segment is damaged, and the past has the keys, as before.
             OutcomeUnknownError: it has failed, and perhaps they are erased.
         """
         if not self._storage.keeps:
@@ -125,8 +126,8 @@ class Filing:
             raise
         except NotCommittedError as error:
             raise not_stored(error) from error
-        except (*UNREADABLE, OSError) as error:
-            raise NotStoredError(words_for_callers(error)) from error
+        except UNREADABLE as error:
+            raise past_refusal(error) from error
         except Exception as error:
             raise OutcomeUnknownError(words_for_callers(error)) from error
         finally:

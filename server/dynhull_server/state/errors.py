@@ -10,6 +10,8 @@ def words(error: BaseException) -> str:
 
 def words_for_callers(error: BaseException) -> str:
     """The message of an error, without what only the operator of the server should read."""
+    if isinstance(error, OSError) and error.strerror:  # its message has the path of a file, too
+        return str(error.strerror)
     return getattr(error, "for_callers", "") or words(error)
 
 

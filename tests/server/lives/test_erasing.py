@@ -17,6 +17,7 @@ from dynhull_client import (
     HullUnsuitableError,
     InvalidRequestError,
     PermissionDeniedError,
+    UnavailableError,
 )
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
@@ -107,6 +108,22 @@ def test_a_key_is_erased_from_what_can_be_read_of_the_past(tmp_path):
     with server_process(*options) as server, HullClient(server.address) as client:
         assert [each.moves for each in client.history("fleet").erasures] == [31, 31, 31]
         assert not client.at("fleet", 12).positions([KEYS[0], KEYS[2], KEYS[3]]).present.any()
+
+
+def test_where_the_files_are_is_not_told_when_they_cannot_be_written(tmp_path):
+    with (
+        server_process("--data", str(tmp_path), complaints=None) as server,
+        HullClient(server.address) as client,
+    ):
+        client.create_hull("fleet", keyed="str", history=True)
+        write(client, "fleet", KEYS, 3)
+        client.remove("fleet", KEYS[:1])
+        (tmp_path / "history").write_text("in the way")
+        with pytest.raises(UnavailableError, match="File exists") as refused:
+            client.erase_history("fleet", KEYS[:1])
+        assert str(tmp_path) not in str(refused.value)
+        (tmp_path / "history").unlink()
+        assert client.erase_history("fleet", KEYS[:1]).moves == 4
 
 
 def test_it_takes_the_rights_to_write_and_to_read_the_past(tmp_path):

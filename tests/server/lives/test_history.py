@@ -29,6 +29,7 @@ from dynhull_server.storage.sqlite.storage import SQLiteStorage
 KEYS = [f"vehicle {i}" for i in range(40)]
 BATCHES = 12  # between two looks
 KILLS = 40
+HOLE = "a part of the past cannot be read"  # what the server says of it
 SNAPSHOTS = ("--snapshot-points", "200")
 
 
@@ -68,7 +69,8 @@ def test_the_past_is_dropped_by_the_time_of_its_commits_after_the_clock_was_set_
 
 
 def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_path):
-    with measured("--data", str(tmp_path), *SNAPSHOTS) as (server, metrics), HullClient(server.address) as client:
+    options = "--data", str(tmp_path), *SNAPSHOTS
+    with measured(*options, complaints=HOLE) as (server, metrics), HullClient(server.address) as client:
         client.create_hull("fleet", keyed="str", history="30d")
         write_until_filed(client, "fleet", 1)
         with ThreadPoolExecutor(8) as threads:
@@ -91,6 +93,10 @@ def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_pa
         found = scrape(metrics)
         assert found[f'dynhull_past_holes{{first="{int(first)}",hull="fleet",last="{int(last)}"}}'] == 1
         assert found['dynhull_past_reads_total{outcome="unreadable"}'] >= 1
+        client.remove("fleet", KEYS[:1])
+        with pytest.raises(PastDamagedError, match=f"revisions {int(first)} to {int(last)} cannot be read") as refused:
+            client.erase_history("fleet", KEYS[:1])
+        assert str(tmp_path) not in str(refused.value)
         newest.write_bytes(content)
         assert client.at("fleet", int(first)).positions(KEYS).positions.tolist() == positions(int(first)).tolist()
         assert not [name for name in scrape(metrics) if name.startswith("dynhull_past_holes")]
@@ -111,7 +117,10 @@ def test_what_was_written_faster_than_snapshots_come_is_in_segments_without_more
 
 
 def test_what_is_in_memory_or_a_part_of_a_file_does_not_hide_a_hole(tmp_path):
-    with measured("--data", str(tmp_path), *SNAPSHOTS) as (server, metrics), HullClient(server.address) as client:
+    with (
+        measured("--data", str(tmp_path), *SNAPSHOTS, complaints=HOLE) as (server, metrics),
+        HullClient(server.address) as client,
+    ):
         client.create_hull("fleet", keyed="str", history="30d")
         write_until_filed(client, "fleet", 1)
         client.at("fleet", 2).positions(KEYS)  # the batches stay in memory
@@ -129,7 +138,10 @@ def test_what_is_in_memory_or_a_part_of_a_file_does_not_hide_a_hole(tmp_path):
         file.write_bytes(content)
         client.track("fleet", KEYS[:1])
         assert hole in scrape(metrics), "a part of a file says nothing of the rest"
-    with measured("--data", str(tmp_path), *SNAPSHOTS) as (server, metrics), HullClient(server.address) as client:
+    with (
+        measured("--data", str(tmp_path), *SNAPSHOTS, complaints=HOLE) as (server, metrics),
+        HullClient(server.address) as client,
+    ):
         file.unlink()
         os.mkfifo(file)  # nobody writes to it
         with pytest.raises(UnavailableError, match=named):
@@ -142,7 +154,10 @@ def test_what_is_in_memory_or_a_part_of_a_file_does_not_hide_a_hole(tmp_path):
 
 
 def test_a_feed_ends_at_a_hole_with_its_revisions_and_goes_on_behind_it(tmp_path):
-    with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
+    with (
+        server_process("--data", str(tmp_path), *SNAPSHOTS, complaints=HOLE) as server,
+        HullClient(server.address) as client,
+    ):
         client.create_hull("fleet", keyed="str", history="30d")
         revision = write_until_filed(client, "fleet", 1)
         file = min(tmp_path.rglob("*.batches.parquet"))
@@ -162,7 +177,10 @@ def test_a_feed_ends_at_a_hole_with_its_revisions_and_goes_on_behind_it(tmp_path
 
 
 def test_a_feed_of_a_prefix_gives_what_is_before_a_hole_and_goes_on_behind_it(tmp_path):
-    with server_process("--data", str(tmp_path), *SNAPSHOTS) as server, HullClient(server.address) as client:
+    with (
+        server_process("--data", str(tmp_path), *SNAPSHOTS, complaints=HOLE) as server,
+        HullClient(server.address) as client,
+    ):
         client.create_hull("fleet", keyed="str", history="30d")
         write_until_filed(client, "fleet", 1)
         revision = write_until_filed(client, "fleet", client.history("fleet").batches + 1)

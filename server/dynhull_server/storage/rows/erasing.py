@@ -10,9 +10,9 @@ from dynhull.keys import key_list, take_keys
 
 from ...state.records import Contents, HeldRows, KeyRows, Keys, Record
 from ..past import Erasure
-from ..segments.archive import Archive
+from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.columns import columns_of
-from .filed import read_batches, read_state
+from .filed import named, read_batches, read_state
 from .filing import Due
 from .ledger import HullRows
 from .segment_rows import StoredSegment
@@ -49,14 +49,16 @@ class Erasing:
         for segment in self.hull.segments:
             if segment.first - 1 > self._until:
                 return
-            before = read_state(self.archive, segment) if segment.facts.state_bytes else None
+            with named(segment, STATE):
+                before = read_state(self.archive, segment) if segment.facts.state_bytes else None
             found = [] if before is None else [before.contents.keys, held_keys(before.contents)]
             in_state = any(self._among(keys).any() for keys in found if keys is not None)
             if before is not None and in_state:
                 before = replace(before, contents=self._without(before.contents))
                 self._first = min(self._first, segment.first - 1)
             moves = self._moves
-            batches = read_batches(self.archive, segment).between(segment.first - 1, segment.last)
+            with named(segment, BATCHES):
+                batches = read_batches(self.archive, segment).between(segment.first - 1, segment.last)
             records = [self._record(each) if each.revision <= self._until else each for each in batches]
             if in_state or self._moves > moves:
                 yield segment, Due(self.hull.row, columns_of(records, self.hull.row.settings.identity), before)

@@ -1,5 +1,6 @@
 """Reading hulls as they were before what the journal has: from segments."""
 
+import logging
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Set
 from concurrent.futures import Future
@@ -25,6 +26,8 @@ from .chunks import state_from
 from .ledger import HullRows
 from .past_rows import STEP_POINTS
 from .segment_rows import StoredSegment
+
+log = logging.getLogger(__name__)
 
 # Segments whose columns stay in memory, since what is read next is mostly in the same: these, and more of few rows, as
 # those of many hulls that are read in the order of their commits.
@@ -226,22 +229,35 @@ class Filed:
     @contextmanager
     def _named(self, segment: StoredSegment, end: str) -> Iterator[None]:
         """Say which revisions cannot be read without a file, and take note that it cannot."""
-        file, first, last = segment.file + end, segment.first, segment.last
-        what = f"revisions {first} to {last}" if end == BATCHES else f"the state at revision {first - 1}"
         try:
-            require_known(segment)
-            yield
+            with named(segment, end):
+                yield
         except StorageError as error:
             with self._turn:
-                self.unreadable.add(file)
-            why = "is missing or damaged" if isinstance(error, DamagedError) else words_for_callers(error)
-            plainly = f"{what} cannot be read: segment {segment.file} {why}"
-            raise type(error)(f"{what} cannot be read: {error}", for_callers=plainly) from error
+                told = segment.file + end in self.unreadable
+                self.unreadable.add(segment.file + end)
+            if not told:
+                log.warning("a part of the past cannot be read", extra={"reason": str(error)})
+            raise
 
     def _readable(self, file: str) -> None:
         """Take note that all of a file has been read: what is in memory, or a part of it, says nothing of the rest."""
         with self._turn:
             self.unreadable.discard(file)
+
+
+@contextmanager
+def named(segment: StoredSegment, end: str) -> Iterator[None]:
+    """Say which revisions cannot be read without a file."""
+    first, last = segment.first, segment.last
+    what = f"revisions {first} to {last}" if end == BATCHES else f"the state at revision {first - 1}"
+    try:
+        require_known(segment)
+        yield
+    except StorageError as error:
+        why = "is missing or damaged" if isinstance(error, DamagedError) else words_for_callers(error)
+        plainly = f"{what} cannot be read: segment {segment.file} {why}"
+        raise type(error)(f"{what} cannot be read: {error}", for_callers=plainly) from error
 
 
 def require_known(segment: StoredSegment) -> None:

@@ -450,12 +450,16 @@ class RowStorage(ABC):
                 gone = list(oldest_of_all(self._settled().hulls, archive.most_bytes))
             for number, segment in gone:
                 with self._visible:
-                    enough = excess(self._settled().hulls, archive.most_bytes) <= 0
+                    hulls = self._settled().hulls
+                    enough = excess(hulls, archive.most_bytes) <= 0
+                    name = hulls[number].row.name if number in hulls else None
+                if name is None:
+                    continue
                 if enough and segment.begins:  # hulls were deleted meanwhile
                     break
                 log.warning(
                     "the past of all hulls is more than --max-history-bytes: the oldest goes",
-                    extra={"hull": number, "first": segment.first, "last": segment.last, "bytes": segment.size},
+                    extra={"hull": name, "first": segment.first, "last": segment.last, "bytes": segment.size},
                 )
                 yield RetireSegment(number, segment)
         yield from self._remove_files(archive)
