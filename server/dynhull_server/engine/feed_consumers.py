@@ -24,6 +24,7 @@ from ..storage.port import NotCommittedError, Storage
 from .driver import Driver
 from .feed import HullFeeds
 from .live_hull import LiveHull
+from .outliving import Outliving
 from .positions import BEGINNING, Standing
 from .recalls import UNREADABLE
 
@@ -78,7 +79,7 @@ class FeedConsumers:
         self._creating = 0
         self._unsure: set[ConsumerId] = set()
         self._turns: dict[ConsumerId, tuple[asyncio.Lock, list[None]]] = {}
-        self._working: set[asyncio.Task[Any]] = set()
+        self._working = Outliving()
 
     def __len__(self) -> int:
         return len(self._there)
@@ -244,10 +245,7 @@ class FeedConsumers:
 
     async def _in_turn(self, ident: ConsumerId, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
         """Do work on a consumer that nothing else changes meanwhile. A caller that goes away does not end it."""
-        working = asyncio.get_running_loop().create_task(self._work(ident, work))
-        self._working.add(working)
-        working.add_done_callback(self._working.discard)
-        return await asyncio.shield(working)
+        return await self._working.run(self._work(ident, work))
 
     async def _work(self, ident: ConsumerId, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
         async with self._turn(ident):

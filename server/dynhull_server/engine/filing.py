@@ -25,6 +25,7 @@ from ..storage.port import NotCommittedError, Storage
 from .driver import Driver
 from .feed import HullFeeds
 from .live_hull import LiveHull
+from .outliving import Outliving
 from .past import PastHulls
 from .recalls import UNREADABLE, past_refusal
 
@@ -56,7 +57,7 @@ class Filing:
         self._pasts = pasts
         self._feeds = feeds
         self._turn = asyncio.Lock()
-        self._erasing: set[asyncio.Task[Erasure | None]] = set()
+        self._erasing = Outliving()
         self.unsure: set[Hull] = set()
 
     async def round(self) -> None:
@@ -78,7 +79,7 @@ class Filing:
         hull.row = row
 
     async def erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
-        """Erase keys from the past of a hull, even if the caller goes away. None if it has none of them.
+        """Erase keys from the past of a hull. None if it has none of them. What has begun goes on without its caller.
 
         What the journal has is filed first, so that it has nothing of them any more. The journal of a hull without a
         history forgets all of its past.
@@ -99,27 +100,31 @@ class Filing:
         if window is not None and window.max_points:
             reason = f"keeps its {window.max_points} newest: those that a key has pushed out would seem to have stayed"
             raise HullUnsuitableError(hull.name, f"{reason}. Shorten its history instead", field="keys")
-        erasing = asyncio.get_running_loop().create_task(self._erase(hull, keys))
-        self._erasing.add(erasing)
-        erasing.add_done_callback(self._erasing.discard)
-        return await asyncio.shield(erasing)
+        await self._turn.acquire()  # who goes away before has asked for nothing: their keys would keep others waiting
+        return await self._erasing.run(self._erase(hull, keys))
 
     async def _erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
+        """Erase keys, and end the turn."""
+        try:
+            return await self._erase_in_turn(hull, keys)
+        finally:
+            self._turn.release()
+
+    async def _erase_in_turn(self, hull: LiveHull, keys: Keys) -> Erasure | None:
         unsaved = hull.unsaved
         _, found = await hull.read(partial(_without, keys), rows=hull.counts.points)
         if not isinstance(found, Kept):
             reason = f"has the key {found!r} now: remove it first, since what is erased is the past"
             raise HullUnsuitableError(hull.name, reason, field="keys")
         try:
-            async with self._turn:
-                for _ in range(SNAPSHOTS):
-                    steps = self._storage.snapshot(hull.number, found)
-                    await self._driver.commit_steps(steps, self._driver.on_disk)
-                hull.saved(unsaved)
-                before = await self._erasures(hull)
-                steps = self._storage.erase(hull.number, keys, found.revision, self._driver.commit_time())
-                await self._driver.commit_steps(steps, self._driver.in_history)
-                after = await self._erasures(hull)
+            for _ in range(SNAPSHOTS):
+                steps = self._storage.snapshot(hull.number, found)
+                await self._driver.commit_steps(steps, self._driver.on_disk)
+            hull.saved(unsaved)
+            before = await self._erasures(hull)
+            steps = self._storage.erase(hull.number, keys, found.revision, self._driver.commit_time())
+            await self._driver.commit_steps(steps, self._driver.in_history)
+            after = await self._erasures(hull)
         except KeyError:
             raise HullNotFoundError(hull.name) from None
         except NotStoredError:

@@ -31,6 +31,7 @@ from .fences import Fences
 from .filing import Filing
 from .layers import COPIES
 from .live_hull import LiveHull
+from .outliving import Outliving
 from .past import PastHull, PastHulls, Place
 from .positions import Standing, standing
 from .recalls import UNREADABLE, Recalls
@@ -73,7 +74,7 @@ class Hulls:
         self._copies = asyncio.Semaphore(COPIES)
         self._recalls = Recalls(storage, driver.on_disk)
         self._storage = storage
-        self._changing: set[asyncio.Task[None]] = set()
+        self._changing = Outliving()
         self._turn_of_settings = asyncio.Lock()
         self.pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
         self.filing = Filing(driver, storage, self.pasts, self.feeds)
@@ -177,10 +178,7 @@ class Hulls:
             self._require_history(name, hull.row.settings)
         elif not hull.row.settings.history:
             return self._live_hull(hull)
-        changing = asyncio.get_running_loop().create_task(self._set_history(hull, max_age, max_bytes))
-        self._changing.add(changing)
-        changing.add_done_callback(self._changing.discard)
-        await asyncio.shield(changing)
+        await self._changing.run(self._set_history(hull, max_age, max_bytes))
         return self._live_hull(hull)
 
     async def _set_history(self, hull: Hull, max_age: int, max_bytes: int) -> None:

@@ -1,0 +1,69 @@
+"""Callers that go away while keys are erased from the past of a hull. An engine without a server around it."""
+
+import asyncio
+import errno
+import gc
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from complaints import complaints_of
+from live_engine import LIMITS
+
+from dynhull.keys import PackedKeys
+from dynhull_server.engine.engine import Engine
+from dynhull_server.engine.supervisor import Supervisor
+from dynhull_server.engine.threads import Machine
+from dynhull_server.state.records import FOREVER, HullSettings
+from dynhull_server.storage.segments.archive import Archive
+from dynhull_server.storage.sqlite.storage import SQLiteStorage
+
+PATIENCE = 60
+
+
+class Full(SQLiteStorage):
+    """Keys are erased when that is permitted, and then the disk is full."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, archive=Archive(folder / "history"))
+        self.erased: list[Any] = []
+        self.begun, self.may_go_on = threading.Event(), threading.Event()
+
+    def erase(self, number: int, keys: Any, until: int, now: int) -> Iterator[Any]:
+        del number, until, now
+        self.erased.append(list(keys))
+        self.begun.set()
+        assert self.may_go_on.wait(PATIENCE)
+        raise OSError(errno.ENOSPC, "No space left on device", "a file of the server")
+        yield
+
+
+def test_who_goes_before_their_turn_has_asked_for_nothing_and_no_failure_is_left_over(tmp_path: Path) -> None:
+    async def life() -> None:
+        complaints = complaints_of(asyncio.get_running_loop())
+        storage, machine = Full(tmp_path), Machine()
+        supervisor = Supervisor(machine.clock, lambda _: None, pytest.fail)
+        engine = Engine(LIMITS, storage, supervisor, machine)
+        await engine.start(lambda *_: None)
+        await engine.hulls.create("fleet", HullSettings("str", history=FOREVER))
+        hull = engine.hulls.get("fleet")
+        first, second = (
+            asyncio.create_task(engine.hulls.filing.erase(hull, PackedKeys.pack([key]))) for key in ("a", "b")
+        )
+        assert await asyncio.to_thread(storage.begun.wait, PATIENCE)
+        for caller in (second, first):
+            caller.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await caller
+        storage.may_go_on.set()
+        with pytest.raises(Exception, match=r"^No space left on device$"):
+            await engine.hulls.filing.erase(hull, PackedKeys.pack(["c"]))
+        gc.collect()
+        assert not complaints
+        assert storage.erased == [["a"], ["c"]]
+        await supervisor.stop()
+        await engine.close()
+
+    asyncio.run(life())
