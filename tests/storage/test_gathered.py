@@ -31,7 +31,13 @@ from dynhull_server.storage.segments import by_key, parquet
 from dynhull_server.storage.segments import gathered as gathering
 from dynhull_server.storage.segments.columns import Batches, columns_of, joined
 from dynhull_server.storage.segments.gathered import gathered, key_codes
-from dynhull_server.storage.segments.parquet import from_parquet, keys_from_parquet, rows_from_parquet, to_parquet
+from dynhull_server.storage.segments.parquet import (
+    columns_of_keys,
+    from_parquet,
+    keys_from_parquet,
+    rows_from_parquet,
+    to_parquet,
+)
 
 LIMITS = Limits(10, 1000, 10, 10, 10**6)
 SECOND = 10**6
@@ -247,7 +253,7 @@ def test_rows_of_keys_that_are_wanted_say_the_same_of_these(kind, steps, wanted)
     same(changes_of_keys(found, keys), expected)
     assert np.unique(found.revision).tolist() == [each.revision for each in records]
     file = BytesIO(to_parquet(columns_of(records, hull.identity), {}))
-    same(changes_of_keys(keys_from_parquet(file, "a file", keys)[0], keys), expected)
+    same(changes_of_keys(columns_of_keys([keys_from_parquet(file, "a file", keys)]), keys), expected)
 
 
 @pytest.mark.skipif(native is None, reason="C++ is not built")

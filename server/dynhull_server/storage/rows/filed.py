@@ -19,9 +19,16 @@ from ..past import Found, Hole, Moment, created
 from ..port import DamagedError, StorageError
 from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.by_key import RowsByKey
-from ..segments.columns import Batches, SegmentColumns, contents_of, joined
+from ..segments.columns import Batches, contents_of
 from ..segments.gathered import gathered
-from ..segments.parquet import from_parquet, keys_from_parquet, rows_from_parquet, ways_from_parquet
+from ..segments.parquet import (
+    RowsOfKeys,
+    columns_of_keys,
+    from_parquet,
+    keys_from_parquet,
+    rows_from_parquet,
+    ways_from_parquet,
+)
 from .chunks import state_from
 from .ledger import HullRows
 from .past_rows import STEP_POINTS
@@ -109,35 +116,35 @@ class Filed:
     def key_changes(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What the batches of some segments do to some keys, from a revision on."""
         segments = _run(hull, after + 1, until)[:TOGETHER]
-        beside: Future[list[SegmentColumns | StorageError]] = Future()
+        beside: Future[list[RowsOfKeys | StorageError]] = Future()
         if len(segments) > 1:
             read = partial(self._rows_of_keys, segments[1::2], keys)
             Thread(target=_settle, args=(beside, read), name="read beside").start()
         here = self._rows_of_keys(segments[::2], keys)
-        found: list[SegmentColumns] = []
+        found: list[RowsOfKeys] = []
         for each in chain.from_iterable(zip_longest(here, beside.result() if len(segments) > 1 else ())):
             if isinstance(each, StorageError) and not found:
                 raise each
-            if not isinstance(each, SegmentColumns):  # what is before it comes first
+            if not isinstance(each, RowsOfKeys):  # what is before it comes first
                 break
             found.append(each)
         last = min(until, segments[len(found) - 1].last)
-        columns = joined(found, hull.row.settings.identity)
+        columns = columns_of_keys(found)
         return last, changes_of_keys(columns.between(after, last), keys)
 
-    def _rows_of_keys(self, segments: list[StoredSegment], keys: Keys) -> list[SegmentColumns | StorageError]:
+    def _rows_of_keys(self, segments: list[StoredSegment], keys: Keys) -> list[RowsOfKeys | StorageError]:
         """The rows of keys in some segments: of the first, and of others until that are many, or one fails."""
-        found: list[SegmentColumns | StorageError] = []
+        found: list[RowsOfKeys | StorageError] = []
         rows = 0
         for segment in segments:
             name = segment.file + BATCHES
             try:
                 with self._named(segment, BATCHES), self._archive.parts(name, segment.facts.wrote) as file:
-                    columns, _, _ = keys_from_parquet(file, name, keys)
+                    some = keys_from_parquet(file, name, keys)
             except StorageError as error:
                 return [*found, error]
-            found.append(columns)
-            rows += len(columns)
+            found.append(some)
+            rows += len(some.table)
             if rows >= STEP_POINTS:
                 break
         return found
@@ -290,7 +297,8 @@ def read_state(archive: Archive, segment: StoredSegment, keys: Keys | None = Non
         columns, about, told = from_parquet(archive.read(name, facts.state_wrote), name)
     else:
         with archive.parts(name, facts.state_wrote) as file:
-            columns, about, told = keys_from_parquet(file, name, keys)
+            some = keys_from_parquet(file, name, keys)
+        columns, about, told = columns_of_keys([some]), some.about, some.state
     kept, _ = state_from(told)
     contents = contents_of(columns, times=about["times"] == "True", deadlines=about["deadlines"] == "True")
     return replace(kept, revision=segment.first - 1, contents=contents)
