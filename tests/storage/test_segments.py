@@ -389,9 +389,9 @@ def test_what_is_read_of_a_few_keys_is_as_it_was_written_or_refused(tmp_path, bl
     storage = fleet.storage
     hull = storage._ledger.hulls[1]
     if not blocks:
-        hull.segments[:] = [
-            replace(each, facts=replace(each.facts, blocks="", state_blocks="")) for each in hull.segments
-        ]
+        hull.set_segments(
+            [replace(each, facts=replace(each.facts, blocks="", state_blocks="")) for each in hull.segments]
+        )
     segment = hull.segments[1]
     keys = PackedKeys.pack(KEYS[:1])
 

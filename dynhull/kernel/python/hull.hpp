@@ -344,12 +344,17 @@ class Hull {
     if (settled().plane().version() != asked_version_) queries_ = 0;
     asked_version_ = tree_.plane().version();
     queries_ += queries;
-    if (!index_.stale(tree_.plane(), queries_)) return;
+    if (!index_stale()) return;
     const WriteLock lock(lock_);
-    if (index_.stale(tree_.plane(), queries_)) index_.refresh(tree_.plane(), queries_);
+    if (!index_stale()) return;
+    if (!index_) index_ = std::make_unique<LocateIndex>();
+    index_->refresh(tree_.plane(), queries_);
+  }
+  bool index_stale() const {
+    return index_ ? index_->stale(tree_.plane(), queries_) : queries_ > LocateIndex::FIRST_PAYS;
   }
 
-  void forget_index() { index_ = LocateIndex(); }
+  void forget_index() { index_.reset(); }
 
   FramedTree tree_;
   ReadWriteLock lock_;
@@ -368,7 +373,7 @@ class Hull {
   }
 
   bool locate_range(const Point* points, std::size_t count, std::int8_t* where) const {
-    if (index_.fresh(tree_.plane())) return index_.locate(tree_.plane(), points, count, where);
+    if (index_ && index_->fresh(tree_.plane())) return index_->locate(tree_.plane(), points, count, where);
     Plain plain;
     for (std::size_t i = 0; i < count; ++i) {
       const Point p = plain(points[i]);
@@ -402,7 +407,7 @@ class Hull {
     for (std::size_t i = 0; i < near; ++i) where[rows[i]] = found[i];
   }
 
-  LocateIndex index_;
+  std::unique_ptr<LocateIndex> index_;  // made when it pays: most of ten thousand hulls have none
   std::uint64_t asked_version_ = 0, queries_ = 0;
 };
 

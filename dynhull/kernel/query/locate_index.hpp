@@ -14,12 +14,14 @@ namespace dynhull {
 
 class LocateIndex {
  public:
+  static constexpr std::uint64_t FIRST_PAYS = 200;  // of so many queries, whatever the hull
+
   bool fresh(const HullTree& tree) const { return version_ == tree.version(); }
 
   // Whether the number of queries since the hull's last change pays for a refresh. The chains cost about as much as one
   // query for each vertex, the boxes as much as BOXES_PAY queries.
   bool stale(const HullTree& tree, std::uint64_t queries) const {
-    return fresh(tree) ? !boxes_ && queries > BOXES_PAY : queries > vertices_ / 20 + 200;
+    return fresh(tree) ? !boxes_ && queries > BOXES_PAY : queries > vertices_ / 20 + FIRST_PAYS;
   }
 
   // O(h log n).

@@ -8,7 +8,6 @@ and what was read before is void.
 """
 
 from array import array
-from bisect import insort
 from collections import defaultdict
 from itertools import count
 from typing import Any
@@ -224,12 +223,12 @@ class Follower:
             if of in new:
                 new[of][1].chunks[number] = place
         for hull in ledger.hulls.values():
-            hull.snapshots = [each for each in hull.snapshots if each.id in there]
+            hull.set_snapshots(each for each in hull.snapshots if each.id in there)
         for number, snapshot in new.values():
             if 0 in snapshot.chunks:
                 raise DamagedError(f"{self._place}: a snapshot of hull {number} is damaged")
             hull = ledger.hulls[number]
-            hull.snapshots = sorted([*hull.snapshots, snapshot], key=lambda each: each.revision)
+            hull.set_snapshots((*hull.snapshots, snapshot))
 
     def _look_at_segments(self) -> dict[int, tuple[int, int]]:
         """The hull and the checksum of each row of segments. Notes the numbers in use, and which rows are to go."""
@@ -247,10 +246,10 @@ class Follower:
         new = array("q", (place for place, each in self._segments.items() if before.get(place) != each))
         for number, hull in self.ledger.hulls.items():
             for segment in [each for each in hull.segments if each.id in gone]:
-                hull.segments.remove(segment)
+                hull.drop_segment(segment)
                 self._weigh(hull, -segment_weight(segment_values(segment, number)))
             for stored in [each for each in hull.erasures if each.id in gone]:
-                hull.erasures.remove(stored)
+                hull.drop_erasure(stored)
                 self._weigh(hull, -segment_weight(erasure_values(stored, number)))
         for row in self._reader.some("segments", ", ".join(COLUMNS["segments"]), new):
             place, number, first, last, file, facts, checksum = row
@@ -260,9 +259,9 @@ class Follower:
             if segment_checksum(*row[:-1]) != checksum:
                 raise DamagedError(f"{self._place}: the row of the past of revisions {first} to {last} is damaged")
             if file:
-                insort(hull.segments, segment_from(place, first, last, file, facts), key=lambda each: each.first)
+                hull.set_segments((*hull.segments, segment_from(place, first, last, file, facts)))
             else:
-                hull.erasures.append(erasure_from(place, first, last, facts))
+                hull.add_erasure(erasure_from(place, first, last, facts))
             self._weigh(hull, segment_weight(row))
 
     def _weigh(self, hull: HullRows, more: int) -> None:

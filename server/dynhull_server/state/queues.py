@@ -97,7 +97,9 @@ class Queues:
         return None
 
     def add_fences(self, fences: Sequence[Fence]) -> None:
-        """Add the queues of fences that there are, and let those of their hulls be one."""
+        """Add the queues of fences that there are, and let those of their hulls be one. O(hulls), if there are any."""
+        if not fences:
+            return
         for fence in fences:
             if fence.row.config.kind == "prefix":
                 self.reserve_prefix(fence.name, fence.row.config.subjects)

@@ -132,7 +132,6 @@ class _Examination:
         self._compare(totals)
         for scanned in self._hulls.values():
             self._judge(scanned)
-            scanned.rows.segments.sort(key=lambda segment: segment.first)
         self._judge_fenced()
 
     def _totals(self) -> Totals | None:
@@ -161,7 +160,8 @@ class _Examination:
             text = texts.get(id(row.settings))
             if text is None:
                 text = texts[id(row.settings)] = settings_text(row.settings)
-            renewed = row_checksum(row, text)
+            # Of a whole row in the present format it is the one that is stored.
+            renewed = hull.checksum if hull.whole and hull.settings == text else row_checksum(row, text)
             if hull.whole:
                 self._renewed += renewed - hull.checksum
             rows = self._ledger.hulls[row.number] = HullRows(row, renewed)
@@ -177,7 +177,8 @@ class _Examination:
             elif _matches(stored, state, place, number, revision, chunks):
                 scanned.snapshots[place] = StoredSnapshot(place, revision, array("q", [MISSING]) * chunks)
             else:
-                scanned.rows.snapshots.append(StoredSnapshot(place, revision if isinstance(revision, int) else 0))
+                lost = StoredSnapshot(place, revision if isinstance(revision, int) else 0)
+                scanned.rows.set_snapshots((*scanned.rows.snapshots, lost))
 
     def _chunks(self) -> None:
         """Assign the chunks to their snapshots."""
@@ -350,10 +351,11 @@ class _Examination:
     def _judge_snapshots(self, scanned: _Scanned) -> int:
         """The revision of the newest intact snapshot, 0 if there is none."""
         hull = scanned.rows
-        lost = hull.snapshots[:]
+        if not (hull.snapshots or scanned.snapshots):
+            return 0
+        lost = [*hull.snapshots]
         lost += [snapshot for snapshot in scanned.snapshots.values() if MISSING in snapshot.chunks]
-        hull.snapshots += scanned.snapshots.values()
-        hull.snapshots.sort(key=lambda snapshot: snapshot.revision)
+        hull.set_snapshots((*hull.snapshots, *scanned.snapshots.values()))
         for snapshot in lost:
             text = f"the snapshot at revision {snapshot.revision} is damaged, and was dropped"
             self._findings.blame(hull, text, fatal=False)

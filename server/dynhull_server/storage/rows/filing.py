@@ -1,6 +1,6 @@
 """Filing: batches that the journal need not keep become segments; and which segments are to go."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ...state.records import FOREVER, NO_TIME, HullRow, Kept
@@ -104,14 +104,14 @@ def _about(row: HullRow, columns: SegmentColumns) -> dict[str, str]:
     }
 
 
-def outdated(hull: HullRows, now: int, archive: Archive) -> list[StoredSegment]:
+def outdated(hull: HullRows, now: int, archive: Archive) -> Sequence[StoredSegment]:
     """The segments of a hull that are kept for too long, are too many bytes, or lead nowhere.
 
     Those that are kept begin with a state, so what follows one goes with it.
     """
     settings = hull.row.settings
     if not settings.history:
-        return hull.segments[:]
+        return hull.segments
     age = min(settings.history, archive.most_age or FOREVER)
     oldest = 0 if age == FOREVER else now - age
     room = settings.history_bytes or FOREVER
@@ -146,7 +146,7 @@ def oldest_of_all(hulls: Mapping[int, HullRows], most_bytes: int) -> Iterator[tu
         for segment in hull.segments[: run_from_start(hull, 1)]:
             yield number, segment
             more -= segment.size
-            hull.segments.remove(segment)
+            hull.drop_segment(segment)
         if not hull.segments:
             del left[number]
 

@@ -1,6 +1,5 @@
 """Changes that are committed together: what they do to the rows, and to the ledger."""
 
-from bisect import insort
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -351,7 +350,7 @@ class Group:
             return
         keys = snapshot.id, step.number, snapshot.revision, len(snapshot.chunks)
         self.statements.append(Insert("snapshots", (*keys, step.state, checksum(step.state, *keys))))
-        self._effects.append(lambda: insort(now.rows.snapshots, snapshot, key=lambda each: each.revision))
+        self._effects.append(lambda: now.rows.set_snapshots((*now.rows.snapshots, snapshot)))
 
     def _drop_snapshot(self, step: DropSnapshot) -> None:
         now = self._hull(step.number)
@@ -360,7 +359,7 @@ class Group:
         now.gone.add(step.snapshot.id)
 
         def drop() -> None:
-            now.rows.snapshots.remove(step.snapshot)
+            now.rows.set_snapshots(each for each in now.rows.snapshots if each != step.snapshot)
             self._ledger.dead["chunks"].extend(step.snapshot.chunks)
 
         self.statements.append(Remove("snapshots", (step.snapshot.id,)))
@@ -384,7 +383,7 @@ class Group:
         values = segment_values(segment, now.rows.row.number)
         self._replace_segment(values)
         self._weigh(now, segment_weight(values))
-        self._effects.append(lambda: insort(now.rows.segments, segment, key=lambda each: each.first))
+        self._effects.append(lambda: now.rows.set_segments((*now.rows.segments, segment)))
 
     def _retire_segment(self, step: RetireSegment) -> None:
         now, segment = self._hull(step.number), step.segment
@@ -392,7 +391,7 @@ class Group:
             return
         self._replace_segment(unused_values(segment.id, segment.file))
         self._weigh(now, -segment_weight(segment_values(segment, step.number)))
-        self._effects.append(lambda: now.rows.segments.remove(segment))
+        self._effects.append(lambda: now.rows.drop_segment(segment))
         self._effects.append(lambda: self._ledger.dead["segments"].append(segment.id))
 
     def _erase(self, step: EraseKeys) -> None:
@@ -406,7 +405,7 @@ class Group:
         values = erasure_values(step.stored, step.number)
         self.statements.append(Insert("segments", values))
         self._weigh(now, segment_weight(values))
-        self._effects.append(lambda: now.rows.erasures.append(step.stored))
+        self._effects.append(lambda: now.rows.add_erasure(step.stored))
 
     def _drop_erasure(self, step: DropErasure) -> None:
         now = self._hull(step.number)
@@ -414,7 +413,7 @@ class Group:
             return
         self.statements.append(Remove("segments", (step.stored.id,)))
         self._weigh(now, -segment_weight(erasure_values(step.stored, step.number)))
-        self._effects.append(lambda: now.rows.erasures.remove(step.stored))
+        self._effects.append(lambda: now.rows.drop_erasure(step.stored))
 
     def _drop_dead_segment(self, place: int) -> None:
         dead = self._ledger.dead["segments"]

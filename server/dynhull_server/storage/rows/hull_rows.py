@@ -3,9 +3,9 @@
 import json
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...state.records import DEFAULT, HullRow, HullSettings, QuarantineRules, Window
 from .encoding import checksum
@@ -20,19 +20,20 @@ Values = tuple[int, str, str, float, str, int]
 SETTINGS_KEPT = 256
 
 
-@dataclass(frozen=True, slots=True)
-class FoundHull:
+class FoundHull(NamedTuple):
     """The row of a hull as found in a database.
 
     Attributes:
         row: the hull; without its settings if the row is damaged.
         checksum: the checksum stored with it.
         whole: whether the row is intact.
+        settings: the text of its settings, in formats that have one.
     """
 
     row: HullRow
     checksum: int
     whole: bool
+    settings: str | None = None
 
 
 def values(row: HullRow) -> Values:
@@ -89,7 +90,7 @@ def _of_format_2(number: int, name: str, uid: str, created: float, most: int, st
 
 def _of_format_3(number: int, name: str, uid: str, created: float, settings: str, stored: int) -> FoundHull:
     whole = _checksum(number, name, uid, created, settings) == stored
-    return FoundHull(HullRow(number, name, uid, created, settings_from(settings)), stored, whole)
+    return FoundHull(HullRow(number, name, uid, created, settings_from(settings)), stored, whole, settings)
 
 
 FORMATS: dict[int, tuple[str, Callable[..., FoundHull]]] = {

@@ -2,7 +2,7 @@
 
 from array import array
 from bisect import bisect_right
-from collections.abc import Set
+from collections.abc import Iterable, Set
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Self
@@ -72,9 +72,9 @@ class HullRows:
     firsts: "array[int]" = field(default_factory=lambda: array("q"))
     ids: "array[int]" = field(default_factory=lambda: array("q"))
     last: int = 0
-    snapshots: list[StoredSnapshot] = field(default_factory=list)
-    segments: list[StoredSegment] = field(default_factory=list)
-    erasures: list[StoredErasure] = field(default_factory=list)
+    snapshots: tuple[StoredSnapshot, ...] = ()
+    segments: tuple[StoredSegment, ...] = ()
+    erasures: tuple[StoredErasure, ...] = ()
 
     @property
     def oldest(self) -> int:
@@ -135,7 +135,7 @@ class HullRows:
 
     def copy(self) -> Self:
         """A copy of the present state."""
-        columns = self.firsts[:], self.ids[:], self.last, self.snapshots[:], self.segments[:], self.erasures[:]
+        columns = self.firsts[:], self.ids[:], self.last, self.snapshots, self.segments, self.erasures
         return type(self)(self.row, self.sum, *columns)
 
     def between(self, after: int, until: int) -> "array[int]":
@@ -172,6 +172,26 @@ class HullRows:
         self.ids.append(place)
         self.last = last
         self.sum += weight
+
+    def set_snapshots(self, snapshots: Iterable[StoredSnapshot]) -> None:
+        """Have these snapshots, given in any order."""
+        self.snapshots = tuple(sorted(snapshots, key=lambda each: each.revision))
+
+    def set_segments(self, segments: Iterable[StoredSegment]) -> None:
+        """Have these segments, given in any order."""
+        self.segments = tuple(sorted(segments, key=lambda each: each.first))
+
+    def drop_segment(self, segment: StoredSegment) -> None:
+        """Have no longer one of the segments."""
+        self.segments = tuple(each for each in self.segments if each != segment)
+
+    def add_erasure(self, stored: StoredErasure) -> None:
+        """Have one more erasure, the newest."""
+        self.erasures = (*self.erasures, stored)
+
+    def drop_erasure(self, stored: StoredErasure) -> None:
+        """Have no longer one of the erasures."""
+        self.erasures = tuple(each for each in self.erasures if each != stored)
 
     def drop(self, rows: int, weights: int) -> None:
         """Remove the oldest rows of batches."""

@@ -61,8 +61,10 @@ def read_each(reader: Reader, hulls: Sequence[HullRows]) -> Iterator[Kept]:
             yield read_hull(reader, hull, hull.last)
             continue
         kept = Kept()
-        with as_damage(hull):
+        try:
             _add_records(kept, hull, islice(rows, len(hull.ids)), hull.last)
+        except UnreadableError as error:
+            raise _unreadable(hull, error) from error
         yield kept
 
 
@@ -108,7 +110,11 @@ def as_damage(hull: HullRows) -> Iterator[None]:
     try:
         yield
     except UnreadableError as error:
-        raise DamagedError(f"hull {hull.row.name!r} cannot be read ({error}): restore a backup") from error
+        raise _unreadable(hull, error) from error
+
+
+def _unreadable(hull: HullRows, error: UnreadableError) -> DamagedError:
+    return DamagedError(f"hull {hull.row.name!r} cannot be read ({error}): restore a backup")
 
 
 def newest_snapshot(reader: Reader, hull: HullRows, until: int) -> Kept:

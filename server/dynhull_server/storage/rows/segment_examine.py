@@ -7,6 +7,7 @@ if, with the weight that it must have had, the sum is that of the totals.
 
 import re
 from bisect import bisect_left
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -87,6 +88,7 @@ class SegmentExamination:
         self._hulls = hulls
         self._damaged: list[tuple[Any, ...]] = []
         self._places: set[int] = set()
+        self._found: defaultdict[int, list[StoredSegment]] = defaultdict(list)  # that their hulls do not have yet
         self.newest = 0
         self.dead: list[int] = []
 
@@ -98,6 +100,7 @@ class SegmentExamination:
                 self._add(row)
             else:
                 self._damaged.append(row)
+        self._hand_out()
         self.newest = max(self._places, default=0)
 
     def explain(self, lacking: int, committed: int) -> list[Mended] | None:
@@ -132,9 +135,9 @@ class SegmentExamination:
             self.dead.append(place)
             return 0
         if file:
-            hull.segments.append(segment_from(place, first, last, file, facts))
+            self._found[number].append(segment_from(place, first, last, file, facts))
         else:
-            hull.erasures.append(erasure_from(place, first, last, facts))
+            hull.add_erasure(erasure_from(place, first, last, facts))
         found = segment_weight(values)  # type: ignore[arg-type]  # a row has these columns
         hull.weigh(found)
         return found
@@ -189,8 +192,15 @@ class SegmentExamination:
             else:
                 values, text = self._lost(row, hull, committed), f"{text}: they cannot be read"
             step = MendSegment(row[0], values, self._add(values) - each.weight)
+            self._hand_out()
             found.append(Mended(hull, text, step, each.values is None))
         return found
+
+    def _hand_out(self) -> None:
+        """Give their hulls the segments that were found."""
+        for number, found in self._found.items():
+            self._hulls[number].set_segments((*self._hulls[number].segments, *found))
+        self._found.clear()
 
     def _lost(self, row: tuple[Any, ...], hull: HullRows, committed: int) -> Values:
         """A row that says which revisions there were, and which no file can satisfy."""
