@@ -20,7 +20,7 @@ class Numbers:
 
     def pop(self, key: int) -> int: ...
 
-def numbered(waiting: list[Any], names: tuple[str, ...], types: bytes, places: Numbers, lasts: object, times: object) -> tuple[bytes, bytes, bytes, bytes]:
+def numbered(waiting: list[Any], names: tuple[str, ...], types: bytes, places: Numbers, table: object, last: int, time: int) -> tuple[bytes, bytes, bytes, bytes]:
     """
     The events of crossings: the bytes of their runs, of themselves, of their keys, and of what they say of their fences.
     """
@@ -30,22 +30,22 @@ def encoded(runs: object, rows: object, keys: bytes, own: object, names: tuple[s
     Events as the bytes that are stored, without those of members and origins, whose flags are `more`.
     """
 
-def followed(runs: object, places: Numbers, lasts: object, news: Numbers) -> bool:
+def followed(runs: object, places: Numbers, table: object, last: int, news: Numbers) -> bool:
     """
     Whether each run follows the last event of its fence; if so, `news` has the new last events.
     """
 
-def own(runs: object, places: Numbers, subjects: object, names: tuple[int, ...]) -> bytes | None:
+def own(runs: object, places: Numbers, table: object, subjects: int, names: tuple[int, ...]) -> bytes | None:
     """
     Of which runs the hull is the one that the fence names; None if a fence does not exist.
     """
 
-def added(runs: object, places: Numbers, lasts: object, news: object, end: int, row: int) -> None:
+def added(runs: object, places: Numbers, table: object, last: int, news: object, end: int, row: int) -> None:
     """
     Add runs to the columns of new ones, and set the last events of their fences.
     """
 
-def counted(places: object, news: tuple[object, object, object, object], columns: tuple[object, object, object, object, object]) -> None:
+def counted(places: object, news: tuple[object, object, object, object], table: object, columns: tuple[int, int, int, int, int]) -> None:
     """
     Count events of fences at these places: two columns are set, two are added to, and the last is 1.
     """

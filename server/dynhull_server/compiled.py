@@ -55,8 +55,9 @@ class Native(Protocol):
         names: "tuple[str, ...]",
         types: bytes,
         places: "Any",
-        lasts: "npt.NDArray[Any]",
-        times: "npt.NDArray[Any]",
+        table: "npt.NDArray[Any]",
+        last: int,
+        time: int,
     ) -> "tuple[bytes, bytes, bytes, bytes]":
         """The bytes of runs, rows, keys and what is said of the fences: `numbered_natively` in state/fences."""
 
@@ -75,7 +76,8 @@ class Native(Protocol):
         self,
         runs: "npt.NDArray[Any]",
         places: "Any",
-        lasts: "npt.NDArray[Any]",
+        table: "npt.NDArray[Any]",
+        last: int,
         news: "Any",
     ) -> bool:
         """Whether runs follow the last events of their fences: `FenceRuns.follow` in storage/rows."""
@@ -84,7 +86,8 @@ class Native(Protocol):
         self,
         runs: "npt.NDArray[Any]",
         places: "Any",
-        subjects: "npt.NDArray[Any]",
+        table: "npt.NDArray[Any]",
+        subjects: int,
         names: "tuple[int, ...]",
     ) -> bytes | None:
         """`FenceRuns.own` in storage/rows; None if a fence does not exist."""
@@ -93,7 +96,8 @@ class Native(Protocol):
         self,
         runs: "npt.NDArray[Any]",
         places: "Any",
-        lasts: "npt.NDArray[Any]",
+        table: "npt.NDArray[Any]",
+        last: int,
         news: "npt.NDArray[Any]",
         end: int,
         row: int,
@@ -104,7 +108,8 @@ class Native(Protocol):
         self,
         places: "npt.NDArray[Any]",
         news: "tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]",
-        columns: "tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]",
+        table: "npt.NDArray[Any]",
+        columns: "tuple[int, int, int, int, int]",
     ) -> None:
         """`Tallies.take` in state/fences."""
 

@@ -72,6 +72,28 @@ class Room {
   Py_buffer buffer_ = {};
 };
 
+// The memory of an array of rows of integers, one of each fence, to be changed.
+class Table {
+ public:
+  explicit Table(const nb::object& source) {
+    if (PyObject_GetBuffer(source.ptr(), &buffer_, PyBUF_ND | PyBUF_WRITABLE) != 0) throw nb::python_error();
+    if (buffer_.ndim == 2 && buffer_.itemsize == Py_ssize_t(sizeof(std::int64_t))) return;
+    PyBuffer_Release(&buffer_);
+    throw nb::value_error("the table has no rows of integers");
+  }
+  Table(const Table&) = delete;
+  ~Table() { PyBuffer_Release(&buffer_); }
+
+  std::int64_t& at(std::int64_t place, std::size_t column) const {
+    if (place < 0 || place >= buffer_.shape[0] || column >= std::size_t(buffer_.shape[1]))
+      throw nb::value_error("a place outside of the table");
+    return static_cast<std::int64_t*>(buffer_.buf)[std::size_t(place) * std::size_t(buffer_.shape[1]) + column];
+  }
+
+ private:
+  Py_buffer buffer_ = {};
+};
+
 // Crossings of one revision: the columns of PackedCrossings, and what else `Crossed` has.
 class Columns {
   static constexpr std::size_t ROW = 6 * sizeof(double) + 2;
@@ -124,15 +146,12 @@ std::int64_t value_of(const Numbers& numbers, std::int64_t key) {
   throw nb::key_error(std::to_string(key).c_str());
 }
 
-// The last sequence and time of each fence, from its place in a column of each.
-void look_up(Told& told, const Numbers& places, const nb::object& lasts, const nb::object& times) {
-  const View<std::int64_t> of_lasts(lasts), of_times(times, of_lasts.size());
+// The last sequence and time of each fence, from its row in a table.
+void look_up(Told& told, const Numbers& places, const Table& table, std::size_t last, std::size_t time) {
   for (std::size_t i = 0; i < told.fences.size(); ++i) {
-    const auto place = static_cast<std::size_t>(value_of(places, told.fences[i]));  // KeyError if it is not there
-    if (place >= of_lasts.size()) throw nb::value_error("a place outside of the columns");
-    told.places[i] = static_cast<std::int64_t>(place);
-    told.lasts[i] = of_lasts.data()[place];
-    told.times[i] = of_times.data()[place];
+    told.places[i] = value_of(places, told.fences[i]);  // KeyError if it is not there
+    told.lasts[i] = table.at(told.places[i], last);
+    told.times[i] = table.at(told.places[i], time);
   }
 }
 
@@ -144,7 +163,7 @@ std::int64_t place_in(const nb::tuple& names, nb::handle name) {
 }
 
 nb::tuple numbered(const nb::list& waiting, const nb::tuple& names, const nb::bytes& types, const Numbers& places,
-                   const nb::object& lasts, const nb::object& times) {
+                   const nb::object& table, std::size_t last, std::size_t time) {
   if (types.size() != 3) throw nb::value_error("there are three changes of side");
   std::vector<Columns> columns;
   columns.reserve(waiting.size());
@@ -160,7 +179,7 @@ nb::tuple numbered(const nb::list& waiting, const nb::tuple& names, const nb::by
     count += crossed.back().count;
   }
   Told told(numbers_of(crossed));
-  look_up(told, places, lasts, times);
+  look_up(told, places, Table(table), last, time);
   nb::object rows = nb::steal(PyBytes_FromStringAndSize(nullptr, Py_ssize_t(count * sizeof(Event))));
   if (!rows.is_valid()) throw nb::python_error();
   auto* const events = reinterpret_cast<Event*>(PyBytes_AS_STRING(rows.ptr()));
@@ -170,11 +189,11 @@ nb::tuple numbered(const nb::list& waiting, const nb::tuple& names, const nb::by
     if (count >= MANY) release.emplace();
     number(crossed, static_cast<Types>(types.data()), told, runs, events);
   }
-  std::vector<std::int64_t> table;
+  std::vector<std::int64_t> said;
   for (const auto* column : {&told.fences, &told.places, &told.lasts, &told.times, &told.made, &told.changes})
-    table.insert(table.end(), column->begin(), column->end());
+    said.insert(said.end(), column->begin(), column->end());
   return nb::make_tuple(bytes(runs.data(), runs.size()), rows, bytes(keys.data(), keys.size()),
-                        bytes(table.data(), table.size()));
+                        bytes(said.data(), said.size()));
 }
 
 nb::bytes encoded(const nb::object& runs, const nb::object& rows, const nb::bytes& keys, const nb::object& own,
@@ -208,9 +227,10 @@ nb::bytes encoded(const nb::object& runs, const nb::object& rows, const nb::byte
 }
 
 // Takes note in `news` of the last events of fences, if each run follows the one before; otherwise changes nothing.
-bool followed(const nb::object& runs, const Numbers& places, const nb::object& lasts, Numbers& news) {
+bool followed(const nb::object& runs, const Numbers& places, const nb::object& table, std::size_t last_column,
+              Numbers& news) {
   const View<Run> of_runs(runs);
-  const View<std::int64_t> of_lasts(lasts);
+  const Table of_fences(table);
   Numbers found;
   found.reserve(of_runs.size());
   for (const Run& run : of_runs.values()) {
@@ -218,8 +238,8 @@ bool followed(const nb::object& runs, const Numbers& places, const nb::object& l
     if (!last) last = news.find(run.fence);
     if (!last) {
       const std::int64_t* const place = places.find(run.fence);
-      if (!place || static_cast<std::size_t>(*place) >= of_lasts.size()) return false;
-      last = of_lasts.data() + *place;
+      if (!place) return false;
+      last = &of_fences.at(*place, last_column);
     }
     if (run.first != *last + 1) return false;
     found.set(run.fence, *last + run.count);
@@ -233,11 +253,12 @@ bool followed(const nb::object& runs, const Numbers& places, const nb::object& l
   return true;
 }
 
-// Of which runs the hull is the one that the fence names; None if a fence does not exist. The columns have the names as
+// Of which runs the hull is the one that the fence names; None if a fence does not exist. The table has the names as
 // numbers, and `names` those of the hulls.
-nb::object own(const nb::object& runs, const Numbers& places, const nb::object& subjects, const nb::tuple& names) {
+nb::object own(const nb::object& runs, const Numbers& places, const nb::object& table, std::size_t subjects,
+               const nb::tuple& names) {
   const View<Run> of_runs(runs);
-  const View<std::int64_t> of_subjects(subjects);
+  const Table of_fences(table);
   std::vector<std::int64_t> of_hulls;
   for (const nb::handle name : names) of_hulls.push_back(nb::cast<std::int64_t>(name));
   std::string found;
@@ -245,43 +266,45 @@ nb::object own(const nb::object& runs, const Numbers& places, const nb::object& 
   for (const Run& run : of_runs.values()) {
     const std::int64_t* const place = places.find(run.fence);
     if (!place) return nb::none();
-    if (static_cast<std::size_t>(*place) >= of_subjects.size() || static_cast<std::size_t>(run.hull) >= of_hulls.size())
-      throw nb::value_error("a place outside of the columns");
-    found.push_back(of_subjects.data()[*place] == of_hulls[static_cast<std::size_t>(run.hull)]);
+    if (static_cast<std::size_t>(run.hull) >= of_hulls.size()) throw nb::value_error("a hull without a name");
+    found.push_back(of_fences.at(*place, subjects) == of_hulls[static_cast<std::size_t>(run.hull)]);
   }
   return nb::bytes(found.data(), found.size());
 }
 
 // Adds runs to the three columns of new ones, from `end` on, and sets the last events of their fences.
-void added(const nb::object& runs, const Numbers& places, const nb::object& lasts, const nb::object& news,
-           std::size_t end, std::int64_t row) {
+void added(const nb::object& runs, const Numbers& places, const nb::object& table, std::size_t last,
+           const nb::object& news, std::size_t end, std::int64_t row) {
   const View<Run> of_runs(runs);
-  const Room of_lasts(lasts), of_news(news);
+  const Table of_fences(table);
+  const Room of_news(news);
   const std::size_t room = of_news.size() / 3;
   if (end + of_runs.size() > room) throw nb::value_error("there is no room for the runs");
   for (const Run& run : of_runs.values()) {
     of_news[end] = run.fence;
     of_news[room + end] = run.first;
     of_news[2 * room + end++] = row;
-    of_lasts[static_cast<std::size_t>(value_of(places, run.fence))] = run.first + run.count - 1;
+    of_fences.at(value_of(places, run.fence), last) = run.first + run.count - 1;
   }
 }
 
-// Counts events of fences, given their places: each of the first two columns gets the new value, each of the next two
-// as much more, and each of the last one a 1.
-void counted(const nb::object& places, const nb::tuple& news, const nb::tuple& columns) {
+// Counts events of fences, given their places: the first two of these columns get the new value, the next two as much
+// more, and the last one a 1.
+void counted(const nb::object& places, const nb::tuple& news, const nb::object& table, const nb::tuple& columns) {
   if (news.size() != 4 || columns.size() != 5) throw nb::value_error("there are four columns of news, and five others");
   const View<std::int64_t> of_places(places);
   const std::size_t count = of_places.size();
   const View<std::int64_t> lasts(news[0], count), times(news[1], count), made(news[2], count), changes(news[3], count);
-  const Room of_lasts(columns[0]), of_times(columns[1]), of_made(columns[2]), of_changes(columns[3]), seen(columns[4]);
+  const Table of_fences(table);
+  std::size_t at[5];
+  for (std::size_t i = 0; i < 5; ++i) at[i] = nb::cast<std::size_t>(nb::int_(columns[i]));
   for (std::size_t i = 0; i < count; ++i) {
-    const auto place = static_cast<std::size_t>(of_places.data()[i]);
-    of_lasts[place] = lasts.data()[i];
-    of_times[place] = times.data()[i];
-    of_made[place] += made.data()[i];
-    of_changes[place] += changes.data()[i];
-    seen[place] = 1;
+    const std::int64_t place = of_places.data()[i];
+    of_fences.at(place, at[0]) = lasts.data()[i];
+    of_fences.at(place, at[1]) = times.data()[i];
+    of_fences.at(place, at[2]) += made.data()[i];
+    of_fences.at(place, at[3]) += changes.data()[i];
+    of_fences.at(place, at[4]) = 1;
   }
 }
 
@@ -408,29 +431,30 @@ NB_MODULE(_native, module) {
             return taken ? *taken : dynhull_server::value_of(numbers, key);  // KeyError
           },
           "key"_a);
-  module.def("numbered", &dynhull_server::numbered, "waiting"_a, "names"_a, "types"_a, "places"_a, "lasts"_a, "times"_a,
+  module.def("numbered", &dynhull_server::numbered, "waiting"_a, "names"_a, "types"_a, "places"_a, "table"_a, "last"_a,
+             "time"_a,
              nb::sig("def numbered(waiting: list[typing.Any], names: tuple[str, ...], types: bytes, places: Numbers, "
-                     "lasts: object, times: object) -> tuple[bytes, bytes, bytes, bytes]"),
+                     "table: object, last: int, time: int) -> tuple[bytes, bytes, bytes, bytes]"),
              "The events of crossings: the bytes of their runs, of themselves, of their keys, and of what they say of "
              "their fences.");
   module.def("encoded", &dynhull_server::encoded, "runs"_a, "rows"_a, "keys"_a, "own"_a, "names"_a, "more"_a,
              nb::sig("def encoded(runs: object, rows: object, keys: bytes, own: object, names: tuple[str, ...], "
                      "more: int) -> bytes"),
              "Events as the bytes that are stored, without those of members and origins, whose flags are `more`.");
-  module.def("followed", &dynhull_server::followed, "runs"_a, "places"_a, "lasts"_a, "news"_a,
-             nb::sig("def followed(runs: object, places: Numbers, lasts: object, news: Numbers) -> bool"),
+  module.def("followed", &dynhull_server::followed, "runs"_a, "places"_a, "table"_a, "last"_a, "news"_a,
+             nb::sig("def followed(runs: object, places: Numbers, table: object, last: int, news: Numbers) -> bool"),
              "Whether each run follows the last event of its fence; if so, `news` has the new last events.");
-  module.def("own", &dynhull_server::own, "runs"_a, "places"_a, "subjects"_a, "names"_a,
-             nb::sig("def own(runs: object, places: Numbers, subjects: object, names: tuple[int, ...]) "
+  module.def("own", &dynhull_server::own, "runs"_a, "places"_a, "table"_a, "subjects"_a, "names"_a,
+             nb::sig("def own(runs: object, places: Numbers, table: object, subjects: int, names: tuple[int, ...]) "
                      "-> bytes | None"),
              "Of which runs the hull is the one that the fence names; None if a fence does not exist.");
-  module.def("added", &dynhull_server::added, "runs"_a, "places"_a, "lasts"_a, "news"_a, "end"_a, "row"_a,
-             nb::sig("def added(runs: object, places: Numbers, lasts: object, news: object, end: int, row: int) "
-                     "-> None"),
+  module.def("added", &dynhull_server::added, "runs"_a, "places"_a, "table"_a, "last"_a, "news"_a, "end"_a, "row"_a,
+             nb::sig("def added(runs: object, places: Numbers, table: object, last: int, news: object, end: int, "
+                     "row: int) -> None"),
              "Add runs to the columns of new ones, and set the last events of their fences.");
-  module.def("counted", &dynhull_server::counted, "places"_a, "news"_a, "columns"_a,
-             nb::sig("def counted(places: object, news: tuple[object, object, object, object], "
-                     "columns: tuple[object, object, object, object, object]) -> None"),
+  module.def("counted", &dynhull_server::counted, "places"_a, "news"_a, "table"_a, "columns"_a,
+             nb::sig("def counted(places: object, news: tuple[object, object, object, object], table: object, "
+                     "columns: tuple[int, int, int, int, int]) -> None"),
              "Count events of fences at these places: two columns are set, two are added to, and the last is 1.");
   module.def(
       "plain_batches", &dynhull_server::plain_batches, "payloads"_a, "first"_a, "kind"_a, "wanted"_a.none(),

@@ -232,7 +232,7 @@ class FenceRuns:
             ValueError: an event does not follow the last one of its fence. Nothing was noted.
             KeyError: a fence does not exist.
         """
-        if native is not None and native.followed(block.runs, self.table.at, self.table.columns[LAST], lasts):
+        if native is not None and native.followed(block.runs, self.table.at, self.table.rows, LAST, lasts):
             return
         found: dict[int, int] = {}
         for number, first, made in zip(
@@ -260,7 +260,7 @@ class FenceRuns:
         """Of which runs the hull is the one that the fence names; KeyError if a fence does not exist."""
         names = tuple([self._names.get(name, NO_NAME) for name in block.names])
         if native is not None:
-            found = native.own(block.runs, self.table.at, self.table.columns[SUBJECTS], names)
+            found = native.own(block.runs, self.table.at, self.table.rows, SUBJECTS, names)
             if found is not None:
                 return np.frombuffer(found, np.bool_)
         subjects = self.table.columns[SUBJECTS][self.table.places(block.fences)]
@@ -270,7 +270,7 @@ class FenceRuns:
     def add(self, block: EventBlock | Runs, row: int) -> None:
         """Add the runs of a row. O(runs), with O(all new runs) now and then."""
         if native is not None and isinstance(block, EventBlock) and self._end + len(block.runs) <= MOST_NEW:
-            native.added(block.runs, self.table.at, self.table.columns[LAST], self._new, self._end, row)
+            native.added(block.runs, self.table.at, self.table.rows, LAST, self._new, self._end, row)
             self._end += len(block.runs)
             return
         for first in range(0, len(block.fences), MOST_NEW):

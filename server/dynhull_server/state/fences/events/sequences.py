@@ -139,10 +139,8 @@ def numbered(waiting: Sequence[Crossed], before: Callable[[Integers], Told]) -> 
 
 def numbered_natively(native: Native, waiting: list[Crossed], tallies: Tallies) -> tuple[EventBlock, Told]:
     """As `numbered`, after what is counted of the fences. O(n + runs log n)."""
-    names, counted = tuple(dict.fromkeys([each.hull for each in waiting])), tallies.columns
-    runs, rows, keys, told = native.numbered(
-        waiting, names, TYPES, tallies.at, counted[Column.LAST], counted[Column.TIME]
-    )
+    names = tuple(dict.fromkeys([each.hull for each in waiting]))
+    runs, rows, keys, told = native.numbered(waiting, names, TYPES, tallies.at, tallies.rows, Column.LAST, Column.TIME)
     block = EventBlock(np.frombuffer(runs, RUN), np.frombuffer(rows, EVENT), keys, names)
     return block, Told(*np.frombuffer(told, np.int64).reshape(len(Told._fields), -1))
 

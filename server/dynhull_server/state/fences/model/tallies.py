@@ -27,14 +27,16 @@ class Table:
         room: the number of places, at first.
 
     Attributes:
-        columns: (columns, places) the integers.
+        rows: (places, columns) the integers: those of a fence lie together, as who looks at one looks at others.
+        columns: (columns, places) the same.
         at: the place of each fence, by its number.
     """
 
-    __slots__ = ("_free", "at", "columns")
+    __slots__ = ("_free", "at", "columns", "rows")
 
     def __init__(self, columns: int, room: int = ROOM) -> None:
-        self.columns: Integers = np.zeros((columns, room), np.int64)
+        self.rows: Integers = np.zeros((room, columns), np.int64)
+        self.columns: Integers = self.rows.T
         self.at: Numbers = numbers()
         self._free: list[int] = []
 
@@ -45,7 +47,7 @@ class Table:
         else:
             place = len(self.at)
             self._make_room(place)
-        self.columns[:, place] = 0
+        self.rows[place] = 0
         self.at[number] = place
         return place
 
@@ -61,11 +63,11 @@ class Table:
         return np.array([at[number] for number in numbers.tolist()], np.int64)
 
     def _make_room(self, place: int) -> None:
-        room = self.columns.shape[1]
+        room = len(self.rows)
         if place == room:
-            columns = np.zeros((len(self.columns), max(2 * room, ROOM)), np.int64)
-            columns[:, :room] = self.columns
-            self.columns = columns
+            rows = np.zeros((max(2 * room, ROOM), self.rows.shape[1]), np.int64)
+            rows[:room] = self.rows
+            self.rows, self.columns = rows, rows.T
 
 
 class Column(IntEnum):
@@ -84,6 +86,10 @@ class Column(IntEnum):
     RULES = 5
     LIMITED = 6
     CHANGED = 7
+
+
+# What events of crossings change.
+COUNTED = Column.LAST, Column.TIME, Column.UNSAVED, Column.INSIDE, Column.CHANGED
 
 
 class Tallies(Table):
@@ -117,20 +123,10 @@ class Tallies(Table):
 
     def take(self, told: "Told") -> None:
         """Count events of crossings, which are committed."""
-        columns, places = self.columns, told.places
         if native is not None:
-            native.counted(
-                places,
-                told[2:],
-                (
-                    columns[Column.LAST],
-                    columns[Column.TIME],
-                    columns[Column.UNSAVED],
-                    columns[Column.INSIDE],
-                    columns[Column.CHANGED],
-                ),
-            )
+            native.counted(told.places, told[2:], self.rows, COUNTED)
             return
+        columns, places = self.columns, told.places
         columns[Column.LAST][places] = told.lasts
         columns[Column.TIME][places] = told.times
         columns[Column.UNSAVED][places] += told.made
