@@ -60,9 +60,9 @@ class FenceCore:
         births: set[str] = set()
         for request in requests:
             if type(request) is WriteBatch:  # as a rule
-                names[request.name] = None
+                names[request.write.name] = None
                 if request.birth is not None:
-                    births.add(request.name)
+                    births.add(request.write.name)
             elif isinstance(request, FenceRequest):
                 fences[request.name] = self._registry.fences.get(request.name)
                 names |= dict.fromkeys(request.names[1:])
@@ -156,9 +156,10 @@ class FenceCore:
         events, to_wake = part.events, []
         if part.crossed is not None:
             self._registry.tallies.take(part.crossed)
-        moved = any(leg.area is not leg.fence.area for leg in part.legs.values())
+        legs = part.legs.values()
+        moved = any(leg.area is not leg.fence.area for leg in legs)
         part.dismiss_deleted()
-        for leg in part.legs.values():
+        for leg in legs:
             fence = leg.fence
             if leg.created:
                 self._registry.add_fence(fence)
@@ -174,7 +175,7 @@ class FenceCore:
                 to_wake.append(fence)
         if events is not None:
             self._registry.recent.add(events, len(self._registry.fences))
-        self._registry.remove_fences([leg.fence for leg in part.legs.values() if leg.deleted])
+        self._registry.remove_fences([leg.fence for leg in legs if leg.deleted])
         if to_wake or events is not None:
             effects.append(WakeFences(to_wake, events))
         if part.structural:

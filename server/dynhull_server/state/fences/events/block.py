@@ -86,8 +86,8 @@ class EventBlock:
     @property
     def bytes(self) -> int:
         """The memory that it takes, about."""
-        members = sum(_bytes_of(each.keys) for found in self.inside.values() for each in found)
-        return self.rows.nbytes + self.runs.nbytes + len(self.keys) + members
+        size = self.rows.nbytes + self.runs.nbytes + len(self.keys)
+        return size + sum([_bytes_of(each.keys) for found in self.inside.values() for each in found])
 
     def events(self, run: int, skipped: int = 0, most: int = MANY) -> list[FenceEvent]:
         """The events of a run after some of them, at most that many: O(their number), and O(n) the first time."""

@@ -34,7 +34,7 @@ NOTHING: Mapping[str, KeysChanged] = MappingProxyType({})
 NO_DOUBT: Mapping[Fence, bool] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Ground:
     """What a trip on hulls with fences begins with.
 

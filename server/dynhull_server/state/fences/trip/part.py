@@ -123,7 +123,7 @@ class FencePart:
     @property
     def weight(self) -> int:
         """The number of subjects that it may concern beside the rows of the requests."""
-        return sum(line.weight(name) for line in self.lines for name in self._ground.hulls)
+        return sum([line.weight(name) for line in self.lines for name in self._ground.hulls])
 
     # Changes of hulls
 
@@ -295,7 +295,7 @@ class FencePart:
 
     def changes(self) -> Iterator[Change]:
         """The changes to commit, after those of the hulls."""
-        legs, stored = self.legs.values(), self.events
+        legs, stored = self._comparison.legs.values(), self.events
         if any(leg.deleted for leg in legs):
             stored = self._block([leg for leg in legs if not leg.deleted])
         for leg in legs:
