@@ -44,14 +44,14 @@ def is_picture(path) -> bool:
 def test_hours_of_flights(tmp_path):
     """`make demo` replays a whole day."""
     picture = tmp_path / "flights.png"
-    done = demo("--day", "2013-03-08", "--hours", 1, "--out", picture)
+    done = demo("--day", "2013-03-08", "--hours", 2, "--out", picture)
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[-2:] == ["REPLAYED 60/60", "VERIFIED 60/60"]
+    assert lines[-2:] == ["REPLAYED 120/120", "VERIFIED 120/120"]
     assert re.fullmatch(r"EVENTS ([1-9]\d*)/\1", lines[-4])
     assert any(line.strip().startswith("near/LAX enter ") for line in lines)
     hours = [line for line in lines if " km²  " in line]
-    assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(1)]
+    assert [line.split()[0] for line in hours] == [f"{hour:02}:00" for hour in range(2)]
     assert " to SJU" in done.stdout
     assert is_picture(picture)
 

@@ -62,6 +62,7 @@ def _idle(_: Browser) -> list[Page]:
 def opened(browser: Browser, url: str, *hulls: str, fences: Sequence[str] = (), **look: object) -> Iterator[Page]:
     """The page with these hulls and fences. It must not raise an error, nor log a warning to the browser's console."""
     failures: list[object] = []
+    scheme = look.pop("color_scheme") if look.keys() == {"color_scheme"} else "light"
     idle = [] if look else _idle(browser)
     page = idle.pop() if idle else browser.new_context(**{**DESKTOP, **look}).new_page()
     listeners = {
@@ -74,6 +75,8 @@ def opened(browser: Browser, url: str, *hulls: str, fences: Sequence[str] = (), 
         page.on(event, listener)
     page.set_default_timeout(PATIENCE_OF_BROWSER)
     page.mouse.move(0, 0)
+    if not look:
+        page.emulate_media(color_scheme=scheme)
     page.goto(f"{url}?{urlencode({'hull': hulls, 'fence': fences}, doseq=True)}")
     page.evaluate(PARTS)
     try:

@@ -2,11 +2,10 @@
 
 Most of the processor time of a short-lived server goes into importing what it needs; a fork of a process that has
 imported it needs a tenth. On Linux the commands of the tests are forked from this file, which runs as a process for
-each worker of the tests.
+each worker of the tests. It tells the worker how they end: to make them children of the worker, each was forked twice.
 """
 
 import atexit
-import ctypes
 import gc
 import importlib
 import inspect
@@ -15,6 +14,7 @@ import multiprocessing.util
 import os
 import resource
 import runpy
+import select
 import signal
 import socket
 import subprocess
@@ -22,6 +22,7 @@ import sys
 import threading
 import time
 import warnings
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -45,17 +46,42 @@ RUN_ON_DATABASE = ["dynhull_cluster.storages.postgresql", "dynhull_cluster.machi
 SERVER = "dynhull_server"  # the module
 RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
 
-CHILD_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl
 REQUEST_BYTES = 2**18
 
 
 class Process(subprocess.Popen[str]):
     """`subprocess.Popen`, but processes of `COMMAND`, Python files and modules, in our environment, are forked."""
 
+    _ended: int | None = None  # from where to read how it has ended, if it is forked: it is no child of this process
+
     def kill(self) -> None:
         """End it at once: when this returns it has ended, and its locks are free."""
         super().kill()
         self.wait()
+
+    def _try_wait(self, wait_flags: int) -> tuple[int, int]:
+        if self._ended is None:
+            return super()._try_wait(wait_flags)
+        if wait_flags & os.WNOHANG and not _may_read(self._ended):
+            return 0, 0
+        status = os.read(self._ended, 4)
+        if not status:
+            raise ChildProcessError(f"nobody knows how {self.args} has ended")
+        os.close(self._ended)
+        return self.pid, int.from_bytes(status, "little")
+
+    def _internal_poll(self, _deadstate: int | None = None) -> int | None:
+        if self._ended is None:
+            return super()._internal_poll(_deadstate)
+        if self.returncode is None and self._waitpid_lock.acquire(blocking=False):
+            try:
+                if self.returncode is None:  # no other thread has waited
+                    process, status = self._try_wait(os.WNOHANG)
+                    if process:
+                        self._handle_exitstatus(status)
+            finally:
+                self._waitpid_lock.release()
+        return self.returncode
 
     def _execute_child(self, *arguments: object) -> None:
         call = inspect.signature(super()._execute_child).bind(*arguments).arguments
@@ -68,7 +94,7 @@ class Process(subprocess.Popen[str]):
             return
         files = [number if given == -1 else given for number, given in enumerate((ours[0], ours[3], ours[5]))]
         try:
-            self.pid = _fork(command, str(call["cwd"] or Path.cwd()), files)
+            self.pid, self._ended = _fork(command, str(call["cwd"] or Path.cwd()), files)
         finally:
             self._close_pipe_fds(*ours)
         self._child_created = True
@@ -77,18 +103,26 @@ class Process(subprocess.Popen[str]):
 _lock = threading.Lock()
 
 
-def _fork(command: list[str], folder: str, files: list[int]) -> int:
-    """The number of a process that runs the command with these files as its standard ones, a child of this process."""
+def _fork(command: list[str], folder: str, files: list[int]) -> tuple[int, int]:
+    """Run the command in a process with these files as its standard ones.
+
+    Returns its number, and a file with its exit status, as of waitpid, once it has ended.
+    """
     request = json.dumps([command, folder, dict(os.environ)]).encode()
-    with _lock:
-        parent = _parent()
-        adopt = ctypes.CDLL(None).prctl
-        adopt(CHILD_SUBREAPER, 1, 0, 0, 0)
-        try:
-            socket.send_fds(parent, [request], files)
-            return int(parent.recv(64))
-        finally:
-            adopt(CHILD_SUBREAPER, 0, 0, 0, 0)
+    ended, ends = os.pipe()
+    try:
+        with _lock:
+            parent = _parent()
+            socket.send_fds(parent, [request], [*files, ends])
+            return int(parent.recv(64)), ended
+    finally:
+        os.close(ends)
+
+
+def _may_read(file: int) -> bool:
+    asked = select.poll()
+    asked.register(file)
+    return bool(asked.poll(0))
 
 
 @cache
@@ -107,28 +141,38 @@ def _parent() -> socket.socket:
 
 
 def _wait_to_be(connection: socket.socket) -> None:
-    """Answer requests, and return in each forked process, as the process of its command."""
+    """Answer requests, tell how processes have ended, and return in each of them, as the process of its command."""
+    running: dict[int, tuple[int, int]] = {}  # by the descriptor of a process: its number, and where its end is told
+    waiting = select.poll()
+    waiting.register(connection, select.POLLIN)
     while True:
-        request, files, _flags, _address = socket.recv_fds(connection, REQUEST_BYTES, 3)
-        if not request:
-            sys.exit()
-        command, folder, environment = json.loads(request)
-        import_for(command)
-        reads, writes = os.pipe()
-        if (middle := os.fork()) == 0:
-            if (process := os.fork()) != 0:
-                # With the end of its parent, the process becomes a child of the one that asked for it.
-                os.write(writes, str(process).encode())
-                os._exit(0)
-            for each in (reads, writes):
-                os.close(each)
-            connection.close()
-            _become(command, folder, environment, files)
-            return
-        os.waitpid(middle, 0)
-        connection.send(os.read(reads, 64))
-        for each in (reads, writes, *files):
-            os.close(each)
+        for each, _ in waiting.poll():
+            if each in running:
+                waiting.unregister(each)
+                process, ends = running.pop(each)
+                with suppress(BrokenPipeError):  # nobody asks any more
+                    os.write(ends, os.waitpid(process, 0)[1].to_bytes(4, "little"))
+                for file in (each, ends):
+                    os.close(file)
+                continue
+            request, files, _flags, _address = socket.recv_fds(connection, REQUEST_BYTES, 4)
+            if not request:
+                sys.exit()
+            command, folder, environment = json.loads(request)
+            import_for(command)
+            *own, ends = files
+            if (process := os.fork()) == 0:
+                for file in (ends, *running, *(told for _, told in running.values())):
+                    os.close(file)
+                connection.close()
+                _become(command, folder, environment, own)
+                return
+            connection.send(str(process).encode())
+            descriptor = os.pidfd_open(process)
+            running[descriptor] = process, ends
+            waiting.register(descriptor, select.POLLIN)
+            for file in own:
+                os.close(file)
 
 
 def import_for(command: list[str]) -> None:

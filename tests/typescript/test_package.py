@@ -50,6 +50,12 @@ def gateway(server: MortalServer) -> Iterator[Gateway]:
         yield running
 
 
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as browser:
+        yield browser
+
+
 def node(*words: str, **environment: str) -> str:
     """What a program of Node prints in the package's folder."""
     return run(program("node"), *words, folder=typescript(), **environment)
@@ -280,14 +286,10 @@ def watched(browser: Browser, loaded: list[bytes] | None = None) -> tuple[Page, 
     return seen, errors
 
 
-def test_a_page_with_a_live_hull(gateway: Gateway, server: MortalServer, tmp_path: Path) -> None:
+def test_a_page_with_a_live_hull(browser: Browser, gateway: Gateway, server: MortalServer, tmp_path: Path) -> None:
     name = "typescript/index.html"
     loaded: list[bytes] = []
-    with (
-        served(tmp_path, gateway, "index.html") as url,
-        HullClient(server.address) as client,
-        chromium() as browser,
-    ):
+    with served(tmp_path, gateway, "index.html") as url, HullClient(server.address) as client:
         client.create_hull(name)
         seen, errors = watched(browser, loaded)
         seen.goto(url)
@@ -307,7 +309,7 @@ def signalled(processes: list[int], what: signal.Signals) -> None:
             os.kill(each, what)
 
 
-def test_a_page_that_slept_goes_on(server: MortalServer, tmp_path: Path) -> None:
+def test_a_page_that_slept_goes_on(browser: Browser, server: MortalServer, tmp_path: Path) -> None:
     """A page whose processes stood still, while both the server and the gateway were killed, shows what is now."""
     name, port = "typescript/index.html", free_port()
     with ExitStack() as stack:
@@ -316,7 +318,6 @@ def test_a_page_that_slept_goes_on(server: MortalServer, tmp_path: Path) -> None
         )
         url = stack.enter_context(served(tmp_path, gateway, "index.html"))
         client = stack.enter_context(HullClient(server.address))
-        browser = stack.enter_context(chromium())
         client.create_hull(name, exist_ok=True)
         revision = client.get_hull(name).revision
         seen, errors = watched(browser)
@@ -373,9 +374,11 @@ def by_night(seen: Page) -> None:
         seen.wait_for_function(f"({INKED})('{HULL_BY_NIGHT if dark else HULL}') > 200")
 
 
-def test_a_map_of_a_hull_a_fence_and_an_alarm(gateway: Gateway, server: MortalServer, tmp_path: Path) -> None:
+def test_a_map_of_a_hull_a_fence_and_an_alarm(
+    browser: Browser, gateway: Gateway, server: MortalServer, tmp_path: Path
+) -> None:
     name = "typescript/map.html"
-    with served(tmp_path, gateway, "map.html") as url, HullClient(server.address) as client, chromium() as browser:
+    with served(tmp_path, gateway, "map.html") as url, HullClient(server.address) as client:
         client.create_hull(name, keyed="str")
         client.create_fence("yard", [(2, -1), (9, -1), (9, 9), (2, 9)], subjects=name, margin=3)
         client.create_alarm("spread", hull=name, when="area > 100")
