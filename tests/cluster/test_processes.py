@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from blind import blind, may_blind
+from cases import slow
 from forked import COMMAND
 from peers import missing
 from postgresql import PostgreSQL
@@ -30,6 +31,7 @@ def other_user() -> list[str]:
     return blind()
 
 
+@slow
 @pytest.mark.one_process("its owner is the process that the test starts")
 def test_an_owner_whose_process_is_hidden_keeps_its_database(postgres: PostgreSQL, other_user: list[str]) -> None:
     options = ("--journal", postgres.new_database(), *QUIET)

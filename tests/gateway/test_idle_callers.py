@@ -7,6 +7,7 @@ from contextlib import ExitStack, closing, contextmanager
 from urllib.parse import urlsplit
 
 import numpy as np
+from cases import slow
 from gateway_process import Events, Gateway, gateway_process
 from metrics import scrape
 from patience import PATIENCE, wait_until
@@ -62,6 +63,7 @@ def test_half_requests_end(address: str) -> None:
         assert scrape(metrics)[LATE] == 3 * CALLERS
 
 
+@slow
 def test_readers_that_do_not_read_end(address: str, name: str) -> None:
     """Those of events, and those of plain answers; another reader gets everything."""
     stream = f"/hulls/{name}/events"

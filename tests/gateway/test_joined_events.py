@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
+from cases import slow
 from gateway_process import Answer, Events, Gateway, gateway_process
 from metrics import scrape
 from mortal_server import MortalServer
@@ -251,6 +252,7 @@ def test_limits(address: str, name: str) -> None:
         wait_until(lambda: not scrape(metrics)["dynhull_gateway_streams"])
 
 
+@slow
 def test_nothing_is_missed_over_kills_of_the_server_and_the_gateway(tmp_path: Path, name: str) -> None:
     """Every event of a fence, an alarm and a feed once and in order, and the hulls in the end."""
     server = MortalServer(tmp_path)

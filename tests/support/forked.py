@@ -31,20 +31,22 @@ from typing import NoReturn
 COMMAND = str(Path(sys.executable).with_name("dynhull"))
 
 # What the commands import when they run, and those that serve with several processes.
+UVICORN = ["uvicorn.lifespan.off", "uvicorn.loops.auto", "uvloop"]
 RUN_BY = {
     "serve": [
         "dynhull_server.process",
+        "encodings.idna",  # of the first address
         *(f"dynhull_cluster.storages.{each}" for each in ("choice", "folder", "memory")),
     ],
-    "gateway": ["dynhull_client", "dynhull_gateway.serve"],
-    "dashboard": ["dynhull_client", "dynhull_gateway.serve"],
+    "gateway": ["dynhull_client", "dynhull_cli.certificates", "dynhull_gateway.serve", *UVICORN],
+    "dashboard": ["dynhull_client", "dynhull_cli.certificates", "dynhull_gateway.serve", *UVICORN],
     "ingest": ["dynhull_client", "dynhull_bridges.ingest.ingest", "dynhull_bridges.ingest.jetstream"],
     "relay": ["dynhull_client", "dynhull_bridges.relay", "dynhull_bridges.webhook"],
 }
 RUN_BY_SEVERAL = ["dynhull_cluster.process", "dynhull_cluster.child"]
 RUN_ON_DATABASE = ["dynhull_cluster.storages.postgresql", "dynhull_cluster.machines.only_member"]
 SERVER = "dynhull_server"  # the module
-RUN_BY_OTHERS = ["dynhull_client", "rich.console", "rich.table"]
+RUN_BY_OTHERS = ["dynhull_client", "dynhull_cli.certificates", "grpc._channel", "rich.console", "rich.table"]
 
 REQUEST_BYTES = 2**18
 

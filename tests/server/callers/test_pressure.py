@@ -4,6 +4,7 @@ import asyncio
 
 import grpc
 import numpy as np
+from cases import slow
 from metrics import measured, scrape
 from patience import wait_until
 from refusal import refusal
@@ -84,6 +85,7 @@ def test_watchers_that_do_not_read_cost_no_memory() -> None:
             watch.cancel()
 
 
+@slow
 def test_a_stream_whose_acknowledgements_are_not_read_is_not_read_either() -> None:
     """The client would send for ever; the amount that the server accepts is bounded."""
     with (

@@ -89,6 +89,7 @@ def test_who_leaves_after_it_is_due_and_before_somebody_looks():
     ]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_past_makes_what_time_has_made(seed):
     """Field by field, with all times."""

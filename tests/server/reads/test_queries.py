@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from patience import wait_until
 from processor import needs_proc, processor_time, wait_for_rest
 from refusal import refusal
@@ -174,6 +175,7 @@ def test_writes_go_on_beside_a_large_read(address: str, name: str) -> None:
             wait_until(lambda: written() >= 5)
 
 
+@slow
 @pytest.mark.long
 @needs_proc
 def test_a_large_answer_is_given_up_when_its_caller_goes() -> None:
