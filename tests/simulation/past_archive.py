@@ -105,6 +105,10 @@ class FaultyArchive(Archive):
         self._at("unlinked")
         super().remove(file)
 
+    def _times(self, _: str) -> Iterator[tuple[str, float]]:
+        """When files were written, by the clock of the machine: no life lasts for a day."""
+        return iter(())
+
     def names(self) -> set[str]:
         """The names of the segments of which there is any file, also a part of one."""
         return names_in(self.path)
@@ -271,7 +275,7 @@ def simulated_reading(threads: Callable[[], SimulatedThreads], elapsed: Callable
         patch.object(archive, "token_hex", lambda size: f"{next(numbers):0{2 * size}}"),
         patch.object(filed, "Thread", thread),
         patch.object(filed, "Future", future),
-        patch.object(objects, "ORPHAN_SECONDS", OLD),
+        patch.object(archive, "ORPHAN_SECONDS", OLD),
         patch.object(rows_storage, "monotonic", elapsed),
         patch.object(rows_storage, "LOOK", LOOK),
         patch.object(rows_storage, "LATE", LATEST),

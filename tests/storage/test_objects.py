@@ -16,7 +16,8 @@ from dynhull_server.state.records import Delete
 from dynhull_server.storage.port import DamagedError, StorageError
 from dynhull_server.storage.rows import storage
 from dynhull_server.storage.segments import objects as store_calls
-from dynhull_server.storage.segments.objects import ORPHAN_SECONDS, ObjectArchive
+from dynhull_server.storage.segments.archive import ORPHAN_SECONDS
+from dynhull_server.storage.segments.objects import ObjectArchive
 from dynhull_server.storage.segments.owner import Claimant, OccupiedError
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.sqlite.owner import FolderMarks

@@ -1,7 +1,9 @@
 """What the journal drops of hulls with a history becomes segments: whole, once, checked, and no longer than wanted."""
 
 import errno
+import os
 import shutil
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -613,6 +615,44 @@ def test_an_owner_that_was_replaced_removes_no_file_of_the_next_one(postgres, tm
     fleet.storage.commit([closes], fleet.time)
     fleet.carry_out(steps)
     assert fleet.storage.oldest(1) > 0
+    require_all(fleet.storage, fleet.records)
+    first.close()
+    fleet.storage.close()
+
+
+@pytest.mark.parametrize("late", ["within a day", "after days"])
+def test_what_an_owner_writes_that_stood_still_is_removed(postgres, tmp_path, monkeypatch, late):
+    elapsed = 0.0
+    monkeypatch.setattr(storage, "monotonic", lambda: elapsed)
+    url, files = postgres.new_database(), Archive(tmp_path / "history")
+    fleet = Fleet(tmp_path, archive=files, make=lambda: PostgresStorage(Database(url), lambda _: None, archive=files))
+    first = fleet.storage
+    for _ in range(2):
+        fleet.put(4)
+        fleet.snapshot()
+    steps = first.file_history(fleet.time)
+    first.commit([next(steps)], fleet.time)  # the file has a name, and now its owner stands still
+    query(url, "UPDATE owners SET epoch = epoch + 1, until = '-infinity', process = ''")
+    fleet.storage = fleet.make()
+    fleet.storage.open(no_progress)
+    fleet.file()
+    if late == "after days":
+        elapsed += storage.LATE
+        fleet.file()
+        assert not fleet.storage._ledger.dead["segments"]
+    before = fleet.files
+    closes = next(steps)
+    (written,) = set(fleet.files) - set(before)
+    with pytest.raises(TakenOverError):
+        first.commit([closes], fleet.time)
+    old = time.time() - 2 * archive.ORPHAN_SECONDS
+    for each in fleet.files if late == "after days" else ():
+        os.utime(files.path / each, (old, old))
+    elapsed += storage.LATE
+    fleet.file()
+    assert written not in fleet.files
+    assert not fleet.storage._ledger.dead["segments"]
+    assert fleet.files == before
     require_all(fleet.storage, fleet.records)
     first.close()
     fleet.storage.close()

@@ -13,6 +13,9 @@ class Outliving:
     def __init__(self) -> None:
         self._working: set[asyncio.Task[Any]] = set()
 
+    def __len__(self) -> int:
+        return len(self._working)
+
     async def run(self, work: Coroutine[Any, Any, T]) -> T:
         """The result of some work."""
         working = asyncio.get_running_loop().create_task(work)

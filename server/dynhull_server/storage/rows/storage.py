@@ -553,8 +553,8 @@ class RowStorage(ABC):
     def _remove_files(self, archive: Archive) -> Iterator[StorageStep]:
         """Remove the files that no segment has, and then the rows that name them.
 
-        Of what a server gave up, or was writing when it ended, the row stays, so that what a store takes late is
-        removed, too, whatever has become of the hull.
+        Of what a server gave up, or was writing when it ended, the row stays, so that what a store takes late, or an
+        owner that stood still writes when it goes on, is removed, too, whatever has become of the hull.
         """
         now = monotonic()
         while ids := [
@@ -576,7 +576,7 @@ class RowStorage(ABC):
                     archive.remove(file)
                     if self._filed is not None:
                         self._filed.forget(file)
-            if rows and archive.takes_late and self._late.get(ids[0]) == 0:
+            if rows and (archive.takes_late or self.epoch) and self._late.get(ids[0]) == 0:
                 self._late[ids[0]] = monotonic() + LATE
                 continue
             yield DropDeadSegment(ids[0])

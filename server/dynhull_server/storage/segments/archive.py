@@ -10,6 +10,7 @@ from hashlib import blake2b
 from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
+from time import time
 from typing import NamedTuple
 
 from ..durable import TEMPORARY, make_durable, write_durably
@@ -19,6 +20,7 @@ from .owner import CLAIMS, MARK_BYTES, Claimant, Marks, OccupiedError
 BATCHES, STATE = ".batches.parquet", ".state.parquet"
 HISTORY = "history"  # the folder within a data folder, unless another one is named
 DIGEST_BYTES = 16
+ORPHAN_SECONDS = 86_400.0
 # Who needs a part of a file reads and checks whole blocks of it: a group of rows is in one or two.
 BLOCK, BLOCK_DIGEST_BYTES = 2**16, 8
 WAITED = "cannot be read at present: {}"
@@ -310,9 +312,21 @@ class Archive:
             yield file + STATE
 
     def orphans(self, uid: str, epoch: int) -> list[str]:
-        """Segments of a hull that may have been written after another owner had taken it: none in a folder."""
-        del uid, epoch
-        return []
+        """Segments older than a day that owners before an epoch have written.
+
+        A hull may have those of owners before.
+
+        Raises:
+            OSError: that cannot be read.
+        """
+        before = time() - ORPHAN_SECONDS
+        return sorted({file for file, changed in self._times(uid) if changed < before and _epoch(file) < epoch})
+
+    def _times(self, uid: str) -> Iterator[tuple[str, float]]:
+        """The segments of a hull, once for each file, and when that was written."""
+        folder = self.path / uid
+        for each in folder.iterdir() if folder.is_dir() else ():
+            yield f"{uid}/{each.name.partition('.')[0]}", each.stat().st_mtime
 
     def sync(self) -> None:
         """Make the names of all files durable."""
@@ -341,6 +355,12 @@ def _digests_of(content: bytes) -> bytes:
     """The hashes of the blocks of a file, or of some of them."""
     blocks = (content[start : start + BLOCK] for start in range(0, len(content), BLOCK))
     return b"".join(blake2b(block, digest_size=BLOCK_DIGEST_BYTES).digest() for block in blocks)
+
+
+def _epoch(file: str) -> int:
+    """The epoch in the name of a segment; that of one without it is that of nobody."""
+    parts = file.rpartition("/")[2].split("-")
+    return int(parts[2]) if len(parts) == 4 and parts[2].isdigit() else 0
 
 
 def _changed(path: Path) -> DamagedError:

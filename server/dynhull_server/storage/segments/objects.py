@@ -16,7 +16,7 @@ from concurrent.futures import TimeoutError as TooLongError
 from functools import partial
 from pathlib import Path
 from threading import BoundedSemaphore, Lock, Thread
-from time import monotonic, time
+from time import monotonic
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
@@ -38,7 +38,6 @@ CALLS = 8  # at a time, also of those that were given up and hang
 # Who reads the past of a hull waits for an answer: less than clients wait by default, also behind another one. After a
 # read that was given up, others are for some time refused with the same words, so that they do not wait one by one.
 READ_SECONDS, REST_SECONDS = 10.0, 5.0
-ORPHAN_SECONDS = 86_400.0
 
 
 def archive_at(place: str | Path, most_bytes: int = 0, most_age: int = 0) -> Archive:
@@ -151,21 +150,11 @@ class ObjectArchive(Archive):
         if self._ask(file, lambda: self._is_there(self._key(file + STATE)), self._seconds):
             yield file + STATE
 
-    def orphans(self, uid: str, epoch: int) -> list[str]:
-        """Segments older than a day that owners before an epoch have written.
-
-        A hull may have those of owners before.
-
-        Raises:
-            OSError: the store refuses, or does not answer.
-        """
-        before = time() - ORPHAN_SECONDS
-        found = {
-            f"{uid}/{each.base_name.partition('.')[0]}"
-            for each in self._listed(uid)
-            if each.mtime is not None and each.mtime.timestamp() < before
-        }
-        return [file for file in sorted(found) if _epoch(file) < epoch]
+    def _times(self, uid: str) -> Iterator[tuple[str, float]]:
+        """The segments of a hull, once for each object, and when that was written. Raises the errors of `content`."""
+        for each in self._listed(uid):
+            if each.mtime is not None:
+                yield f"{uid}/{each.base_name.partition('.')[0]}", each.mtime.timestamp()
 
     def sync(self) -> None:
         """Nothing is left to do: a store that has taken an object keeps it."""
@@ -228,9 +217,3 @@ class ObjectArchive(Archive):
             answer.set_exception(error)
         finally:
             self._places.release()
-
-
-def _epoch(file: str) -> int:
-    """The epoch in the name of a segment; that of one without it is that of nobody."""
-    parts = file.rpartition("/")[2].split("-")
-    return int(parts[2]) if len(parts) == 4 and parts[2].isdigit() else 0
