@@ -113,6 +113,19 @@ def test_a_copy_of_a_disk_which_has_the_same_name_is_noticed_before_anything_is_
     require_noticed(tmp_path / "past", FolderMarks(first), lambda: FolderMarks(shutil.copytree(first, next(copies))))
 
 
+def test_a_place_that_cannot_be_written_adds_no_marks(tmp_path):
+    (tmp_path / "data").mkdir()
+    past, marks = tmp_path / "past", FolderMarks(tmp_path / "data")
+    found = archive(past, marks)
+    past.write_text("in the way")
+    for _ in range(3):
+        with pytest.raises(OSError, match="File exists"):
+            found.claim()
+    past.unlink()
+    found.claim()
+    assert len(marks.known()) == 2  # who takes a place that nobody has, and then the process
+
+
 def test_a_copy_of_the_files_of_postgresql_is_noticed_too(tmp_path):
     with ExitStack() as stack:
         original = stack.enter_context(postgresql())

@@ -106,6 +106,7 @@ class Archive:
         self.most_bytes = most_bytes
         self.most_age = most_age
         self._claimed: Claimant | None = None
+        self._known_mark = ""  # the next one, until it is in the claim: while a store is away there are no more
 
     def claim(self) -> None:
         """Have this place for the owner alone. Nothing is written or removed before.
@@ -161,9 +162,12 @@ class Archive:
 
     def _mark(self, owner: Claimant, marks: Marks) -> None:
         """Put a new mark into the claim, after it is known."""
-        mark = token_hex(MARK_BYTES)
-        marks.add(mark)
-        self._put(f"{CLAIMS}/{owner.id}", f"{owner.about}\n{mark}".encode())
+        if not self._known_mark:
+            mark = token_hex(MARK_BYTES)
+            marks.add(mark)
+            self._known_mark = mark
+        self._put(f"{CLAIMS}/{owner.id}", f"{owner.about}\n{self._known_mark}".encode())
+        self._known_mark = ""
 
     def _may_remove(self) -> None:
         """Have this place for the owner alone still. Raises the errors of `claim`."""
