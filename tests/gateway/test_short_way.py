@@ -63,6 +63,14 @@ def test_a_change_is_refused_as_by_its_route(gateway: Gateway, name: str) -> Non
     assert gateway.get(f"/hulls/{name}").json["info"]["revision"] == 0
 
 
+@pytest.mark.parametrize(("first", "second", "status"), [("Basic x", "Bearer y", 401), ("Bearer y", "Basic x", 404)])
+def test_of_two_tokens_the_first_counts(gateway: Gateway, name: str, first: str, second: str, status: int) -> None:
+    tokens = {"Authorization": first, "authorization": second}
+    short, route = both(gateway, f"/hulls/{name}/locate", POINT + "]}", **tokens)
+    assert (short.status, short.body) == (route.status, route.body)
+    assert short.status == status
+
+
 def test_many_locates_at_once_have_their_own_answers(gateway: Gateway, name: str) -> None:
     """Also beside some that are refused."""
     gateway.post("/hulls", {"name": name})

@@ -18,7 +18,11 @@ described = HTTPBearer(auto_error=False, description="A token of the server (`dy
 
 def token_of(request: Request) -> str | None:
     """The bearer token of a request; None without."""
-    given = request.headers.get("authorization")
+    return bearer(request.headers.get("authorization"))
+
+
+def bearer(given: str | None) -> str | None:
+    """The token in the header of that name; None without."""
     if given is None:
         return None
     if given[: len(SCHEME)].lower() != SCHEME:
@@ -37,8 +41,11 @@ def address_of(request: Request) -> str:
 
 def client_of(request: Request) -> AsyncHullClient:
     """The client that calls with the token of the request, or with the gateway's own if it has none."""
-    client: AsyncHullClient = request.app.state.client
-    token = token_of(request)
+    return client_with(request.app.state.client, token_of(request))
+
+
+def client_with(client: AsyncHullClient, token: str | None) -> AsyncHullClient:
+    """The client that calls with a token, or the gateway's own without."""
     if token is None:
         return client
     try:

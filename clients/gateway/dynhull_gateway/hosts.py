@@ -5,6 +5,7 @@ same origin as the gateway, for the browser: only the name in them differs.
 """
 
 from collections.abc import Iterable
+from functools import lru_cache
 from http import HTTPStatus
 from urllib.parse import urlsplit
 
@@ -51,6 +52,7 @@ class KnownHosts:
         await self._app(scope, receive, send)
 
 
+@lru_cache(16)  # nearly all requests come under one name
 def _name(host: str) -> str | None:
     try:
         return urlsplit(f"//{host}").hostname

@@ -10,14 +10,13 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from pydantic import ValidationError
-from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dynhull_client import DynhullError
 
 from .bodies import JSON, again, read_json
-from .callers import client_of, token_of
+from .callers import bearer, client_with
 from .figures import SHORT
 from .gathering import Gatherer
 from .points import read_batch
@@ -61,7 +60,7 @@ class ShortWay:
         if found is None:
             await self._app(scope, receive, send)
             return
-        name, work = found
+        name, work, given = found
         try:
             message = await receive()
             content = _content(message, work)
@@ -69,9 +68,9 @@ class ShortWay:
                 await self._app(scope, again(message, receive), send)
                 return
             scope[SHORT] = work.route
-            request = Request(scope)
-            gatherer, token = request.app.state.gatherer, token_of(request)
-            response = Response(await work.do(gatherer, client_of(request), token, name, content), media_type=JSON)
+            state, token = scope["app"].state, bearer(given)
+            client = client_with(state.client, token)
+            response = Response(await work.do(state.gatherer, client, token, name, content), media_type=JSON)
         except DynhullError as error:
             response = of_refusal(error, read_json(message["body"]))
         except ProblemError as error:
@@ -80,18 +79,19 @@ class ShortWay:
             response = of_value_error(error, read_json(message["body"]))
         await response(scope, receive, send)
 
-    def _found(self, scope: Scope) -> tuple[str, _Work] | None:
-        """The hull, and what is asked of it; None if the request cannot be a small one."""
+    def _found(self, scope: Scope) -> tuple[str, _Work, str | None] | None:
+        """The hull, what is asked of it, and who asks; None if the request cannot be a small one."""
         if scope["type"] != "http" or scope["method"] != "POST" or scope["query_string"]:
             return None
         found = PATH.fullmatch(scope["path"].removeprefix(self._root))
         if found is None:
             return None
-        headers = dict(scope["headers"])
+        headers = dict(reversed(scope["headers"]))  # the first of each name, as those of a Request
         small = LENGTH.fullmatch(headers.get(b"content-length", b"")) and int(headers[b"content-length"]) <= MOST_BYTES
         if not small or headers.get(b"content-type") != JSON.encode() or NUMBER in headers:
             return None
-        return unquoted(found[1]), WORKS[found[2]]
+        given = headers.get(b"authorization")
+        return unquoted(found[1]), WORKS[found[2]], None if given is None else given.decode("latin-1")
 
 
 def _content(message: Message, work: _Work) -> Any:
