@@ -39,7 +39,7 @@ log = logging.getLogger(__name__)
 # Segments whose columns stay in memory, since what is read next is mostly in the same: these, and more of few rows, as
 # those of many hulls that are read in the order of their commits.
 KEPT_OPEN, KEPT_ROWS = 3, 2**20
-# Segments that are looked at for some keys in one read, half of them beside the caller.
+# Segments that are looked at for some keys in one read.
 TOGETHER = 16
 
 
@@ -116,13 +116,8 @@ class Filed:
     def key_changes(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What the batches of some segments do to some keys, from a revision on."""
         segments = _run(hull, after + 1, until)[:TOGETHER]
-        beside: Future[list[RowsOfKeys | StorageError]] = Future()
-        if len(segments) > 1:
-            read = partial(self._rows_of_keys, segments[1::2], keys)
-            Thread(target=_settle, args=(beside, read), name="read beside").start()
-        here = self._rows_of_keys(segments[::2], keys)
         found: list[RowsOfKeys] = []
-        for each in chain.from_iterable(zip_longest(here, beside.result() if len(segments) > 1 else ())):
+        for each in self._rows_of_keys(segments, keys) if self._archive.has_parts else self._apart(segments, keys):
             if isinstance(each, StorageError) and not found:
                 raise each
             if not isinstance(each, RowsOfKeys):  # what is before it comes first
@@ -131,6 +126,16 @@ class Filed:
         last = min(until, segments[len(found) - 1].last)
         columns = columns_of_keys(found)
         return last, changes_of_keys(columns.between(after, last), keys)
+
+    def _apart(self, segments: list[StoredSegment], keys: Keys) -> Iterator[RowsOfKeys | StorageError | None]:
+        """The same as `_rows_of_keys`, half of it read beside the caller, where to read is to wait.
+
+        From a disk that took longer: two threads that need the interpreter again and again wait for each other.
+        """
+        beside: Future[list[RowsOfKeys | StorageError]] = Future()
+        read = partial(self._rows_of_keys, segments[1::2], keys)
+        Thread(target=_settle, args=(beside, read), name="read beside").start()
+        return chain.from_iterable(zip_longest(self._rows_of_keys(segments[::2], keys), beside.result()))
 
     def _rows_of_keys(self, segments: list[StoredSegment], keys: Keys) -> list[RowsOfKeys | StorageError]:
         """The rows of keys in some segments: of the first, and of others until that are many, or one fails."""

@@ -99,6 +99,8 @@ class RowsByKey:
         else:
             ordered = rows
         counts = np.diff(self.starts[begin : end + 1])
+        place = np.arange(start, stop)
+        place -= _repeated(self.starts[begin:end], counts)
         codes = self.codes[ordered]
         keyed = codes != NONE
         detail: list[str | None] = [None] * (stop - start)
@@ -110,8 +112,8 @@ class RowsByKey:
         columns |= {name: _taken(values, ordered, stop - start) for name, values in self.of_rows.items()}
         return SegmentColumns(
             identity=self.identity,
-            revision=np.repeat(self.first + np.arange(begin, end), counts),
-            place=np.arange(start, stop) - np.repeat(self.starts[begin:end], counts),
+            revision=_repeated(self.first + np.arange(begin, end), counts),
+            place=place,
             keyed=keyed,
             keys=self.packed(codes if keyed.all() else codes[keyed]),
             detail=detail,
@@ -130,7 +132,7 @@ class RowsByKey:
 
 def _repeated(values: Integers, counts: Integers) -> Integers:
     """The value of each revision for all of its rows. What has the same in all takes no memory for each."""
-    if values.strides == (0,) and len(values):
+    if len(values) == 1 or (values.strides == (0,) and len(values)):
         return np.broadcast_to(values[0], int(counts.sum()))
     return np.repeat(values, counts)
 

@@ -26,7 +26,7 @@ from .gathered import key_codes
 
 if TYPE_CHECKING:
     import io
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     import numpy.typing as npt
     import pyarrow as pa
@@ -463,7 +463,7 @@ def _by_key(file: pq.ParquetFile) -> RowsByKey:
     of_rows.setdefault("points", np.full((count, 2), np.nan))
     of_revisions = _of_revisions(file, [name for name in apart if name not in same], placed)
     of_revisions |= {name: _constant(NO_TIME, revisions) for name in apart if name in same}
-    return RowsByKey(identity, *placed, of_revisions, of_rows, codes, words.packed(), detail)
+    return RowsByKey(identity, *placed, of_revisions, of_rows, codes, words.keys, detail)
 
 
 def _add_arrays(of_rows: dict[str, npt.NDArray[Any]], table: pa.Table, rows: slice, count: int) -> None:
@@ -488,6 +488,8 @@ class _Words:
 
     def numbers(self, column: pa.ChunkedArray) -> npt.NDArray[np.int32]:
         """The numbers of the keys of the next group, NONE for no key. The first may be the last one before it."""
+        import pyarrow as pa
+
         codes, words = _coded(column)
         if self._identity == "int":
             words = words.drop_null()
@@ -501,19 +503,27 @@ class _Words:
             first -= 1
             words = words[1:]
         if len(words):
-            self._parts.append(words)
+            self._parts.append(words.cast(pa.uint64() if self._identity == "int" else pa.string()))
             self._count += len(words)
         if first:
             codes = np.where(codes == NONE, np.int32(NONE), codes + np.int32(first))
         return codes
 
-    def packed(self) -> Callable[[npt.NDArray[np.int32]], Keys]:
-        """What returns the keys with some numbers."""
+    def keys(self, codes: npt.NDArray[np.int32]) -> Keys:
+        """The keys with some numbers. Those of all, as of a state, are copied once: new memory takes its time."""
+        if self._identity == "str" and len(codes) == self._count and np.array_equal(codes, np.arange(self._count)):
+            texts = [_text(part) for part in self._parts]
+            return PackedKeys(*(b"".join(each) for each in zip(*texts, strict=True)) if texts else (b"", b""))
+        return _packed(self._together(), codes, self._identity)
+
+    def _together(self) -> pa.Array:
+        """All keys as one array."""
         import pyarrow as pa
 
-        kind = pa.uint64() if self._identity == "int" else pa.string()
-        words = pa.concat_arrays([pa.array([], kind), *(each.cast(kind) for each in self._parts)])
-        return partial(_packed, words, identity=self._identity)
+        if len(self._parts) != 1:
+            kind = pa.uint64() if self._identity == "int" else pa.string()
+            self._parts = [pa.concat_arrays([pa.array([], kind), *self._parts])]
+        return self._parts[0]
 
 
 def _of_revisions(file: pq.ParquetFile, names: list[str], placed: _Placed) -> dict[str, Integers]:
@@ -824,10 +834,16 @@ def _packed(words: pa.Array, codes: npt.NDArray[np.int32], identity: Identity) -
     if identity == "int":
         integers: npt.NDArray[np.uint64] = there.to_numpy(zero_copy_only=False)
         return integers
-    _, offsets, data = there.buffers()
-    ends = np.frombuffer(offsets, np.int32, len(there) + 1, 4 * there.offset) if offsets else np.zeros(1, np.int32)
-    lengths = np.diff(ends).astype(np.uint8)
-    return PackedKeys(lengths, b"" if data is None else data.slice(ends[0], ends[-1] - ends[0]).to_pybytes())
+    lengths, text = _text(there)
+    return PackedKeys(lengths, bytes(text))
+
+
+def _text(words: pa.Array) -> tuple[npt.NDArray[np.uint8], memoryview]:
+    """The lengths of keys, and these one after the other."""
+    _, offsets, data = words.buffers()
+    ends = np.frombuffer(offsets, np.int32, len(words) + 1, 4 * words.offset) if offsets else np.zeros(1, np.int32)
+    text = memoryview(b"" if data is None else data)
+    return np.diff(ends).astype(np.uint8), text[ends[0] : ends[-1]]
 
 
 def _scaled(values: npt.NDArray[np.float64], there: npt.NDArray[np.bool_], order: Rows) -> tuple[pa.Array, int | None]:
