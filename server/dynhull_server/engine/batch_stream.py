@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from ..state.batch import Write
+from ..state.batch import Batch, Write
 from ..state.events import Arrived, Gone
 from ..state.hull import Hull
 from ..state.requests import Birth, Request, Stream, WriteBatch
@@ -35,9 +35,18 @@ class BatchStream:
         self._stream = Stream(name, hull)
         self._notify = notify
 
+    def apply_points(self, batch: Batch) -> bool:
+        """Apply a small batch of points and nothing else, if that needs neither a request nor what one has."""
+        applied = self._driver.at_once(self._driver.core.apply_points, self._stream, batch)
+        if applied is None:
+            return False
+        self.applied.append((0, applied))
+        self._notify()
+        return True
+
     def write_one(self, write: Write) -> None:
         """Send a batch."""
-        applied = self._driver.write_at_once(self._stream, write)
+        applied = self._driver.at_once(self._driver.core.write_at_once, self._stream, write)
         if applied is not None:
             self.applied.append((write.sequence, applied))
             self._notify()

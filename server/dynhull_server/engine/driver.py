@@ -5,11 +5,11 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import Future
 from functools import partial
-from typing import Any, Protocol, assert_never
+from typing import Any, Protocol, TypeVar, assert_never
 
 from ..state import events
-from ..state.batch import Applied, Write
-from ..state.core import Core, not_stored
+from ..state.batch import Applied
+from ..state.core import Core, Written, not_stored
 from ..state.errors import StoppingError
 from ..state.events import (
     Commit,
@@ -58,6 +58,8 @@ STUCK = 10.0
 PAUSE_FACTOR = 4.0
 # Seconds between looks at the commit in progress.
 WATCH_SECONDS = 1.0
+
+T = TypeVar("T")
 
 
 class HullObserver(Protocol):
@@ -233,12 +235,12 @@ class Driver:
         finally:
             self._stepping = False
 
-    def write_at_once(self, stream: Stream, write: Write) -> Applied | None:
+    def at_once(self, apply: "Callable[[Stream, T], Written | None]", stream: Stream, batch: T) -> Applied | None:
         """The result of a small batch of a stream, which is applied without a request; None if it takes one."""
         if self._stepping:
             return None
         try:
-            written = self.core.write_at_once(stream, write)
+            written = apply(stream, batch)
             if written is None:
                 return None
             hull, applied, changes = written

@@ -223,9 +223,10 @@ class StreamedBatches:
         batch = message.batch()
         if batch is None:
             return False
-        rows = self._call.message_bytes // decode.BYTES_PER_POINT
         self._arrivals.append(time.perf_counter())
-        self._batches.write_one(Write(self.name, batch, self._driver.time(), rows, "", 0, self._owner))
+        if not self._batches.apply_points(batch):
+            rows = self._call.message_bytes // decode.BYTES_PER_POINT
+            self._batches.write_one(Write(self.name, batch, self._driver.time(), rows, "", 0, self._owner))
         return True
 
     def _require_batches_alone(self, message: Any, batches: int) -> None:

@@ -13,7 +13,7 @@ occupies all of these queues. The hulls that a fence depends on share one queue:
 """
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 from .errors import (
     DiskFullError,
@@ -77,7 +77,7 @@ if TYPE_CHECKING:
 
     from sortedcontainers import SortedDict
 
-    from .batch import Applied, Write
+    from .batch import Applied, Batch, Write
     from .changes import Change
     from .fences.model.records import KeptFence
 
@@ -90,6 +90,8 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 READS = ReadHull | ReadTogether | ReadFence
 # What the shards of a divided hull carry out.
 DIVIDED = WriteBatch | Expire
+# A hull, the result of a batch that was applied to it at once, and what to commit.
+Written: TypeAlias = "tuple[Hull, Applied, list[Change]]"
 
 
 class Core:
@@ -327,19 +329,41 @@ class Core:
         else:
             effects.append(Reply([request]))
 
-    def write_at_once(self, stream: Stream, write: "Write") -> "tuple[Hull, Applied, list[Change]] | None":
+    def _free(self, stream: Stream) -> Hull | None:
+        """The hull of a stream, if nothing goes on in its queue or depends on it; otherwise a batch takes a request."""
+        queue = self._queues.get(stream.name)
+        if queue is None or queue.trip is not None or queue.waiting or self._stopping or not self._immediate:
+            return None
+        hull = queue.hull
+        if hull is None or hull is not stream.hull or stream.stopped or hull.divided or hull.state.torn:
+            return None
+        return None if queue.line is not None or self._schedule.fences else hull
+
+    def apply_points(self, stream: Stream, batch: "Batch") -> "Written | None":
+        """Apply a small batch of points and nothing else as `write_at_once` does, where none is kept.
+
+        None where it is refused, or more may follow from it. Then nothing has changed, unless the hull is torn.
+        """
+        hull = self._free(stream)
+        if hull is None or self._keeps or len(batch.inserts) + len(batch.deletes) > SMALL:
+            return None
+        try:
+            applied = hull.state.apply_points(batch)
+        except Exception:  # a request is refused with it
+            return None
+        if applied is None:
+            return None
+        hull.counts = hull.state.counts
+        return hull, applied, []
+
+    def write_at_once(self, stream: Stream, write: "Write") -> "Written | None":
         """Apply a small batch of a stream as `_write` does, without a request: the hull, the result, what to commit.
 
         None where it takes one: the batch is refused, or something goes on in the queue of the hull, or depends on it.
         Then nothing has changed, unless the hull is torn.
         """
-        queue = self._queues.get(stream.name)
-        if queue is None or queue.trip is not None or queue.waiting or self._stopping or not self._immediate:
-            return None
-        hull = queue.hull
-        if hull is None or hull is not stream.hull or stream.stopped or hull.divided or write.rows > SMALL:
-            return None
-        if queue.line is not None or self._schedule.fences:
+        hull = self._free(stream)
+        if hull is None or write.rows > SMALL:
             return None
         records: list[Record] | None = [] if self._keeps else None
         try:

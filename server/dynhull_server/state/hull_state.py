@@ -9,10 +9,11 @@ import numpy.typing as npt
 
 from dynhull.arrays import Points
 
-from .batch import NO_POINTS, Applied, Write
+from .batch import NO_POINTS, Applied, Batch, Write
 from .contents import replayed
 from .contents.keyed import Keyed
 from .contents.live import AnyKeyedHull, LiveContents, layer_of
+from .contents.multiset import Multiset
 from .contents.places import GeographicHull
 from .contents.quarantine import Quarantine
 from .errors import HullUnsuitableError, MisfitError, RefusedError
@@ -199,6 +200,25 @@ class HullState:
         if write.producer and not self.is_new(write, now):
             return self.duplicate()
         return self.apply_decoded(write, self.decoded(write), now, records, expired)
+
+    def apply_points(self, batch: Batch) -> Applied | None:
+        """Apply a batch to a hull whose points have neither keys nor times nor a globe, and record nothing.
+
+        None for another hull. Raises as `apply` does; then nothing has changed.
+        """
+        contents = self.contents
+        if type(contents) is not Multiset or contents.globe is not None:
+            return None
+        contents.admit(batch, 0)
+        self.torn = True
+        try:
+            applied = contents.apply(batch, self.counts.revision + 1)
+        except RefusedError:
+            self.torn = False
+            raise
+        self._applied(applied.points, contents.cause(batch), hull_changed=applied.hull_changed)
+        self.torn = False
+        return applied
 
     def is_new(self, write: Write, now: float) -> bool:
         """Whether a batch is the next one of its producer, or not numbered; False where it has already been applied.

@@ -91,6 +91,47 @@ def test_as_with_a_request(settings: HullSettings, make: Any, producer: str, *, 
         assert stored(mine) == stored(theirs)
 
 
+def test_points_as_with_a_request() -> None:
+    random = np.random.default_rng(13)
+    (core, stream), (other, its_stream) = serving(), serving()
+    for number in range(200):
+        batch = points(random, number)
+        request = WriteBatch(None, Write(NAME, batch, 1000 + number, 3), None, its_stream)
+        answered(other, request)
+        assert request.error is None
+        mine, theirs = core.get(NAME), other.get(NAME)
+        assert core.apply_points(stream, batch) == (mine, request.result, [])
+        assert mine.counts == theirs.counts
+        assert mine.counts is mine.state.counts
+        assert not mine.state.torn
+        assert (stored(mine), mine.state.vertices().tolist()) == (stored(theirs), theirs.state.vertices().tolist())
+
+
+@pytest.mark.parametrize(
+    ("settings", "keeps"),
+    [
+        (DEFAULT, True),
+        (HullSettings("str"), False),
+        (HullSettings(window=Window(max_points=20)), False),
+        (HullSettings(frame="geographic"), False),
+    ],
+)
+def test_points_of_which_more_follows_take_more(settings: HullSettings, *, keeps: bool) -> None:
+    core, stream = serving(settings, keeps=keeps)
+    counts = core.get(NAME).counts
+    assert core.apply_points(stream, ONE) is None
+    assert core.get(NAME).state.counts is counts
+    assert not core.get(NAME).state.torn
+
+
+def test_points_beyond_the_limit_take_a_request() -> None:
+    core, stream = serving(HullSettings(max_points=2))
+    two = Batch(np.array([[1.0, 2.0], [3.0, 4.0]]), NO_POINTS, 0, False)
+    assert core.apply_points(stream, two) is not None
+    assert core.apply_points(stream, ONE) is None
+    assert core.get(NAME).counts.points == len(core.get(NAME).state.hull) == 2
+
+
 def ended(core: Core, stream: Stream) -> None:
     core.step(Gone(stream))
 
@@ -126,6 +167,7 @@ def test_only_where_nothing_goes_on(what: Callable[[Core, Stream], None]) -> Non
     what(core, stream)
     before = core.hulls[NAME].state.counts if NAME in core.hulls else None
     assert core.write_at_once(stream, Write(NAME, ONE, 1, 1)) is None
+    assert core.apply_points(stream, ONE) is None
     assert (core.hulls[NAME].state.counts if NAME in core.hulls else None) is before
 
 
@@ -134,12 +176,16 @@ def test_large_batches_and_commits_that_take_time_need_a_request() -> None:
     assert core.write_at_once(stream, Write(NAME, ONE, 1, SMALL)) is not None
     assert core.write_at_once(stream, Write(NAME, ONE, 1, SMALL + 1)) is None
     assert core.write_at_once(Stream(NAME), Write(NAME, ONE, 1, 1)) is None  # it may have to create the hull
+    assert core.apply_points(stream, Batch(np.zeros((SMALL, 2)), NO_POINTS, 0, False)) is not None
+    assert core.apply_points(stream, Batch(np.zeros((SMALL, 2)), np.zeros((1, 2)), 0, False)) is None
+    assert core.apply_points(Stream(NAME), ONE) is None
     waits = Core(LIMITS)
     for effect in waits.step(CreateHull(None, NAME, CREATED)):
         assert isinstance(effect, Commit)
         assert effect.ticket is not None
         waits.step(Committed(effect.ticket))
     assert waits.write_at_once(Stream(NAME, waits.get(NAME)), Write(NAME, ONE, 1, 1)) is None
+    assert waits.apply_points(Stream(NAME, waits.get(NAME)), ONE) is None
 
 
 @pytest.mark.parametrize(
@@ -154,14 +200,17 @@ def test_what_is_refused_takes_a_request(write: Write, refusal: type[Exception])
     core, stream = serving()
     counts = core.get(NAME).counts
     assert core.write_at_once(stream, write) is None
+    if write.producer == "" and isinstance(write.content, Batch):
+        assert core.apply_points(stream, write.content) is None
     request = WriteBatch(None, write, None, stream)
     answered(core, request)
     assert (type(request.error), stream.stopped) == (refusal, True)
     assert core.get(NAME).counts is counts
 
 
-def test_memory_that_runs_out_in_the_middle(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A part of the batch may be in memory: the request after it does not apply it again, and the hull is examined."""
+@pytest.mark.parametrize("points_alone", [False, True])
+def test_memory_that_runs_out_in_the_middle(monkeypatch: pytest.MonkeyPatch, *, points_alone: bool) -> None:
+    """A part of the batch may be in memory: what comes after it does not apply it again, and the hull is examined."""
     core, stream = serving()
     counts = core.get(NAME).counts
     applied = []
@@ -172,6 +221,8 @@ def test_memory_that_runs_out_in_the_middle(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(Multiset, "apply", run_out)
     write = Write(NAME, ONE, 1, 1)
+    if points_alone:
+        assert core.apply_points(stream, ONE) is None
     assert core.write_at_once(stream, write) is None
     request = WriteBatch(None, write, None, stream)
     reply, examine = core.step(request)
