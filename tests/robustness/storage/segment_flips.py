@@ -9,6 +9,7 @@ revisions are answered as they were, and `check` names those. Any other outcome 
 """
 
 import argparse
+import logging
 import random
 import sys
 import tempfile
@@ -208,6 +209,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the choice of bits (default 0)")
     parser.add_argument("--folder", type=Path, default=None, help="where to put the data (default: the system's)")
     options = parser.parse_args()
+    logging.disable()  # a line for each file that cannot be read
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:
         past = Past(Path(folder))
         try:
