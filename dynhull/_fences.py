@@ -263,13 +263,13 @@ class Fences:
 
     def _columns(self, rows: list[tuple[int, int, int, Key, Point, Point, float]]) -> Taken:
         fences, changes, causes, keys, points, previous, distances = zip(*rows, strict=True)
-        wide = np.array(fences, np.int64), *(np.array(each, np.float64) for each in (points, previous, distances))
-        narrow = np.array(changes, np.int8), np.array(causes, np.uint8)
-        columns = b"".join([column.tobytes() for column in (*wide, *narrow)])
+        columns = [np.array(fences, np.int64).tobytes()]
+        columns += [np.array(each, np.float64).tobytes() for each in (points, previous, distances)]
+        columns += [np.array(changes, np.int8).tobytes(), np.array(causes, np.uint8).tobytes()]
         packed = self._packed(keys)
         if isinstance(packed, PackedKeys):
-            return columns, packed.lengths, packed.data
-        return columns, None, packed.tobytes()
+            return b"".join(columns), packed.lengths, packed.data
+        return b"".join(columns), None, packed.tobytes()
 
     def _packed(self, keys: Any) -> Keys:
         return PackedKeys.pack(keys) if self._entities.key_type == "str" else np.array(keys, np.uint64)
