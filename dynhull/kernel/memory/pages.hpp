@@ -45,7 +45,20 @@ inline void* map_aligned(std::size_t bytes) {
   madvise(start + before, bytes, MADV_HUGEPAGE);
   return start + before;
 }
+
+// The size of a block that is soon released: without a rest that the system would hand out in small pages.
+inline std::size_t whole_huge_pages(std::size_t bytes) {
+  return mapped(bytes) ? (bytes + HUGE_PAGE - 1) / HUGE_PAGE * HUGE_PAGE : whole_pages(bytes);
+}
+#else
+inline std::size_t whole_huge_pages(std::size_t bytes) { return whole_pages(bytes); }
 #endif
+
+// The size of a block that stays: in huge pages only where that takes a sixteenth more at most.
+inline std::size_t mostly_huge_pages(std::size_t bytes) {
+  const std::size_t whole = whole_huge_pages(bytes);
+  return whole - bytes <= bytes / 16 ? whole : whole_pages(bytes);
+}
 
 // Sizes of mapped blocks are multiples of a page.
 inline void* resize(void* old, std::size_t old_bytes, std::size_t bytes) {

@@ -40,7 +40,7 @@ class Pool {
     std::size_t capacity = std::max<std::size_t>({needed - freed_, std::size_t{capacity_} + capacity_ / 8, 2});
     if (capacity_ > 0 && capacity < SMALL) capacity += capacity / 2;
     if (capacity >= NOWHERE / 2) throw std::bad_alloc();
-    capacity = memory::whole_pages(capacity * sizeof(Record)) / sizeof(Record);
+    capacity = whole_pages(capacity) / sizeof(Record);
     data_ = static_cast<Record*>(memory::resize(data_, bytes(), whole_pages(capacity)));
     capacity_ = static_cast<std::uint32_t>(capacity);
   }
@@ -110,7 +110,7 @@ class Pool {
   static constexpr std::uint32_t NOWHERE = ~std::uint32_t{0};
   static constexpr std::size_t SMALL = (std::size_t{1} << 20) / sizeof(Record);
 
-  static std::size_t whole_pages(std::size_t capacity) { return memory::whole_pages(capacity * sizeof(Record)); }
+  static std::size_t whole_pages(std::size_t capacity) { return memory::mostly_huge_pages(capacity * sizeof(Record)); }
   std::size_t bytes() const { return whole_pages(capacity_); }
   std::uint32_t& link(std::uint32_t i) { return reinterpret_cast<std::uint32_t&>(data_[i]); }
 

@@ -66,7 +66,7 @@ class BlockCache {
 template <class Record>
 class Scratch {
  public:
-  explicit Scratch(std::size_t count) : block_(BlockCache::take(memory::whole_pages(count * sizeof(Record)))) {}
+  explicit Scratch(std::size_t count) : block_(BlockCache::take(memory::whole_huge_pages(count * sizeof(Record)))) {}
   Scratch(Scratch&& other) noexcept : block_(std::exchange(other.block_, {})) {}
   ~Scratch() { BlockCache::give_back(block_); }
 

@@ -91,6 +91,7 @@ class Chord {
   struct Distance {
     double value, bound;
     bool certainly_inside() const { return -value > bound; }
+    Distance from_below() const { return {-value, bound}; }  // from the same line, of the other side
   };
 
   Chord(Side side, Point a, Point b)

@@ -84,7 +84,17 @@ struct Leaf {
       y[i] = points[i].y;
     }
     std::fill(x + size, x + LEAF, INFINITE);
-    for (Side side : SIDES) chain[side] = scan(side, 0, count - 1);
+    // One pass for both sides: what is above a chord is as far from below it.
+    const unsigned last = count - 1;
+    const Chord chord(UPPER, points[0], points[last]);
+    Beyond above, beneath;
+    for (unsigned i = 1; i < last; ++i) {
+      const Chord::Distance distance = chord.distance(points[i]);
+      above.add(i, distance);
+      beneath.add(i, distance.from_below());
+    }
+    chain[UPPER] = scan(UPPER, 0, perhaps_vertices(UPPER, 0, above, last), last);
+    chain[LOWER] = scan(LOWER, 0, perhaps_vertices(LOWER, 0, beneath, last), last);
   }
 
   // Adds p as entry i. Returns the sides on whose chain p is, as bits.
@@ -156,22 +166,31 @@ struct Leaf {
   static Mask opened(Mask mask, unsigned i) { return (mask & below(i)) | (mask & ~below(i)) << 1; }
   static Mask closed(Mask mask, unsigned i) { return (mask & below(i)) | ((mask >> 1) & ~below(i)); }
 
-  // The entries between two, without those certainly inside the chord or inside the triangle of the chord and the entry
-  // farthest outside it. A floating-point filter, branch-free.
-  Mask perhaps_vertices(Side side, unsigned from, unsigned to) const {
-    const Point a = (*this)[from], b = (*this)[to];
-    const Chord chord(side, a, b);
+  // What is not certainly inside a chord, and the entry farthest outside it. Branch-free.
+  struct Beyond {
     Mask outside = 0;
     double most = 0;
-    unsigned apex = from;
-    for (unsigned i = from + 1; i < to; ++i) {
-      const Chord::Distance distance = chord.distance((*this)[i]);
+    unsigned apex = LEAF;  // none
+
+    void add(unsigned i, Chord::Distance distance) {
       outside |= Mask{!distance.certainly_inside()} << i;
       apex = distance.value > most ? i : apex;
       most = std::max(most, distance.value);
     }
-    if (!several(outside) || apex == from) return outside;
-    const Chord chords[] = {Chord(side, (*this)[apex], b), Chord(side, a, (*this)[apex])};
+  };
+
+  // The entries between two, without those certainly inside the chord or inside the triangle of the chord and the entry
+  // farthest outside it. A floating-point filter.
+  Mask perhaps_vertices(Side side, unsigned from, unsigned to) const {
+    const Chord chord(side, (*this)[from], (*this)[to]);
+    Beyond beyond;
+    for (unsigned i = from + 1; i < to; ++i) beyond.add(i, chord.distance((*this)[i]));
+    return perhaps_vertices(side, from, beyond, to);
+  }
+  Mask perhaps_vertices(Side side, unsigned from, const Beyond& beyond, unsigned to) const {
+    const auto [outside, most, apex] = beyond;
+    if (!several(outside) || apex == LEAF) return outside;
+    const Chord chords[] = {Chord(side, (*this)[apex], (*this)[to]), Chord(side, (*this)[from], (*this)[apex])};
     Mask kept = bit(apex);
     for (Mask rest = outside & ~bit(apex); rest; rest &= rest - 1) {
       const unsigned i = lowest(rest);
