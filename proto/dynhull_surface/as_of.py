@@ -5,6 +5,8 @@ from typing import Any
 
 from .iso_times import from_iso
 
+REVISION_DIGITS, SHOWN_DIGITS = 20, 60
+
 
 class Present:
     """The reading methods of a client for one hull, without its name.
@@ -26,12 +28,15 @@ def moment_of(text: str | None, name: str) -> int | str | None:
     """A revision, which is all digits; or the text of a time with a time zone; None for None.
 
     Raises:
-        ValueError: it is neither; the message has the name.
+        ValueError: it is neither, or no revision has that number; the message has the name.
     """
     if text is None:
         return None
     if text.isdecimal() and text.isascii():
-        return int(text)
+        digits = text.lstrip("0") or "0"
+        if len(digits) > REVISION_DIGITS or int(digits) >= 2**64:  # Python refuses thousands of digits in its own words
+            raise ValueError(f"{name} must be less than 2**64, got {text[:SHOWN_DIGITS]}")
+        return int(digits)
     try:
         zone = from_iso(text).tzinfo
     except ValueError:

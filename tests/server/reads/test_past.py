@@ -356,6 +356,12 @@ def test_a_text_that_is_no_moment_is_refused_with_the_name_that_it_was_given_by(
         for path, name in (("?at=", "at"), ("/tracks?key=a&to=", "to"), ("/replay?from=", "from")):
             status, body = asyncio.run(streamed(f"/hulls/keyed{path}{text}"))
             assert (status, json.loads(body)["detail"]) == (400, f"{name} {text!r} {NO_MOMENT}")
+    for text in (str(2**64), "9" * 5000):
+        refused = f"must be less than 2**64, got {text[:60]}"
+        done = dynhull("measure", "keyed", "--at", text, "--address", address)
+        assert (done.exit_code, done.stderr) == (2, f"error: --at {refused}\n")
+        status, body = asyncio.run(streamed(f"/hulls/keyed?at={text}"))
+        assert (status, json.loads(body)["detail"]) == (400, f"at {refused}")
 
 
 def test_faces_of_a_replay(served):
