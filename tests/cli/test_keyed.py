@@ -63,6 +63,8 @@ def test_integer_keys_and_another_hull(served, name):
     done = dynhull("put", fleet, "seven", "1", "1")
     assert done.exit_code == 2
     assert "key 1 is 'seven', not an integer from 0 to 2**64 - 1" in done.stderr
+    done = dynhull("put", fleet, "9" * 5000, "1", "1")
+    assert (done.exit_code, "not an integer from 0 to 2**64 - 1" in done.stderr) == (2, True)
     file = dynhull("load", fleet, "--key", "id", input="id,x,y\n8,1,1\nx,2,2\n")
     assert (file.exit_code, "line 3: id is 'x', not an integer" in file.stderr) == (0, True)
     assert entities(served, fleet)[0] == {7: [0.5, 0.5], 8: [1, 1]}

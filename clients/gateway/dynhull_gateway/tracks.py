@@ -1,5 +1,6 @@
 """The ways of keys through the past."""
 
+import re
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -18,6 +19,8 @@ from .problems import ProblemError
 from .schemas import HullPath
 
 router = APIRouter(tags=["questions"], route_class=JsonRoute)
+
+WHOLE = re.compile("0*[0-9]{1,20}")
 
 TrackedKeys = Annotated[
     Sequence[str],
@@ -68,9 +71,10 @@ async def _as_the_hull_has_them(client: AsyncHullClient, name: str, keys: Sequen
     """The keys as integers, if those of the hull are."""
     async for info in client.list_hulls(name):
         if info.name == name and info.keyed == "int":
-            if wrong := [key for key in keys if not (key.isascii() and key.isdecimal())]:
-                detail = f"key: {wrong[0]!r} is not a key of {name!r}, which are integers"
-                raise ProblemError(400, detail, "INVALID_FIELD", field="key", value=wrong[0])
+            if wrong := [key for key in keys if not WHOLE.fullmatch(key)]:
+                shown = wrong[0][:60]
+                detail = f"key: {shown!r} is not a key of {name!r}, which are integers"
+                raise ProblemError(400, detail, "INVALID_FIELD", field="key", value=shown)
             return list(map(int, keys))
         break
     return keys

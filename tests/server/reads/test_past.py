@@ -484,7 +484,10 @@ def test_faces_of_a_track(served):
     for asked in ({"accept": "application/geo+json"}, {}):
         found = asyncio.run(streamed(path + ("" if asked else "&f=geojson"), **asked))[1]
         assert json.loads(found)["features"][0] == way
-    assert asyncio.run(streamed("/hulls/numbered/tracks?key=k1"))[0] == 400
+    for wrong in ("k1", "9" * 5000):
+        status, body = asyncio.run(streamed(f"/hulls/numbered/tracks?key={wrong}"))
+        detail = f"key: {wrong[:60]!r} is not a key of 'numbered', which are integers"
+        assert (status, json.loads(body)["detail"]) == (400, detail)
     assert json.loads(asyncio.run(streamed("/hulls/numbered/tracks?key=99"))[1])["tracks"][0]["key"] == 99
     assert asyncio.run(streamed("/hulls/plain/tracks?key=99"))[0] == 409
     assert dynhull("track", "plain", "a", "--csv", "--json", "--address", address).exit_code != 0

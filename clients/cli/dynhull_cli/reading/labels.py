@@ -12,6 +12,7 @@ from .values import BadValueError, coordinate
 
 Key = str | int
 LONGEST_KEY = 255  # bytes
+KEY_DIGITS = 20  # those of 2**64 - 1; Python refuses thousands in its own words
 Labels = tuple[Key | None, int | None, int | None, float | None]
 """The key of a row, its time and the time at which it leaves, in microseconds since 1970, and its accuracy; or None."""
 
@@ -92,7 +93,7 @@ def integer_key(key: Any, place: str) -> int:
     """A key that is an integer; BadValueError names the place."""
     if isinstance(key, int) and not isinstance(key, bool):
         return key
-    if not isinstance(key, str) or not key.strip().isdecimal():
+    if not isinstance(key, str) or not key.strip().isdecimal() or len(key.strip().lstrip("0")) > KEY_DIGITS:
         problem = "not an integer from 0 to 2**64 - 1, and the keys of the hull are integers"
         raise BadValueError(place, problem, key)
     return int(key)
