@@ -113,13 +113,21 @@ def test_the_options_of_a_command_are_known_without_what_it_runs(asked, answer) 
         assert not early, f"dynhull {name} {asked} imports {', '.join(sorted(early))}"
 
 
-def test_the_help_of_each_command() -> None:
-    listed = dynhull("--help").stdout
+def test_the_help_of_each_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every example has a line of its own."""
+    monkeypatch.setenv("COLUMNS", "120")
+    listed, examples = dynhull("--help").stdout, 0
     for entry in entry_points(group="dynhull.commands"):
         done = dynhull(entry.name, "-h")
         assert (done.exit_code, f" dynhull {entry.name} " in done.stdout.replace(" root ", " dynhull ")) == (0, True)
         assert f"\n  {entry.name} " in listed
         assert "<bool>" not in done.stdout, "a flag takes no value"
+        shown = [line.strip() for line in done.stdout.splitlines()]
+        for line in (entry.load().__doc__ or "").splitlines():
+            if line.startswith(" " * 8 + "dynhull "):
+                assert line.strip() in shown, entry.name
+                examples += 1
+    assert examples > 20
     assert "More:" not in listed, "each command has its group"
     assert "Another name for dynhull load." in dynhull("import", "-h").stdout
 
@@ -196,19 +204,6 @@ def test_a_value_of_the_wrong_kind_is_shown(command: list[str], message: str, mo
     done = dynhull(*command)
     assert done.exit_code == 2
     assert message in done.stderr
-
-
-def test_every_example_of_the_help_has_a_line_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "120")
-    examples = 0
-    for entry in entry_points(group="dynhull.commands"):
-        written = (entry.load().__doc__ or "").splitlines()
-        shown = [line.strip() for line in dynhull(entry.name, "--help").stdout.splitlines()]
-        for line in written:
-            if line.startswith(" " * 8 + "dynhull "):
-                assert line.strip() in shown, entry.name
-                examples += 1
-    assert examples > 20
 
 
 def test_without_a_command_line() -> None:

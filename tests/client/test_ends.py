@@ -267,6 +267,7 @@ def checked(cells: Cells) -> None:
     assert not cells.wrong, str(cells)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("how", WAYS)
 def test_async_waits_end(server: Server, how: str) -> None:
     cells = Cells()

@@ -7,8 +7,9 @@ from threading import Event, Thread
 import numpy as np
 import oracle
 import pytest
+from cases import one_of
 from hulls import HULLS, KEYED_HULLS
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from inputs import CIRCLE, cloud, point, points, questions
 
@@ -57,7 +58,7 @@ def test_layers(make, rows, k):
 
 @both
 @given(asked=questions(8), k=st.integers(0, 4))
-@settings(max_examples=20)
+@one_of(2)
 def test_depth(make, asked, k):
     rows, queries = asked
     layers = list(peeled(rows))[:k]
@@ -227,6 +228,6 @@ def test_odd_arguments(make):
 
 @both
 @given(rows=st.lists(point, min_size=1, max_size=4), copies=st.integers(1, 3))
-@settings(max_examples=10)
+@one_of(3)
 def test_copies_go_together(make, rows, copies):
     assert list(map(tuples, make(rows * copies).layers(5))) == list(peeled(rows))
