@@ -6,6 +6,7 @@ from io import BytesIO
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from cases import one_of
 from folders import same
@@ -19,7 +20,16 @@ from dynhull_server.state.contents import begun
 from dynhull_server.state.errors import MisfitError, RefusedError
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.limits import Limits
-from dynhull_server.state.records import CommitStamp, HullRow, HullSettings, Kept, QuarantineRules, Window
+from dynhull_server.state.records import (
+    CommitStamp,
+    HullRow,
+    HullSettings,
+    Kept,
+    KeyRows,
+    QuarantineRules,
+    Record,
+    Window,
+)
 from dynhull_server.state.root_state import state_of
 from dynhull_server.storage.of_keys import changes_of_keys
 from dynhull_server.storage.port import DamagedError
@@ -338,3 +348,21 @@ def test_keys_have_the_same_numbers_in_both_languages(monkeypatch):
     monkeypatch.setattr(gathering, "native", None)
     assert found.tolist() == key_codes(keys).tolist()
     assert key_codes(keys[:0]).tolist() == []
+
+
+@pytest.mark.parametrize("rows", [1, 3, 4, 9])
+def test_keys_of_few_rows_are_written_one_by_one_and_read_as_those_of_many(rows, monkeypatch):
+    """In groups of 64 rows, in whose first ones a key ends and the next one begins."""
+    monkeypatch.setattr(parquet, "GROUP_ROWS", 64)
+    names, places = [f"key {each:03}" for each in range(100)], np.arange(200.0).reshape(-1, 2)
+    moved = [KeyRows(PackedKeys.pack(names), places + turn, PackedKeys.pack([])) for turn in range(rows)]
+    columns = columns_of([Record(turn + 1, each) for turn, each in enumerate(moved)], "str")
+    content = to_parquet(columns, {})
+    encodings = pq.ParquetFile(BytesIO(content)).metadata.row_group(0).column(parquet.ORDER.index("key")).encodings
+    assert ("RLE_DICTIONARY" in encodings) == (rows >= parquet.SHARED)
+    same(from_parquet(content, "a file")[0], columns)
+    found = rows_from_parquet(content, "a file")[0].last_places(HullSettings("str"), 0, rows)
+    assert list(found.rows.keys) == names
+    assert np.array_equal(found.rows.points, places + rows - 1)
+    some = columns_of_keys([keys_from_parquet(BytesIO(content), "a file", PackedKeys.pack(["key 007", "key 063"]))])
+    assert list(some.keys) == ["key 007", "key 063"] * rows

@@ -77,7 +77,7 @@ CODED = ("key", "cause", "kind", "op", "detail")  # what is read as places in a 
 SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
 MOVES = ("put", "remove")
 TOGETHER = 4  # groups that are read at once where one after the other is needed
-SHARED = 4  # rows of a commit, on average, from which on its time is an index into those of all
+SHARED = 4  # rows of a commit, or of a key, on average, from which on its time, or it, is an index into those of all
 
 
 def load() -> None:
@@ -107,7 +107,8 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
     commits = np.count_nonzero(np.diff(columns.committed)) + 1
     shared = commits * SHARED <= len(columns)
     group_rows = LARGE_GROUP_ROWS if shared and commits >= MANY_COMMITS else GROUP_ROWS
-    order, key = _sorted(columns, group_rows)
+    order, key, keys = _sorted(columns, group_rows)
+    words = WORDS if keys * SHARED <= len(columns) else CONSTANT
     found = _in_order(columns, order, key)
     fields = {name: pa.field(name, _seen_as(column.type)) for name, column in found.items()}
     there = ~np.isnan(columns.points[:, 0])
@@ -127,7 +128,7 @@ def to_parquet(columns: SegmentColumns, about: dict[str, str], state: bytes = b"
         store_schema=False,
         compression="zstd",
         compression_level=LEVEL,
-        use_dictionary=[*WORDS, "committed"] if shared else list(WORDS),
+        use_dictionary=[*words, "committed"] if shared else list(words),
         column_encoding=dict.fromkeys(SPLIT if shared else (*SPLIT, "committed"), "BYTE_STREAM_SPLIT"),
         write_page_checksum=True,
     ) as writer:
@@ -189,8 +190,8 @@ def rows_from_parquet(data: bytes, name: str) -> tuple[RowsByKey, dict[str, str]
 
     try:
         file = _opened(pa.BufferReader(data), name)
-        found = file.schema_arrow.metadata
-        if STATE in found:  # of a state every key is another one
+        found = file.metadata.metadata
+        if not _has_places(file):
             file = pq.ParquetFile(
                 pa.BufferReader(data),
                 metadata=file.metadata,
@@ -347,6 +348,14 @@ def _starts(codes: npt.NDArray[np.int32], words: pa.Array) -> Rows:
     return np.flatnonzero(np.append(True, values[1:] != values[:-1])[: len(values)])
 
 
+def _begins(keys: pa.Array) -> npt.NDArray[np.bool_]:
+    """Which of some keys in order differ from the one before."""
+    import pyarrow.compute as pc
+
+    differ = pc.not_equal(keys.slice(1), keys.slice(0, max(len(keys) - 1, 0))).to_numpy(zero_copy_only=False)
+    return np.append(True, differ)[: len(keys)].astype(np.bool_)
+
+
 def _stamps(file: pq.ParquetFile, groups: Sequence[int], rows: slice | Rows) -> Stamps:
     """The revisions of some rows of groups, and their commits."""
     table = file.read_row_groups(groups, columns=["revision", "commit", "committed"])
@@ -364,6 +373,13 @@ def _opened(source: pa.NativeFile | io.IOBase, name: str) -> pq.ParquetFile:
     if int(found[FORMAT]) > VERSION:
         raise DamagedError(f"{name} has format {int(found[FORMAT])}, this version reads {VERSION}")
     return file
+
+
+def _has_places(file: pq.ParquetFile) -> bool:
+    """Whether the keys of rows are read as places in a list of them: not where most rows have another one."""
+    if STATE in file.metadata.metadata or not file.num_row_groups:  # earlier versions wrote all as such
+        return False
+    return "RLE_DICTIONARY" in file.metadata.row_group(0).column(ORDER.index("key")).encodings
 
 
 def _groups(metadata: pq.FileMetaData, column: int, values: list[Any]) -> list[int]:
@@ -431,8 +447,8 @@ def _by_key(file: pq.ParquetFile) -> RowsByKey:
 
     Memory that is new takes longer than what is done with it.
     """
-    identity: Any = file.schema_arrow.metadata[b"dynhull.identity"].decode()
-    count = file.metadata.num_rows
+    identity: Any = file.metadata.metadata[b"dynhull.identity"].decode()
+    count, distinct = file.metadata.num_rows, STATE in file.metadata.metadata
     same = _same([file.metadata.row_group(group) for group in range(file.num_row_groups)]) if count else {}
     placed = _placed(file)
     revisions = len(placed.starts) - 1
@@ -443,7 +459,7 @@ def _by_key(file: pq.ParquetFile) -> RowsByKey:
     known = {*of_rows, *same, *apart, "revision", "row"}
     columns = [name for name in file.schema_arrow.names if name not in known]
     detail: dict[int, str] = {}
-    codes, words, at = np.full(count, NONE, np.int32), _Words(identity), 0
+    codes, words, at = np.full(count, NONE, np.int32), _Words(identity, distinct=distinct), 0
     for group in range(file.num_row_groups):
         table = file.read_row_group(group, columns=columns, use_threads=False)
         rows = slice(at, at + len(table))
@@ -481,8 +497,9 @@ def _add_arrays(of_rows: dict[str, npt.NDArray[Any]], table: pa.Table, rows: sli
 class _Words:
     """The keys of groups of rows, which lie by key, and a number for each of them."""
 
-    def __init__(self, identity: Identity) -> None:
+    def __init__(self, identity: Identity, *, distinct: bool) -> None:
         self._identity = identity
+        self._distinct = distinct  # as in a state, where every row has another one
         self._parts: list[pa.Array] = []
         self._count = 0
 
@@ -491,13 +508,12 @@ class _Words:
         import pyarrow as pa
 
         codes, words = _coded(column)
-        if self._identity == "int":
+        if not pa.types.is_dictionary(column.type):
             words = words.drop_null()
-            starts = _starts(np.arange(len(words), dtype=np.int32), words)
-            begins = np.zeros(len(words), np.int32)
-            begins[starts] = 1
-            codes[codes != NONE] = np.cumsum(begins) - 1
-            words = words.take(starts)
+        if not (self._distinct or pa.types.is_dictionary(column.type)):
+            begins = _begins(words)
+            codes[codes != NONE] = np.cumsum(begins, dtype=np.int32) - 1
+            words = words.filter(pa.array(begins))
         first = self._count
         if first and len(words) and words[0] == self._parts[-1][-1]:
             first -= 1
@@ -767,8 +783,8 @@ def _filled(values: Any, none: float) -> Any:
     return values.fill_null(none) if values.null_count else values
 
 
-def _sorted(columns: SegmentColumns, group_rows: int) -> tuple[Rows, pa.Array | pa.ChunkedArray]:
-    """The rows by key, then revision and place, those without a key last; and their keys in this order."""
+def _sorted(columns: SegmentColumns, group_rows: int) -> tuple[Rows, pa.Array | pa.ChunkedArray, int]:
+    """The rows by key, then revision and place, those without a key last; their keys; how many strings these are."""
     import pyarrow as pa
 
     with_key, rest = np.flatnonzero(columns.keyed), np.flatnonzero(~columns.keyed)
@@ -777,10 +793,11 @@ def _sorted(columns: SegmentColumns, group_rows: int) -> tuple[Rows, pa.Array | 
         by_key = np.argsort(columns.keys, kind="stable")
         integers = np.zeros(len(columns), np.uint64)
         integers[: len(with_key)] = columns.keys[by_key]
-        return np.concatenate([with_key[by_key], rest]), pa.array(integers, mask=none)
+        return np.concatenate([with_key[by_key], rest]), pa.array(integers, mask=none), 0
     ranks, names = _ranked(columns.keys)
     by_key = np.argsort(ranks, kind="stable")
-    return np.concatenate([with_key[by_key], rest]), _keys_of_groups(ranks[by_key], names, len(columns), group_rows)
+    key = _keys_of_groups(ranks[by_key], names, len(columns), group_rows)
+    return np.concatenate([with_key[by_key], rest]), key, len(names)
 
 
 def _keys_of_groups(ranks: npt.NDArray[Any], names: pa.Array, count: int, group_rows: int) -> pa.ChunkedArray:
