@@ -8,7 +8,7 @@ from asyncio import CancelledError
 from collections import deque
 from collections.abc import Callable, Coroutine, Generator, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from dynhull.arrays import Points
 from dynhull.keys import key_list
@@ -22,7 +22,7 @@ from dynhull_server.state.admission import TICK
 from dynhull_server.state.alarms.status import AlarmStatus
 from dynhull_server.state.alarms.watched import WatchedHulls
 from dynhull_server.state.batch import Applied, Write
-from dynhull_server.state.core import Core
+from dynhull_server.state.core import Core, Written
 from dynhull_server.state.errors import (
     HullNotFoundError,
     HullReplacedError,
@@ -97,6 +97,8 @@ MICROSECOND = 1e-6
 # Seconds within which everything leaves that has to.
 MOMENT = 0.5
 EPOCH = 1e9
+
+T = TypeVar("T")
 
 Condition = Callable[[], object]
 
@@ -223,9 +225,9 @@ class CoreServer:
                 self._carry_out(effect)
         self._stepping = False
 
-    def write_at_once(self, stream: Stream, write: Write) -> Applied | None:
+    def at_once(self, apply: "Callable[[Stream, T], Written | None]", stream: Stream, batch: T) -> Applied | None:
         """The result of a batch that the core applies without a request, as the driver has it; None if it takes one."""
-        written = None if self._stepping else self.core.write_at_once(stream, write)
+        written = None if self._stepping else apply(stream, batch)
         if written is None:
             return None
         hull, applied, changes = written
