@@ -38,7 +38,7 @@ class Logged:
 def logged_process(command: Sequence[str], *, killed: bool = False, code: int = 0) -> Iterator[Logged]:
     """The command; it is ended by SIGTERM, and must end with `code`, unless it was `killed`."""
     with (
-        tempfile.TemporaryFile("w+") as errors,
+        tempfile.TemporaryFile("a+") as errors,  # to read it moves the place at which it would write else
         Process(command, stdout=subprocess.PIPE, stderr=errors, text=True) as process,
     ):
         logged = Logged(process, errors)

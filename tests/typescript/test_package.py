@@ -194,7 +194,8 @@ def test_what_is_aborted_ends_with_the_reason(way: str, server: MortalServer, ga
 @pytest.mark.parametrize("way", ["gateway", "grpc"])
 def test_what_reads_a_damaged_past_ends_with_the_reason(way: str, tmp_path: Path) -> None:
     """Who began anew at each end would do so for ever."""
-    with server_process("--data", str(tmp_path)) as server, HullClient(server.address) as client:
+    complaints = "a part of the past cannot be read"
+    with server_process("--data", str(tmp_path), complaints=complaints) as server, HullClient(server.address) as client:
         client.create_hull("fleet", keyed="str", history=True)
         client.put("fleet", ["a", "b"], [(0, 0), (1, 1)])
         client.remove("fleet", ["b"])

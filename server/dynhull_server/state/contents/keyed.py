@@ -16,6 +16,7 @@ from ..batch import NO_POINTS, Applied, Batch, KeyedBatch
 from ..errors import InvalidBatchError, KeyMissingError, KeyRepeatedError, LimitExceededError, MisfitError
 from ..frames import Globe
 from ..records import (
+    FOREVER,
     NO_TIME,
     Accuracies,
     Cause,
@@ -316,10 +317,15 @@ class Keyed:
     def stored(self) -> Contents:
         """The points in the order of their keys. O(n log n)."""
         keys, points, times = self.hull.entities()
-        deadlines = self._deadlines.of(key_list(keys)) if len(self._deadlines) else None
+        deadlines = self._ends(keys)
         held = self.quarantine.stored() if self.quarantine else None
         accuracies = self.accuracies(keys)
         return Contents(points, keys, stored_times(times) if self.timed else None, deadlines, held, accuracies)
+
+    def _ends(self, keys: Keys) -> Times | None:
+        """The deadlines of keys that are there; None where none has one, though some that were evicted had."""
+        found = self._deadlines.of(key_list(keys)) if len(self._deadlines) else None
+        return found if found is not None and (found != FOREVER).any() else None
 
     def accuracies(self, keys: Keys) -> Accuracies | None:
         """The errors of the positions of keys that are there; None where all are 0."""
