@@ -4,8 +4,9 @@ from sys import modules as _modules
 from typing import Any as _Any
 
 from . import _hull, static
+from ._crossings import Crossings
 from ._entities import DuplicateKeyError, MissingKeyError
-from ._fence_index import Crossings, FenceIndex
+from ._fence_index import FenceIndex
 from ._geo import GeoHull, GeoKeyedHull, GeoWindowHull
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL, set_threads
