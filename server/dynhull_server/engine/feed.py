@@ -22,6 +22,7 @@ from ..storage.port import DamagedError
 from .divided_hull import DividedHull
 from .driver import Driver
 from .live_hull import LiveHull
+from .past import PastHulls
 from .recalls import UNREADABLE, past_refusal
 
 
@@ -46,17 +47,20 @@ class HullFeeds:
     Args:
         driver: has the threads.
         past: keeps the batches.
+        pasts: knows when keys are erased from them.
         keeps: whether any are kept.
-
-    Attributes:
-        erasures: how often keys were erased from the past of any: what was read before may have them.
     """
 
-    def __init__(self, driver: Driver, past: Past, *, keeps: bool) -> None:
+    def __init__(self, driver: Driver, past: Past, pasts: PastHulls, *, keeps: bool) -> None:
         self._driver = driver
         self._past = past
+        self._pasts = pasts
         self._keeps = keeps
-        self.erasures = 0
+
+    @property
+    def erasures(self) -> int:
+        """How often keys were erased from the past of any hull: what was read before may have them."""
+        return self._pasts.erasures
 
     async def follow(
         self, hull: LiveHull, after: int | None, progress_interval: float | None = None

@@ -23,7 +23,6 @@ from ..state.records import Kept, Keys
 from ..storage.past import Erasure
 from ..storage.port import NotCommittedError, Storage
 from .driver import Driver
-from .feed import HullFeeds
 from .live_hull import LiveHull
 from .outliving import Outliving
 from .past import PastHulls
@@ -43,7 +42,6 @@ class Filing:
         driver: has the threads, and commits.
         storage: keeps them.
         pasts: reads them.
-        feeds: read them, too.
 
     Attributes:
         unsure: hulls of which it is not known whether their settings have been changed as was asked.
@@ -51,11 +49,10 @@ class Filing:
 
     SECONDS = 1.0
 
-    def __init__(self, driver: Driver, storage: Storage, pasts: PastHulls, feeds: HullFeeds) -> None:
+    def __init__(self, driver: Driver, storage: Storage, pasts: PastHulls) -> None:
         self._driver = driver
         self._storage = storage
         self._pasts = pasts
-        self._feeds = feeds
         self._turn = asyncio.Lock()
         self._erasing = Outliving()
         self.unsure: set[Hull] = set()
@@ -137,7 +134,6 @@ class Filing:
             raise OutcomeUnknownError(words_for_callers(error)) from error
         finally:
             self._pasts.forget()
-            self._feeds.erasures += 1
         return next((each for each in after if each not in before), None)
 
     async def _erasures(self, hull: LiveHull) -> tuple[Erasure, ...]:

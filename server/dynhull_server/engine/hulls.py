@@ -63,7 +63,8 @@ class Hulls:
     def __init__(self, driver: Driver, storage: Storage, fences: Fences, divisions: Divisions | None) -> None:
         self.rosters = Rosters(lambda: driver.core.hulls.values())
         self.series = KeptSeries(self.of, driver)
-        self.feeds = HullFeeds(driver, storage, keeps=storage.keeps)
+        self.pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
+        self.feeds = HullFeeds(driver, storage, self.pasts, keeps=storage.keeps)
         self._newest = 0  # the number of the last commit with a batch
         self.feed_consumers = FeedConsumers(
             driver, storage, self.feeds, self.get, lambda: (self.standing, self._newest)
@@ -76,8 +77,7 @@ class Hulls:
         self._storage = storage
         self._changing = Outliving()
         self._turn_of_settings = asyncio.Lock()
-        self.pasts = PastHulls(driver, storage, keeps=storage.keeps, max_rows=driver.limits.max_past_rows)
-        self.filing = Filing(driver, storage, self.pasts, self.feeds)
+        self.filing = Filing(driver, storage, self.pasts)
         self._live: dict[Hull, LiveHull] = {}
         self._incarnation = driver.machine.token()  # that of hulls in memory; others find theirs in the storage
         self._standing = standing(self._incarnation, driver.published)

@@ -210,15 +210,19 @@ class HullState:
         if type(contents) is not Multiset or contents.globe is not None:
             return None
         contents.admit(batch, 0)
-        self.torn = True
-        try:
-            applied = contents.apply(batch, self.counts.revision + 1)
-        except RefusedError:
-            self.torn = False
-            raise
+        applied = self._tear(batch)
         self._applied(applied.points, contents.cause(batch), hull_changed=applied.hull_changed)
         self.torn = False
         return applied
+
+    def _tear(self, batch: Any) -> Applied:
+        """Apply an admitted batch to the contents; the hull is torn until the rest follows, unless it is refused."""
+        self.torn = True
+        try:
+            return self.contents.apply(batch, self.counts.revision + 1)
+        except RefusedError:
+            self.torn = False
+            raise
 
     def is_new(self, write: Write, now: float) -> bool:
         """Whether a batch is the next one of its producer, or not numbered; False where it has already been applied.
@@ -275,12 +279,7 @@ class HullState:
                 gone = self.expire(clock, records)
                 if gone and expired is not None:
                     expired()
-        self.torn = True
-        try:
-            applied = contents.apply(batch, self.counts.revision + 1)
-        except RefusedError:
-            self.torn = False
-            raise
+        applied = self._tear(batch)
         if write.producer:
             assert self._producers is not None  # `is_new` has asked them
             self._producers.applied(write.producer, write.sequence, write.owner, now, may_skip=write.may_skip)
