@@ -63,7 +63,7 @@ class Multiset(Live):
 
     def insert_many(self, xy: npt.ArrayLike) -> int:
         """Add k points as one batch. Returns k. O(log² n) each, O((n + k) log k) for k >= n."""
-        return self._apply(+1, xy, "raise")
+        return self._tree.apply(+1, xy, False)
 
     def delete_many(self, xy: npt.ArrayLike, missing: Literal["raise", "ignore"] = "raise") -> int:
         """Remove points as one batch. Returns the number of points removed. O(log² n) each.

@@ -347,11 +347,12 @@ def plain_points(xy: Any) -> Points | None:
     return copy if np.isfinite(copy).all() else None
 
 
-def packed_points(packed: bytes) -> Points | None:
+def _packed_points(packed: bytes) -> Points | None:
     """The points whose coordinates are these little-endian doubles; None if one is not finite."""
-    if kernel is not None and sys.byteorder == "little":
-        return kernel.packed_points(packed)
     return plain_points(np.frombuffer(packed, "<f8").astype(np.float64, copy=False).reshape(-1, 2))
+
+
+packed_points = _packed_points if kernel is None or sys.byteorder == "big" else kernel.packed_points
 
 
 def _finite(array: Points, name: str) -> Points:

@@ -284,8 +284,10 @@ class Hulls:
                 live.moved()
                 if hull.ended:
                     del self._live[hull]
-        self.rosters.moved(hulls)
-        self.series.moved(hulls)
+        if self.rosters.in_use:
+            self.rosters.moved(hulls)
+        if self.series.seconds:
+            self.series.moved(hulls)
 
     def divide(self, hull: Hull, requests: Sequence[WriteBatch | Expire]) -> None:
         """Have the shards of a hull carry out requests."""

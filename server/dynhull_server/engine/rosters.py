@@ -25,11 +25,14 @@ class Rosters:
 
     Args:
         hulls: called for the hulls there are.
+
+    Attributes:
+        in_use: those in use, by what they hold.
     """
 
     def __init__(self, hulls: Callable[[], Iterable[Hull]]) -> None:
         self._hulls = hulls
-        self._rosters: dict[Hashable, tuple[Choice, Roster]] = {}
+        self.in_use: dict[Hashable, tuple[Choice, Roster]] = {}
         self._users: Counter[Hashable] = Counter()
         self._by_prefix: dict[str, list[Roster]] = {}
         self._by_name: dict[str, list[Roster]] = {}
@@ -42,21 +45,19 @@ class Rosters:
         Raises LimitExceededError if they are too many.
         """
         key = kind, choice
-        if key not in self._rosters:
-            self._rosters[key] = choice, self._begin(choice, make())
+        if key not in self.in_use:
+            self.in_use[key] = choice, self._begin(choice, make())
         self._users[key] += 1
         try:
-            yield self._rosters[key][1]
+            yield self.in_use[key][1]
         finally:
             self._users[key] -= 1
             if not self._users[key]:
                 del self._users[key]
-                self._forget(*self._rosters.pop(key))
+                self._forget(*self.in_use.pop(key))
 
     def moved(self, hulls: Iterable[Hull]) -> None:
         """Note that hulls have changed, are new, or are gone. O(1) for each that nobody watches so."""
-        if not self._rosters:
-            return
         for hull in hulls:
             for roster in self._watching(hull.name):
                 if hull.ended:

@@ -128,9 +128,7 @@ class KeptSeries:
         return max(self._begun, self._driver.time() - self._kept)
 
     def moved(self, hulls: Sequence[Hull]) -> None:
-        """Note that hulls have changed, or were deleted. O(1) each."""
-        if not self.seconds:
-            return
+        """Note that hulls have changed, or were deleted, while any is kept. O(1) each."""
         for hull in hulls:
             if hull.ended:
                 self._moved.pop(hull, None)

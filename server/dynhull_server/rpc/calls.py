@@ -115,6 +115,9 @@ class Call:
     async def read(self) -> Any:
         """The next message, None after the last."""
         received = await self._context.read()
+        if type(received) is tuple:  # nearly always
+            message, self.message_bytes = received
+            return message
         return None if received is grpc.aio.EOF else self.take(received)
 
     def take(self, received: Received) -> Any:

@@ -24,22 +24,15 @@ class PointsMessage:
 
     Attributes:
         name: the name that it has of the hull; empty if it has none.
+        batch: the batch.
     """
 
-    __slots__ = ("_data", "_inserts", "_start", "name")
+    __slots__ = ("_data", "batch", "name")
 
-    def __init__(self, data: bytes, name: bytes, inserts: bool, start: int) -> None:
+    def __init__(self, data: bytes, name: bytes, batch: Batch) -> None:
         self._data = data
-        self._inserts = inserts
-        self._start = start
         self.name = name
-
-    def batch(self) -> Batch | None:
-        """The batch; None if a coordinate is not finite."""
-        xy: Points | None = packed_points(self._data[self._start :])
-        if xy is None:
-            return None
-        return Batch(xy, NO_POINTS, 0, False) if self._inserts else Batch(NO_POINTS, xy, 0, False)
+        self.batch = batch
 
     def whole(self) -> Any:
         """The message."""
@@ -56,7 +49,11 @@ def received(whole: Callable[[bytes], Received]) -> Callable[[bytes], Received]:
         if len(data) <= MOST_BYTES:
             found = points_message(data)
             if found is not None:
-                return PointsMessage(data, *found), len(data)
+                name, inserts, start = found
+                xy: Points | None = packed_points(data[start:])
+                if xy is not None:  # all coordinates are finite
+                    batch = Batch(xy, NO_POINTS, 0, False) if inserts else Batch(NO_POINTS, xy, 0, False)
+                    return PointsMessage(data, name, batch), len(data)
         return whole(data)
 
     return deserialize

@@ -127,7 +127,7 @@ class StreamedBatches:
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._loop = asyncio.get_running_loop()
-        self._room = asyncio.Event()
+        self._room: asyncio.Future[None] | None = None  # set while the reader waits
         self._batches = hulls.stream(name, self._notify, create=create)
         self._arrivals: deque[float] = deque()
         self._failure: Exception | None = None
@@ -164,7 +164,9 @@ class StreamedBatches:
         applied = self._batches.applied
         while applied:
             sequence, outcome = applied.popleft()
-            self._room.set()
+            room, self._room = self._room, None
+            if room is not None and not room.done():
+                room.set_result(None)
             self._metrics.batches.applied(outcome, time.perf_counter() - self._arrivals.popleft())
             yield sequence, outcome
 
@@ -203,8 +205,8 @@ class StreamedBatches:
             with self._call.cutoff():
                 while True:
                     while self._batches.rows >= MOST_ROWS or len(self._arrivals) >= MOST_BATCHES:
-                        self._room.clear()
-                        await self._room.wait()
+                        self._room = self._loop.create_future()
+                        await self._room
                     message = await self._call.read()
                     if message is None:
                         return
@@ -220,9 +222,7 @@ class StreamedBatches:
         """Send the batch of a message with points and nothing else; False if it has to be taken as a whole."""
         if self._producer or message.name not in self._own_names:
             return False
-        batch = message.batch()
-        if batch is None:
-            return False
+        batch = message.batch
         self._arrivals.append(time.perf_counter())
         if not self._batches.apply_points(batch):
             rows = self._call.message_bytes // decode.BYTES_PER_POINT

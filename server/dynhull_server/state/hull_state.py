@@ -211,7 +211,9 @@ class HullState:
             return None
         contents.admit(batch, 0)
         applied = self._tear(batch)
-        self._applied(applied.points, contents.cause(batch), hull_changed=applied.hull_changed)
+        revision = applied.revision
+        outlined = self._changed(revision) if applied.hull_changed else self.counts.outlined
+        self.counts = Counts(revision, applied.points, self.hull.distinct, None, "batch", None, outlined)
         self.torn = False
         return applied
 
@@ -352,11 +354,16 @@ class HullState:
         center = None if globe is None else globe.center
         revision, outlined = before.revision + 1 if revision is None else revision, before.outlined
         if hull_changed:
-            self._sent_vertices().changed(revision)
-            outlined = self._changed_at = revision
+            outlined = self._changed(revision)
         if center is not before.center and center != before.center:
             outlined = revision
         self.counts = self._counted(revision, points, cause, center, outlined)
+
+    def _changed(self, revision: int) -> int:
+        """Note that a revision, which is returned, has other vertices than those before."""
+        self._sent_vertices().changed(revision)
+        self._changed_at = revision
+        return revision
 
     def _counted(self, revision: int, points: int, cause: Cause | None, center: Center | None, outlined: int) -> Counts:
         contents = self.contents

@@ -8,7 +8,7 @@ The hulls that a fence depends on share one queue, so that what a change of one 
 next change of any. Creating and deleting a fence joins and parts queues, in a step in which none of them has a trip.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from .fences.index.components import SPANNING, components, depends_on, merged
@@ -55,11 +55,15 @@ class Queues:
 
     Args:
         registry: the hulls and fences that are committed.
+
+    Attributes:
+        get: the queue of a name, None if it has neither a hull nor work.
     """
 
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
         self._queues: dict[str, Queue] = {}
+        self.get: Callable[[str], Queue | None] = self._queues.get
         # The prefixes of fences, by the names of their queues; also of those that are being created.
         self._prefixes: dict[str, str] = {}
         self._first_order = self._last_order = 0
@@ -67,10 +71,6 @@ class Queues:
     def __iter__(self) -> Iterator[Queue]:
         """The queues, by name; one that names share comes several times."""
         return iter(self._queues.values())
-
-    def get(self, name: str) -> Queue | None:
-        """The queue of a name, None if it has neither a hull nor work."""
-        return self._queues.get(name)
 
     def add(self, hull: Hull) -> None:
         """Add the queue of a hull."""

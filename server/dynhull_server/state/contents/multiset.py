@@ -42,8 +42,9 @@ class Multiset:
             raise MisfitError(batch.field, NO_KEYS)
         if batch.times is not None:
             raise MisfitError("insert_times", "has no window, so its points have no times")
-        if self._points + batch.growth > self._most_points:
-            raise LimitExceededError("max_points", self._most_points)
+        most = self._most_points
+        if self._points + len(batch.inserts) > most and self._points + batch.growth > most:
+            raise LimitExceededError("max_points", most)
         if self.globe is not None:
             require_batch(self.globe, batch)
         return batch
@@ -62,10 +63,14 @@ class Multiset:
 
     def apply(self, batch: Batch, revision: int) -> Applied:
         """Apply the batch, or raise PointMissingError."""
-        inserted, to_delete, before = len(batch.inserts), len(batch.deletes), self._changes
-        deleted = apply_points(self.hull, batch)
+        hull, before = self.hull, self._changes
+        inserted, to_delete, deleted = len(batch.inserts), len(batch.deletes), 0
+        if to_delete:
+            deleted = apply_points(hull, batch)
+        else:
+            hull.insert_many(batch.inserts)
         self._points += inserted - deleted
-        self._changes = self.hull.changes
+        self._changes = hull.changes
         return Applied(revision, inserted, deleted, to_delete - deleted, self._changes != before, self._points)
 
     def rows(self, batch: Batch, applied: Applied) -> PointRows:
