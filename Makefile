@@ -23,7 +23,7 @@ COVERAGE_CORE = $(or $(MONITORING),ctrace)
 COVERAGE = $(if $(MONITORING),--cov --cov-report=term)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format docs pages stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties slow long robustness robustness-cluster torture cluster upgrade ray kafka languages objects simulate mutants coverage ends soak flakes peers hooks lock clean
+.PHONY: help demo test check format docs pages stub proto surface vendor contract fuzz fuzz-threads fuzz-reference fuzz-server fuzz-gateway workers shards properties slow browser long robustness robustness-cluster torture cluster upgrade ray kafka languages objects simulate mutants coverage ends soak flakes peers hooks lock clean
 
 help:  ## list these words
 	@sed -En 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | sort | while IFS="$$(printf '\t')" read -r word does; do \
@@ -68,8 +68,11 @@ fuzz-reference: .venv/.test-core  ## every operation checked against a model; a 
 properties: .venv/.test  ## other and many more random examples for the tests of properties
 	$(BIN)/pytest $(WORKERS) -m hypothesis --hypothesis-profile properties --timeout 0 tests
 
-slow: .venv/.test .venv/.peers  ## what `make test` leaves to this word: short runs of the tortures and the fuzzers, faults that must be found, notebooks
-	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) SLOW_CASES=all $(BIN)/pytest $(WORKERS) -m only_with tests
+slow: .venv/.test .venv/.peers  ## what `make test` leaves to this word: short runs of the tortures and the fuzzers, faults that must be found, notebooks, pages in a browser
+	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) SLOW_CASES=all BROWSER_CASES=all $(BIN)/pytest $(WORKERS) -m only_with tests
+
+browser: .venv/.test .venv/.peers  ## the dashboard's pages in a real Chromium; `make test` opens one of each kind
+	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) BROWSER_CASES=all $(BIN)/pytest tests/dashboard -n 2 --dist loadfile
 
 long: .venv/.test  ## all cases of the tests of which `make test` runs every third to seventh
 	LONG_CASES=all $(BIN)/pytest $(WORKERS) -m "every or only_with" tests
@@ -139,7 +142,7 @@ contract: .venv/.check  ## with a release: the contract that later ones must not
 	$(BIN)/buf build --exclude-source-info --output proto/contract.binpb
 
 workers: .venv/.test  ## the tests of server, client, command line and dashboard, run against two gateways and two workers
-	$(BIN)/pytest tests/server tests/cluster tests/client tests/cli tests/dashboard --shape workers -n 2
+	BROWSER_CASES=all $(BIN)/pytest tests/server tests/cluster tests/client tests/cli tests/dashboard --shape workers -n 2
 
 SHARDED = stream watch entities windows verification resume query deadlines queries
 

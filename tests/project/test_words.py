@@ -30,3 +30,19 @@ def test_what_has_a_word_of_its_own_is_left_out_of_the_run_and_not_skipped() -> 
     assert run.returncode == 0, run.stdout + run.stderr
     assert "4/17 tests collected (13 deselected)" in run.stdout
     assert "skipped" not in run.stdout
+
+
+def cases_of(recipe: str) -> set[str]:
+    return set(re.findall(r"\b([A-Z]+_CASES)=all\b", recipe))
+
+
+def test_what_is_left_out_of_the_run_has_a_word_and_ci_runs_what_takes_minutes() -> None:
+    recipes = dict(re.findall(r"^([a-z-]+):[^=\n]*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("*.py"))
+    left_out = set(re.findall(r"only_with\(\"([A-Z]+_CASES)\"\)", sources))
+    assert left_out <= {cases for recipe in recipes.values() for cases in cases_of(recipe)}
+    machine, workflow = ((ROOT / file).read_text() for file in (".ci/run", ".github/workflows/ci.yml"))
+    words = [set(re.findall(r"\bmake ([a-z-]+)", text)) for text in (machine, workflow)]
+    assert words[0] & words[1] >= {"test", "slow", "check"}
+    assert {"SLOW_CASES", "BROWSER_CASES"} <= cases_of(recipes["slow"])
+    assert "SITE_CASES" in cases_of(recipes["pages"])  # a part of `make check`

@@ -1,6 +1,8 @@
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+from cases import in_browser
 from chromium import chromium
 from dashboard_process import dashboard_process
 from metrics import measured
@@ -8,6 +10,17 @@ from playwright.sync_api import Browser
 from server_process import Server
 
 from dynhull_client import HullClient
+
+HERE = Path(__file__).parent
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Pages in a browser take a fifth of the processor time of all tests: `make test` opens one of each kind."""
+    for item in items:
+        in_page = "browser" in getattr(item, "fixturenames", ()) and item.path.parent == HERE
+        if in_page and item.get_closest_marker("smoke") is None:
+            item.add_marker(in_browser)
 
 
 @pytest.fixture(scope="package")

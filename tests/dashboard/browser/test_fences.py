@@ -118,6 +118,7 @@ def test_areas_of_every_kind_and_who_is_inside(
         assert len({*dashes}) == 3, "only their names distinguish them"
 
 
+@pytest.mark.smoke
 def test_events_are_listed_as_they_happen(
     browser: Browser, url: str, client: HullClient, fleet: str, yard: str
 ) -> None:

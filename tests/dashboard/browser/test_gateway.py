@@ -107,6 +107,7 @@ def test_twelve_hulls_and_twelve_fences_in_three_tabs(
         assert len(streams) == len(tabs)
 
 
+@pytest.mark.smoke
 def test_a_gateway_asks_for_a_token_and_keeps_it_in_memory(browser: Browser, tmp_path: Path) -> None:
     tokens = tmp_path / "tokens.toml"
     made = run("token", "--name", "eye", "--read", "fleet", "--write", "fleet")

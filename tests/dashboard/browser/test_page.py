@@ -130,6 +130,7 @@ def place_of(page: Page, x: float, y: float) -> list[float]:
     return place
 
 
+@pytest.mark.smoke
 def test_the_polygon_follows_the_hull(browser: Browser, url: str, client: HullClient, hull: str) -> None:
     generator = np.random.default_rng(3)
     with opened(browser, url, hull) as page:
@@ -721,6 +722,7 @@ def test_a_name_that_no_hull_can_have(browser: Browser, url: str, name: str) -> 
         )
 
 
+@pytest.mark.smoke
 def test_a_name_in_the_address_is_never_html(browser: Browser, url: str) -> None:
     name = "<img src=x onerror=document.title='run'>"
     with opened(browser, url, name) as page:

@@ -72,6 +72,7 @@ def row(page: Page, hull: str) -> Locator:
     return page.locator(".of_hulls").get_by_role("row").filter(has_text=hull)
 
 
+@pytest.mark.smoke
 def test_the_slider_goes_over_all_that_is_kept(browser: Browser, url: str, client: HullClient, fleet: str) -> None:
     with opened(browser, url, fleet) as page:
         wait_for_vertices(page, fleet, corners(3))
