@@ -14,7 +14,7 @@ import grpc
 import numpy as np
 import pytest
 import trustme
-from cases import ALL_CASES, with_all_cases
+from cases import ALL_CASES, slow, with_all_cases
 from cluster import processes
 from command_line import dynhull
 from one_gateway import entries
@@ -114,6 +114,7 @@ def fleet(postgres: PostgreSQL) -> Iterator[Fleet]:
         fleet.writer.stop()
 
 
+@slow
 def test_partitions_move_to_and_fro_and_nobody_complains(postgres: PostgreSQL) -> None:
     url = postgres.new_database()
     with two_servers(url, "") as servers, HullClient(servers[0].address, retries=1000) as client:
@@ -151,6 +152,7 @@ def test_partitions_move_to_and_fro_and_nobody_complains(postgres: PostgreSQL) -
         np.testing.assert_array_equal(copy.vertices, client.get_hull("fleet").vertices)
 
 
+@slow
 def test_killed_workers_lose_and_double_nothing(fleet: Fleet) -> None:
     for _ in range(2):
         for worker in sorted(set(fleet.owners())):

@@ -14,6 +14,7 @@ from typing import Any
 import grpc
 import pytest
 import trustme
+from cases import slow
 from cluster import processes
 from command_line import dynhull
 from forked import COMMAND
@@ -84,6 +85,7 @@ def test_machines_come_and_go_and_callers_notice_only_that_some_calls_take_longe
         assert all(other.verify(name).equal for name in NAMES)
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_reads_of_a_pipeline_wait_while_partitions_move(url: str) -> None:
     with machine(url) as first, machine(url) as second, HullClient(second.address, retries=0) as client:
@@ -166,6 +168,7 @@ def test_operators_see_who_serves_what_and_move_it(url: str) -> None:
         assert second.process.poll() is None
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_worker_that_gave_up_its_partitions_takes_some_when_it_is_started_again(url: str) -> None:
     """It was the last one: nobody else would ever serve them."""

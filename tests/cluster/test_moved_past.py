@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from command_line import dynhull
 from patience import wait_until
 from postgresql import PostgreSQL, query
@@ -80,6 +80,7 @@ def test_owners_that_come_and_go_leave_the_past_whole(postgres: PostgreSQL, tmp_
             check(other, last)
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_partition_that_moves_again_and_again_while_segments_close_keeps_the_past(
     postgres: PostgreSQL, tmp_path: Path

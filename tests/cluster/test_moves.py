@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import slow
 from cluster import processes
 from command_line import dynhull
 from patience import wait_until
@@ -155,6 +156,7 @@ def is_free(pair: Pair) -> bool:
     return query(pair.url, "SELECT until = '-infinity' FROM owners") == [(True,)]
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_partition_moves_to_and_fro_while_it_is_written(pair: Pair) -> None:
     pair.writer.more()
@@ -195,6 +197,7 @@ def test_an_order_can_be_cancelled(mortal_pair: Pair) -> None:
     pair.check()
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_target_that_is_killed_before_the_owner_lets_go(mortal_pair: Pair) -> None:
     pair = mortal_pair
@@ -223,6 +226,7 @@ def test_a_target_that_is_killed_when_the_owner_has_let_go(mortal_pair: Pair) ->
     pair.check()
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_source_that_is_killed_when_it_has_let_go(mortal_pair: Pair) -> None:
     pair = mortal_pair
@@ -240,6 +244,7 @@ def test_a_source_that_is_killed_when_it_has_let_go(mortal_pair: Pair) -> None:
     pair.check()
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_source_that_is_killed_while_the_target_follows(mortal_pair: Pair) -> None:
     """The target takes what it has followed, and the writes of the last moments are there, too."""

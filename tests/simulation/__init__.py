@@ -10,5 +10,6 @@ has several servers, each with a core, that own the hulls of a simulated databas
 past of these in a store that they share (`cluster_past`). `link_life` has the engine behind the link of a gateway, on a
 simulated `network`.
 
-What is found is made small by `shrink`, kept in findings/, and replayed by every `make test`. `mutate` tests the test.
+What is found is made small by `shrink`, kept in findings/, and replayed, those of the core by `make test`,
+the others by `make slow`. `mutate` tests the test.
 """

@@ -17,9 +17,12 @@ from simulation.play import play
 from simulation.schedule import Schedule
 from simulation.shrink import LEAST, shrunk
 
-FINDINGS = sorted((Path(__file__).parent / "findings").glob("*.json"))
+FINDINGS = {
+    file.stem: json.loads(file.read_text())["plan"]
+    for file in sorted((Path(__file__).parent / "findings").glob("*.json"))
+}
 # Plans of each layer, a few seconds together; `make simulate` has more.
-PLANS = {"core": 30, "shell": 6, "sqlite": 2, "past": 6, "cluster": 10, "links": 5}
+PLANS = {"core": 30, "shell": 3, "sqlite": 2, "past": 2, "cluster": 10, "links": 5}
 # The first seed: other plans than those of the command line.
 FIRST = 5 * 10**6
 # Faults that are found in a second, one in the pure state and one in a cluster; `make soak` has all of them.
@@ -33,9 +36,13 @@ def test_no_promise_is_broken(layer):
         assert outcome.finding is None, f"seed {seed}: {outcome.where}"
 
 
-@pytest.mark.parametrize("file", FINDINGS, ids=lambda file: file.stem)
-def test_what_was_found_stays_mended(file):
-    outcome = play(json.loads(file.read_text())["plan"])
+@pytest.mark.parametrize(
+    "finding",
+    # Those of the pure state take a hundredth of a second.
+    [pytest.param(name, marks=() if plan["layer"] == "core" else slow) for name, plan in FINDINGS.items()],
+)
+def test_what_was_found_stays_mended(finding):
+    outcome = play(FINDINGS[finding])
     assert outcome.finding is None, outcome.where
 
 
@@ -58,6 +65,7 @@ def test_who_goes_on_without_a_pause_is_a_finding(monkeypatch):
     assert any(each.endswith("waits for ever, while somebody goes on without a pause") for each in found)
 
 
+@slow
 def test_a_plan_with_a_finding_is_made_small_in_a_given_time(monkeypatch):
     monkeypatch.setattr(sqlite_store, "may_go", lambda *_: False)
     plan = random_plan(123000000120, "past")
