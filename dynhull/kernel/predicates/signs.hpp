@@ -75,6 +75,17 @@ inline double difference_of_products(double a, double b, double c, double d) {
   return left - right;
 }
 
+// Twice the area of a triangle, rounded; positive if it turns left.
+inline double doubled_area(Point a, Point b, Point c) {
+  return difference_of_products(a.x - c.x, b.y - c.y, a.y - c.y, b.x - c.x);
+}
+
+// What bounds the error of that area for each triangle in a box of this size: rounding is monotone, so that no bound of
+// orientation_filter is greater.
+inline double orientation_bound(double width, double height) {
+  return ORIENT_BOUND * (2 * (width * height)) + UNDERFLOW_SLACK;
+}
+
 // The sign of the orientation, or 0 if floating point does not decide it.
 inline int orientation_filter(Point a, Point b, Point c) {
   const double left = (a.x - c.x) * (b.y - c.y);
@@ -91,7 +102,6 @@ class Chord {
   struct Distance {
     double value, bound;
     bool certainly_inside() const { return -value > bound; }
-    Distance from_below() const { return {-value, bound}; }  // from the same line, of the other side
   };
 
   Chord(Side side, Point a, Point b)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -79,22 +80,15 @@ struct Leaf {
   void assign(const Point* points, unsigned count) {
     size = count;
     repeated = 0;
+    double least = INFINITE, greatest = -INFINITE;
     for (unsigned i = 0; i < count; ++i) {
       x[i] = points[i].x;
       y[i] = points[i].y;
+      least = std::min(least, y[i]);
+      greatest = std::max(greatest, y[i]);
     }
     std::fill(x + size, x + LEAF, INFINITE);
-    // One pass for both sides: what is above a chord is as far from below it.
-    const unsigned last = count - 1;
-    const Chord chord(UPPER, points[0], points[last]);
-    Beyond above, beneath;
-    for (unsigned i = 1; i < last; ++i) {
-      const Chord::Distance distance = chord.distance(points[i]);
-      above.add(i, distance);
-      beneath.add(i, distance.from_below());
-    }
-    chain[UPPER] = scan(UPPER, 0, perhaps_vertices(UPPER, 0, above, last), last);
-    chain[LOWER] = scan(LOWER, 0, perhaps_vertices(LOWER, 0, beneath, last), last);
+    find_chains(greatest - least);
   }
 
   // Adds p as entry i. Returns the sides on whose chain p is, as bits.
@@ -166,6 +160,78 @@ struct Leaf {
   static Mask opened(Mask mask, unsigned i) { return (mask & below(i)) | (mask & ~below(i)) << 1; }
   static Mask closed(Mask mask, unsigned i) { return (mask & below(i)) | ((mask >> 1) & ~below(i)); }
 
+  // Entries that may be on either chain, as a ring: from left to right above the chord of the ends, then back below it.
+  struct Ring {
+    static constexpr unsigned MOST = 64;
+    unsigned size = 1;
+    std::array<std::uint8_t, 2 * MOST + 1> entries;
+  };
+
+  // Finds both chains. What is certainly inside the edge between its neighbours in the ring is on neither; rounds of
+  // such tests, which do not wait for each other, leave the chains, unless the sign of a turn remains uncertain.
+  void find_chains(double height) {
+    constexpr unsigned ROUNDS = 8;
+    const unsigned last = size - 1;
+    const double bound = orientation_bound(x[last] - x[0], height);
+    Ring ring = around_chord(bound);
+    bool certain;
+    unsigned before, round = 0;
+    do {
+      before = ring.size;
+      certain = thin_out(ring, bound);
+    } while (ring.size != before && ++round < ROUNDS);
+    Mask upper = bit(last), lower = bit(0);
+    unsigned i = 0;
+    for (; ring.entries[i] != last; ++i) upper |= bit(ring.entries[i]);
+    for (; i < ring.size; ++i) lower |= bit(ring.entries[i]);
+    const Mask inner = ~(bit(0) | bit(last));
+    chain[UPPER] = certain ? upper : scan(UPPER, 0, upper & inner, last);
+    chain[LOWER] = certain ? lower : scan(LOWER, 0, lower & inner, last);
+  }
+
+  Ring around_chord(double bound) const {
+    const unsigned last = size - 1;
+    const Point a = (*this)[0], b = (*this)[last];
+    Ring ring;
+    ring.entries[0] = 0;
+    std::array<std::uint8_t, 2 * Ring::MOST> beneath;  // from `first` to the middle
+    unsigned first = Ring::MOST;
+    for (unsigned i = 1; i < last; ++i) {
+      const double above = doubled_area(a, b, (*this)[i]);
+      ring.entries[ring.size] = beneath[first - 1] = static_cast<std::uint8_t>(i);
+      ring.size += !(-above > bound);
+      first -= !(above > bound);
+    }
+    ring.entries[ring.size] = static_cast<std::uint8_t>(last);
+    ring.size += last > 0;
+    std::copy_n(&beneath[first], Ring::MOST, &ring.entries[ring.size]);
+    ring.size += Ring::MOST - first;
+    return ring;
+  }
+
+  // Removes what is certainly inside the edge between its neighbours; not an end of the chains, whose neighbours are of
+  // both. Returns whether all certainly turn outwards.
+  bool thin_out(Ring& ring, double bound) const {
+    std::uint8_t* const entries = ring.entries.data();
+    entries[ring.size] = 0;
+    unsigned kept = 1;
+    double least = INFINITE;
+    std::uint8_t entry = entries[1];
+    Point before = (*this)[0], p = (*this)[entry];
+    for (unsigned i = 1; i < ring.size; ++i) {
+      const std::uint8_t next = entries[i + 1];
+      const double outside = doubled_area(before, (*this)[next], p);
+      least = std::min(least, outside);
+      entries[kept] = entry;
+      kept += !(outside < -bound) | (entry == size - 1);
+      before = p;
+      p = (*this)[next];
+      entry = next;
+    }
+    ring.size = kept;
+    return least > bound;
+  }
+
   // What is not certainly inside a chord, and the entry farthest outside it. Branch-free.
   struct Beyond {
     Mask outside = 0;
@@ -185,9 +251,6 @@ struct Leaf {
     const Chord chord(side, (*this)[from], (*this)[to]);
     Beyond beyond;
     for (unsigned i = from + 1; i < to; ++i) beyond.add(i, chord.distance((*this)[i]));
-    return perhaps_vertices(side, from, beyond, to);
-  }
-  Mask perhaps_vertices(Side side, unsigned from, const Beyond& beyond, unsigned to) const {
     const auto [outside, most, apex] = beyond;
     if (!several(outside) || apex == LEAF) return outside;
     const Chord chords[] = {Chord(side, (*this)[apex], (*this)[to]), Chord(side, (*this)[from], (*this)[apex])};
