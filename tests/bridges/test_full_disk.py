@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from cases import slow
 from patience import wait_until
 from receiver import Receiver
 from relay_process import FAST, acknowledged, fence, pass_through, relay_process
@@ -46,6 +47,7 @@ def refuses(client: HullClient, points: int) -> bool:
     return False
 
 
+@slow
 def test_a_disk_that_is_full_when_the_relay_starts(tmp_path: Path, endpoint: Receiver) -> None:
     with on_a_small_disk(tmp_path / "small") as (server, client, ballast):
         fill(client, ballast)

@@ -41,6 +41,7 @@ def is_picture(path) -> bool:
     return path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
 
 
+@slow
 def test_hours_of_flights(tmp_path):
     """`make demo` replays a whole day."""
     picture = tmp_path / "flights.png"

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from itertools import pairwise
 
 import pytest
+from cases import slow
 from chromium import chromium
 from command_line import dynhull
 from killers import KILLERS
@@ -66,6 +67,7 @@ def test_vector_sheet(example, tmp_path):
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.SVG").read_bytes()
 
 
+@slow
 def test_animation(tmp_path):
     square = tmp_path / "square.csv"
     square.write_text("x,y\n0,0\n4,0\n4,4\n0,4\n")

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import ALL_CASES, with_all_cases
+from cases import ALL_CASES, slow, with_all_cases
 from cluster import descendants, processes
 from command_line import dynhull
 from pacing import pause
@@ -56,7 +56,10 @@ LIVES = 6 if ALL_CASES else 3
 START = 1_700_000_000
 
 
-@pytest.fixture(scope="module", params=["process", "workers", pytest.param("cluster", marks=with_all_cases)])
+@pytest.fixture(
+    scope="module",
+    params=["process", pytest.param("workers", marks=slow), pytest.param("cluster", marks=with_all_cases)],
+)
 def server(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     options = SHAPES[request.param]
     if request.param != "cluster":

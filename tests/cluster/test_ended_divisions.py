@@ -30,8 +30,8 @@ async def left_when_closed(turns: int) -> list[str]:
     return [str(each.get_coro()) for each in asyncio.all_tasks() - {asyncio.current_task()}]
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("first", range(0, 8, 2))
+@pytest.mark.every(8)
+@pytest.mark.parametrize("first", range(0, 16, 2))
 def test_whenever_it_is_closed_nothing_goes_on(first: int) -> None:
-    for turns in range(first, 400, 8):
+    for turns in range(first, 400, 16):
         assert asyncio.run(left_when_closed(turns)) == [], f"closed after {turns} turns"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import lives
 import pytest
+from cases import slow
 
 from dynhull._tree import HullTree
 
@@ -28,6 +29,7 @@ def test_a_fault_is_found_and_can_be_lived_again(monkeypatch):
     assert lives.survive([seed])[1] == failure
 
 
+@slow
 @pytest.mark.parametrize("words", [["--operations", "300", "--jobs", "1"], ["1", "2"]])
 def test_the_command_says_how_many_operations_were_checked(words):
     script = Path(lives.__file__)

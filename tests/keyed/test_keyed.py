@@ -175,8 +175,8 @@ def test_put_without_a_time_takes_the_time_away(hull):
 
 
 def test_many_entities_at_one_place(make):
-    """10^5 at (0, 0): the least names it, and each can go."""
-    n = 100_000
+    """20,000 at (0, 0): the least names it, and each can go."""
+    n = 20_000
     hull = make("int")
     keys = np.arange(n, dtype=np.uint64)[::-1]
     assert hull.put_many(keys, np.zeros((n, 2))) == n

@@ -8,6 +8,10 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from cases import slow
+
+pytestmark = slow
+
 TESTS = Path(__file__).parents[1]
 MENTIONED = re.compile(r"sleep|Timer|wait|join")
 SHORT = 5  # seconds: a longer wait is for what has to come

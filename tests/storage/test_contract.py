@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import slow
 from folders import appended, event, events, fence_row, fill_fence, read_fence, same
 
 from dynhull.keys import PackedKeys
@@ -116,7 +117,7 @@ def never(reason):
 LESS_OFTEN = [
     pytest.param(each, marks=pytest.mark.only_with("LONG_CASES")) for each in Durability if each != Durability.SYNC
 ]
-STORAGES = ["memory", "simulated", "postgresql", Durability.SYNC, *LESS_OFTEN]
+STORAGES = ["memory", "simulated", pytest.param("postgresql", marks=slow), Durability.SYNC, *LESS_OFTEN]
 
 
 @pytest.fixture(params=STORAGES)

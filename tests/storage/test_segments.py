@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from cases import slow
 from filed_fleet import BEGIN, KEYS, SECOND, SETTINGS, Fleet, move, read_back
 from folders import no_progress, same
 from postgresql import query
@@ -93,7 +94,7 @@ def require_all_of_keys(storage, records):
             assert there == {key: point for key, point in expected.items() if key in wanted}
 
 
-@pytest.fixture(params=["folder", "postgresql"])
+@pytest.fixture(params=["folder", pytest.param("postgresql", marks=slow)])
 def fleet(request, tmp_path):
     make = None
     archive = Archive(tmp_path / "history")

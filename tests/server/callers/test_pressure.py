@@ -50,6 +50,7 @@ async def burst(address: str, name: str) -> int:
         return (await client.get_hull(name)).info.points
 
 
+@slow
 def test_a_burst_of_calls_is_answered(address: str, name: str) -> None:
     assert asyncio.run(burst(address, name)) == BURST
 

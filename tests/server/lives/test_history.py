@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from command_line import dynhull
 from metrics import measured, scrape
 from patience import PATIENCE, wait_until
@@ -52,6 +52,7 @@ def write_until_filed(client, name, batches):
     return revision
 
 
+@slow
 def test_the_past_is_dropped_by_the_time_of_its_commits_after_the_clock_was_set_back(tmp_path):
     with (
         server_process("--data", str(tmp_path), *SNAPSHOTS, wrap=at("+1h")) as server,

@@ -151,6 +151,7 @@ def test_a_direction_that_is_none(stub: HullServiceStub, filled: str) -> None:
     assert info.metadata["field"] == "directions"
 
 
+@slow
 def test_writes_go_on_beside_a_large_read(address: str, name: str) -> None:
     """The read sees one revision, and a writer gets in between again and again: in one of several reads, at least."""
     rng = np.random.default_rng(11)

@@ -363,6 +363,7 @@ def ended(address: str) -> float:
     return sum(value for name, value in samples if name.startswith("dynhull_calls_total") and '"Query"' in name)
 
 
+@slow
 @pytest.mark.long
 @needs_proc
 def test_a_client_that_does_not_read_its_answers_is_not_read_either() -> None:
