@@ -233,6 +233,7 @@ def test_other_numbers_of_shards_beside_moves(fleet: Fleet) -> None:
     fleet.check(changes=3)
 
 
+@slow
 def test_the_shards_of_a_deleted_hull_are_deleted(fleet: Fleet) -> None:
     fleet.check()
     with HullClient(fleet.servers[0].address, retries=1000) as client:

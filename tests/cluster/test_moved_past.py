@@ -116,7 +116,9 @@ def test_a_partition_that_moves_again_and_again_while_segments_close_keeps_the_p
         check(other, last)
 
 
-@pytest.mark.parametrize("shape", [(), ("--cluster", "--partitions", "1")], ids=["alone", "cluster"])
+@pytest.mark.parametrize(
+    "shape", [(), pytest.param(("--cluster", "--partitions", "1"), marks=slow)], ids=["alone", "cluster"]
+)
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_copy_of_a_database_is_refused_where_the_past_of_the_original_is(
     postgres: PostgreSQL, tmp_path: Path, shape: tuple[str, ...]

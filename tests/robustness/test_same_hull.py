@@ -6,6 +6,7 @@ from itertools import combinations, permutations, product
 import numpy as np
 import oracle
 import pytest
+from cases import slow
 from hulls import ALGORITHMS, HULLS, ONE_SHOT
 from inputs import ULP
 from killers import KILLERS, PUBLISHED, nearly_collinear
@@ -87,7 +88,7 @@ def test_dynamic(make, build, name):
     hull.check()
 
 
-@pytest.mark.every(3)
+@slow
 @pytest.mark.parametrize("rows", PUBLISHED.values(), ids=PUBLISHED.keys())
 def test_published_killers_in_every_order_of_four(rows):
     for four in combinations(rows, 4):

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import slow
 from command_line import dynhull
 from folders import (
     DATABASE,
@@ -245,11 +246,11 @@ copies.copy(Path(sys.argv[1]), Path(sys.argv[2]), strike if sys.argv[3] == "prog
     ("where", "nth", "whole"),
     [
         ("progress", 1, False),
-        ("progress", 3, False),
+        pytest.param("progress", 3, False, marks=slow),
         ("examine", 1, False),
         ("fsync", 1, False),
         ("fsync", 2, True),
-        ("fsync", 3, True),
+        pytest.param("fsync", 3, True, marks=slow),
     ],
 )
 def test_half_a_copy_is_never_taken_for_one(paths, where, nth, whole):

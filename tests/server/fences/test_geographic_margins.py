@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import slow
 from pyproj import Geod
 from server_process import server_process
 
@@ -61,7 +62,7 @@ def sides(distance, margin, inside):
     return near, np.abs(distance - margin) <= ERROR
 
 
-@pytest.mark.parametrize("sudden", [True, False])
+@pytest.mark.parametrize("sudden", [True, pytest.param(False, marks=slow)])
 def test_who_is_inside_after_each_step(tmp_path, sudden):
     """Positions are compared with pyproj's distances; a restart halfway, killed or not, changes nothing."""
     options = ["--data", str(tmp_path / "data")]

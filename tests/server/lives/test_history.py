@@ -177,6 +177,7 @@ def test_a_feed_ends_at_a_hole_with_its_revisions_and_goes_on_behind_it(tmp_path
             assert [next(feed).revision for _ in range(revision - last)] == list(range(last + 1, revision + 1))
 
 
+@slow
 def test_a_feed_of_a_prefix_gives_what_is_before_a_hole_and_goes_on_behind_it(tmp_path):
     with (
         server_process("--data", str(tmp_path), *SNAPSHOTS, complaints=HOLE) as server,
