@@ -5,7 +5,7 @@ from typing import Any
 
 from .iso_times import from_iso
 
-REVISION_DIGITS, SHOWN_DIGITS = 20, 60
+REVISION_DIGITS, SHOWN_CHARACTERS = 20, 60
 
 
 class Present:
@@ -32,18 +32,27 @@ def moment_of(text: str | None, name: str) -> int | str | None:
     """
     if text is None:
         return None
+    try:
+        return read_moment(text)
+    except ValueError as error:
+        raise ValueError(f"{name} is {text[:SHOWN_CHARACTERS]!r}: {error}") from None
+
+
+def read_moment(text: str) -> int | str:
+    """A revision, which is all digits; or the text of a time with a time zone.
+
+    Raises:
+        ValueError: it is neither, or no revision has that number; the message does not say where it was found.
+    """
     if text.isdecimal() and text.isascii():
         digits = text.lstrip("0") or "0"
         if len(digits) > REVISION_DIGITS or int(digits) >= 2**64:  # Python refuses thousands of digits in its own words
-            raise ValueError(f"{name} must be less than 2**64, got {text[:SHOWN_DIGITS]}")
+            raise ValueError("must be less than 2**64")
         return int(digits)
     try:
         zone = from_iso(text).tzinfo
     except ValueError:
         zone = None
     if zone is None:
-        raise ValueError(
-            f"{name} {text!r} is no moment: write a revision, all digits, or a time with a time zone, such as "
-            "2026-11-24T16:00Z"
-        )
+        raise ValueError("must be a revision, all digits, or a time with a time zone, such as 2026-11-24T16:00Z")
     return text

@@ -24,6 +24,7 @@ class Name(NamedTuple):
     argument: str | None = None
 
 
+MOMENTS = "revision", "time"
 # Fields below one that is named here belong to it.
 NAMES: Mapping[str, Name] = {
     **{
@@ -90,6 +91,10 @@ NAMES: Mapping[str, Name] = {
     "sequence": Name(("Idempotency-Key",), "", argument="sequence"),
     "consumer": Name(),
     "after_sequence": Name(("after",)),
+    "after_revision": Name(("after",)),
+    **{f"at_{kind}": Name(("at",), argument="when") for kind in MOMENTS},
+    **{f"start_{kind}": Name(("from",), argument="start") for kind in MOMENTS},
+    **{f"end_{kind}": Name(("to",), argument="end") for kind in MOMENTS},
     "other_name": Name(("other",), "the other hull"),
     "include_keys": Name(("keys",)),
     "layer_count": Name(("count",), argument="k"),

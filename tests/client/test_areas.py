@@ -63,7 +63,13 @@ def test_what_is_no_area(nowhere: HullClient, area: object, complaint: str) -> N
         ({"subjects": "a", "initial": "all"}, "initial must be one of 'snapshot', 'events', 'none', got 'all'"),
         ({"subjects": "a", "margin": float("nan")}, "margin is nan: coordinates must be finite"),
         ({"subjects": "a", "confirmations": -1}, "confirmations must be at least 0, got -1"),
-        ({"subjects": "a", "dwell": "soon"}, "dwell is 'soon': must be a finite number of seconds or a timedelta"),
+        (
+            {"subjects": "a", "dwell": "soon"},
+            (
+                "dwell is 'soon': must be a finite number of seconds, "
+                "a timedelta, or text such as 500ms, 90s, 30m, 2h or 7d"
+            ),
+        ),
     ],
 )
 def test_settings_that_cannot_be(nowhere: HullClient, settings: dict[str, object], complaint: str) -> None:

@@ -103,7 +103,11 @@ REFUSED = [
     (A | {"times": [NOON, NOON]}, ValueError, "times has 2 rows for 1 points"),
     (A | {"only": "new"}, ValueError, "only must be"),
     (A | {"missing": "ignore"}, ValueError, "missing must be"),
-    (A | {"ttl": float("nan")}, ValueError, "ttl is nan: must be a finite number of seconds or a timedelta"),
+    (
+        A | {"ttl": float("nan")},
+        ValueError,
+        "ttl is nan: must be a finite number of seconds, a timedelta, or text such as 500ms, 90s, 30m, 2h or 7d",
+    ),
     (A | {"ttl": 1, "expire_times": [NOON]}, ValueError, "either ttl or expire_times"),
     (A | {"insert": POINT}, ValueError, "a batch either puts and removes keys, or inserts"),
     ({"remove": ["a"], "delete": POINT}, ValueError, "a batch either puts and removes keys, or inserts"),

@@ -133,7 +133,13 @@ def test_settings_are_kept_and_compared(client: HullClient, name: str) -> None:
             {"max_skew": 1, "keyed": "str", "ordering": "event_time", "clock": "data"},
             "clock is given alone: give max_age or max_points, too",
         ),
-        ({"max_age": "30m"}, "max_age is '30m': must be a finite number of seconds or a timedelta"),
+        (
+            {"max_age": "30 min"},
+            (
+                "max_age is '30 min': must be a finite number of seconds, "
+                "a timedelta, or text such as 500ms, 90s, 30m, 2h or 7d"
+            ),
+        ),
     ):
         with pytest.raises(ValueError, match=words):
             client.create_hull(f"{name}/bad", **bad)

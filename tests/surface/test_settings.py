@@ -31,7 +31,7 @@ OWN = {
 }
 # As they are written.
 KINDS = {
-    timedelta: "float | timedelta",
+    timedelta: "float | timedelta | str",
     tuple[float, float]: "tuple[float, float]",
     int: "int",
     float: "float",

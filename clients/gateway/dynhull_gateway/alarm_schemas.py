@@ -7,9 +7,8 @@ from pydantic import AliasChoices, Field, StrictStr
 import dynhull_client as sdk
 
 from .answers import Span, answering
+from .numbers import SPAN, Seconds
 from .schemas import Count, Name, Request, Response, example
-
-Seconds = Annotated[float, Field(strict=True, ge=0)]
 
 
 class NewAlarm(Request):
@@ -28,11 +27,9 @@ class NewAlarm(Request):
     clear: Annotated[str, Field(strict=True, max_length=4000)] | None = Field(
         None, description="What clears it, weaker than the opposite of `when`, which it is by default."
     )
-    for_: Seconds | StrictStr | None = Field(
-        None, alias="for", description="How long the condition must hold before: seconds, or text such as 30s."
-    )
+    for_: Seconds | None = Field(None, alias="for", description=f"How long the condition must hold before. {SPAN}.")
     max_events: Count = Field(0, description="How many events are kept; 0 for the limit of the server.")
-    max_event_age: Seconds | None = Field(None, description="The seconds for which events are kept.")
+    max_event_age: Seconds | None = Field(None, description=f"How long events are kept. {SPAN}.")
 
 
 class OfHull(Request):

@@ -7,10 +7,12 @@ import grpc
 from fastapi import Depends, Query
 
 from dynhull_client import AsyncHullClient, HullReplacedError
-from dynhull_surface.as_of import Present, moment_of
+from dynhull_surface.as_of import Present
+
+from .numbers import Moment
 
 AtMoment = Annotated[
-    str | None,
+    Moment | None,
     Query(
         description="In place of the present: a revision, all digits; or a time of RFC 3339, for the last revision "
         "committed at or before it. Not together with a min_revision.",
@@ -30,7 +32,7 @@ AtUid = Annotated[
 class AskedAt:
     """A moment of the past of a hull; the uid is empty for any hull of the name."""
 
-    moment: str
+    moment: int | str
     uid: str
 
 
@@ -49,7 +51,7 @@ async def as_of(client: AsyncHullClient, name: str, at: AskedAt | None) -> Any:
     """What reads a hull: as it is, or as it was."""
     if at is None:
         return Present(client, name)
-    past = await client.at(name, moment_of(at.moment, "at"))
+    past = await client.at(name, at.moment)
     if at.uid not in ("", past.uid):
         problem = f"the hull {name!r} was created again, or restored from a backup: its uid is now {past.uid}"
         metadata = {"field": "at_uid", "value": name, "uid": past.uid}

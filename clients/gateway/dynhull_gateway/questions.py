@@ -8,6 +8,7 @@ from . import examples, schemas
 from .as_of import At, as_of
 from .bodies import JsonRoute
 from .callers import Caller
+from .numbers import SPAN, DaySpan
 from .schemas import AlloyPath, AssetsPath, HullPath, MinRevision, Name
 
 router = APIRouter(prefix="/hulls/{name}", tags=["questions"], route_class=JsonRoute)
@@ -21,10 +22,8 @@ SampleSize = Annotated[int, Query(ge=1, le=100_000, description="The most points
 WithKeys = Annotated[bool, Query(description="Whether to name the points, in a keyed hull.")]
 AboutPointsOrKeys = Annotated[schemas.AboutPointsOrKeys, schemas.body(examples.ABOUT)]
 Last = Annotated[
-    float | None,
-    Query(
-        gt=0, le=86_400, description="Seconds: rows since then, and the one before them. All that are kept by default."
-    ),
+    DaySpan | None,
+    Query(description=f"{SPAN}: rows since then, and the one before them. All that are kept by default."),
 ]
 OtherRevision = Annotated[int, Query(ge=0, le=schemas.LARGEST, description="A revision of the other hull to wait for.")]
 

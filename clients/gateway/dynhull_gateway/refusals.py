@@ -137,6 +137,8 @@ def _path(field: str, body: Any) -> list[str | int] | None:
         return [] if isinstance(body, list) else [*within, *way]
     if way[1:] and way[0] == "area" and isinstance(way[1], int):
         way = _in_area(way, _at(body, ["area"]))
+    if isinstance(body, dict) and found.argument in body and way[0] not in body:
+        return [found.argument]  # the moments of a fence after the fact
     in_body = not way or found.path.startswith("config") or (isinstance(body, dict) and way[0] in body)
     return way if in_body else None
 

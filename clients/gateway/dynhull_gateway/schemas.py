@@ -31,9 +31,9 @@ from dynhull_surface.iso_times import LEAP_SECOND, from_iso
 from . import examples
 from .answers import Finite, Place, Rows, answering, listed, rows, seconds
 from .numbers import LARGEST as LARGEST
+from .numbers import SPAN, KeptSpan, Moment, Seconds
 from .numbers import Number as Number
 from .numbers import Point as Point
-from .numbers import Seconds
 from .setting_fields import with_settings
 
 NO_TIME = np.datetime64(0, "us")  # of a key without event time
@@ -163,7 +163,6 @@ class Response(BaseModel):
 
 
 # A moment of the past, as text.
-Moment = Annotated[str, Field(strict=True, max_length=100)] | None
 
 # Hulls
 
@@ -185,7 +184,7 @@ class QuarantineRules(Request):
 
 
 KeptFor = Annotated[
-    StrictBool | Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | str | None,
+    StrictBool | KeptSpan | None,
     Field(
         description="For how long the past is kept: true for ever, seconds, or text such as 30d; null for not at all."
     ),
@@ -366,7 +365,7 @@ class Batch(Request):
     release: list[Key] | None = Field(None, description="Keys in quarantine to let in.")
     drop: list[Key] | None = Field(None, description="Keys in quarantine whose held position is dropped.")
     only: Literal["absent", "present"] | None = Field(None, description="Put only new keys, or only known ones.")
-    ttl: Seconds | None = Field(None, description="Seconds after which the keys leave.")
+    ttl: Seconds | None = Field(None, description=f"Time after which the keys leave. {SPAN}.")
     expire_times: list[Time] | None = Field(None, description="Times at which the keys leave, instead of ttl.")
     accuracies: list[Accuracy] | None = Field(
         None, description="How far the positions may be from where the keys are: units of the coordinates, or metres."
@@ -739,12 +738,12 @@ class FenceSettings(Request):
 class PastFence(FenceSettings):
     """A fence after the fact: its settings, and between which moments it would have been there."""
 
-    start: Moment = Field(
+    start: Moment | None = Field(
         None,
         description="Where it begins: a revision of the subjects' hull, all digits, or a time of RFC 3339, for the "
         "last revision committed at or before it. By default the oldest that the server keeps.",
     )
-    end: Moment = Field(None, description="The last revision, or the last time, that counts. By default now.")
+    end: Moment | None = Field(None, description="The last revision, or the last time, that counts. By default now.")
 
 
 @with_settings(surface.FenceSettings, at_creation=True)

@@ -9,10 +9,9 @@ from pydantic import AfterValidator, BaseModel, Field, StrictBool, ValidationInf
 
 from dynhull_surface.described import Setting, described
 
-from .numbers import Number, Point, Seconds
+from .numbers import SPAN, Number, Point, Seconds
 
 Body = TypeVar("Body", bound=BaseModel)
-IN_SECONDS = "In seconds."
 
 LONGEST_TEXT = 200
 
@@ -33,7 +32,7 @@ def _field(setting: Setting, every: Sequence[Setting]) -> tuple[Any, Any]:
     if setting.needs:
         needed = [each for each in every if each.name in setting.needs]
         kind = Annotated[kind, AfterValidator(partial(_with_others, needed))]
-    meaning = f"{setting.meaning} {IN_SECONDS}" if setting.kind is timedelta else setting.meaning
+    meaning = f"{setting.meaning} {SPAN}." if setting.kind is timedelta else setting.meaning
     return kind, Field(setting.usual, description=meaning)
 
 

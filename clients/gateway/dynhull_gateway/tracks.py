@@ -8,13 +8,13 @@ from fastapi import APIRouter, Query, Request, Response
 
 from dynhull_cli.tracks import feature_collection, shown_times
 from dynhull_client import AsyncHullClient, Track
-from dynhull_surface.as_of import moment_of
 
 from . import schemas
 from .bodies import GEOJSON, JsonRoute
 from .callers import Caller
 from .events.replays import From, To
 from .hulls import Format, prefers_geojson
+from .numbers import SPAN, PastSpan
 from .problems import ProblemError
 from .schemas import HullPath
 
@@ -27,8 +27,7 @@ TrackedKeys = Annotated[
     Query(min_length=1, max_length=10_000, alias="key", description="A key; repeatable.", examples=[["LH400"]]),
 ]
 EveryPlace = Annotated[
-    float | None,
-    Query(gt=0, le=86_400 * 366, description="Seconds: of each key the last place in each span of this length alone."),
+    PastSpan | None, Query(description=f"{SPAN}: of each key the last place in each span of this length alone.")
 ]
 AS_FEATURES: dict[int | str, dict[str, Any]] = {
     200: {"content": {GEOJSON: {"schema": {"$ref": "#/components/schemas/FeatureCollection"}}}}
@@ -56,8 +55,8 @@ async def tracks(
     found = await client.track(
         name,
         await _as_the_hull_has_them(client, name, keys),
-        moment_of(start, "from"),
-        moment_of(end, "to"),
+        start,
+        end,
         every=every,
     )
     vary = {"Vary": "Accept"}

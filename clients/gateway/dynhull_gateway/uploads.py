@@ -14,6 +14,7 @@ from dynhull_client import DynhullError
 from . import rows, schemas
 from .bodies import JsonRoute, require_type
 from .callers import Caller
+from .numbers import SPAN, Lifetime
 from .points import numbered
 from .problems import ProblemError, problem
 from .refusals import of_refused_rows
@@ -69,7 +70,8 @@ OnlyKeys = Annotated[
     Literal["absent", "present"] | None, Query(description="Which keys are put: only new ones, or only known ones.")
 ]
 TimeToLive = Annotated[
-    float | None, Query(gt=0, le=1e9, allow_inf_nan=False, description="Seconds after which the keys leave.")
+    Lifetime | None,
+    Query(description=f"Time after which the keys leave. {SPAN}."),
 ]
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dynhull_proto.v1 import alarm_service_pb2 as pb
-from dynhull_surface.spans import FORMS, span_of
 
 from ._alarm_messages import Alarm, AlarmStatus, decode_alarm, decode_status, decode_whole_alarm
 from ._arguments import text, whole
@@ -28,7 +27,7 @@ def create_alarm(
     clear: str | None = None,
     for_: float | timedelta | str | None = None,
     max_events: int = 0,
-    max_event_age: float | timedelta | None = None,
+    max_event_age: float | timedelta | str | None = None,
     timeout: float | None = None,
 ) -> Call[Alarm]:
     """Create an alarm: it is raised for a hull when a condition about its outline holds, and cleared when it does not.
@@ -52,7 +51,7 @@ def create_alarm(
             fleet/south 4 km". Default: the opposite.
         for_: how long the condition must hold before the alarm is raised: seconds, a timedelta, or text such as "30s".
         max_events: the number of events to keep; 0 for the limit of the server.
-        max_event_age: seconds or a timedelta for which events are kept; None for no limit.
+        max_event_age: seconds, a timedelta, or text such as 7d for which events are kept; None for no limit.
         timeout: seconds, instead of the client's.
     """
     if (hull is None) == (prefix is None):
@@ -67,7 +66,7 @@ def create_alarm(
     else:
         rule.hull = text("hull", hull)
     if for_ is not None:
-        rule.hold.CopyFrom(encode_duration(_span(for_), "for_"))
+        rule.hold.CopyFrom(encode_duration(for_, "for_"))
     if max_event_age is not None:
         rule.max_event_age.CopyFrom(encode_duration(max_event_age, "max_event_age"))
     return Call("CreateAlarm", request, lambda response: decode_alarm(response.alarm), timeout, repeatable=False)
@@ -197,12 +196,3 @@ def watch_alarm(
     request = pb.WatchAlarmRequest(name=text("name", name), uid=text("uid", uid))
     encode_start(request, consumer, after, progress_interval)
     return WatchingAlarm(request, reconnect, timeout)
-
-
-def _span(value: float | timedelta | str) -> float | timedelta:
-    if not isinstance(value, str):
-        return value
-    span = span_of(value)
-    if span is None:
-        raise ValueError(f"for_ is {value!r}, no time span: {FORMS}")
-    return span

@@ -71,7 +71,7 @@ class Batch:
         delete: npt.ArrayLike | None = None,
         move: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
         only: Only | None = None,
-        ttl: float | timedelta | None = None,
+        ttl: float | timedelta | str | None = None,
         expire_times: Any = None,
         accuracies: Any = None,
         release: Any = None,
@@ -154,7 +154,7 @@ class Batch:
         self._fill(self._message.moves.origins, origins)
         self._fill(self._message.moves.destinations, destinations)
 
-    def _set_conditions(self, only: Only | None, ttl: float | timedelta | None, expire_times: Any) -> None:
+    def _set_conditions(self, only: Only | None, ttl: float | timedelta | str | None, expire_times: Any) -> None:
         if not self._message.HasField("puts"):
             raise ValueError("only, ttl and expire_times are given with keys to put")
         if only not in CONDITIONS:

@@ -103,10 +103,10 @@ def create_hull(  # noqa: D417  # the settings have their descriptions
     name: str,
     *,
     keyed: KeyType | None = None,
-    max_age: float | timedelta | None = None,
+    max_age: float | timedelta | str | None = None,
     max_points: int | None = None,
     clock: Clock = "server",
-    max_skew: float | timedelta | None = None,
+    max_skew: float | timedelta | str | None = None,
     ahead: Ahead = "refuse",
     ordering: Ordering = "arrival",
     point_limit: int | None = None,
@@ -286,7 +286,7 @@ def put(
     *,
     remove: Any = None,
     only: Only | None = None,
-    ttl: float | timedelta | None = None,
+    ttl: float | timedelta | str | None = None,
     expire_times: Any = None,
     accuracies: Any = None,
     producer: str = "",
@@ -307,7 +307,7 @@ def put(
             with a time zone, or integers of microseconds since 1970.
         remove: keys to remove in the same batch.
         only: "absent" puts new keys only, "present" known keys only; the others are skipped and counted.
-        ttl: the time after which the keys leave the hull, in seconds or as a timedelta.
+        ttl: the time after which the keys leave the hull, in seconds, as a timedelta, or as text such as 30m.
         expire_times: (n,) the times at which the keys leave, instead of `ttl`.
         accuracies: (n,) how far the positions may be from where the keys really are, in units of the coordinates, or
             metres on the globe; without them, or 0, not at all. Fences with `by_accuracy` ask for them.

@@ -35,7 +35,7 @@ def feed(
     after: int | bytes | None = None,
     consumer: str | None = None,
     uid: str = "",
-    progress_interval: float | timedelta | None = None,
+    progress_interval: float | timedelta | str | None = None,
     reconnect: bool = True,
     timeout: float | None = None,
 ) -> Feeding:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Key = str | int
 UNTIMED = 0
-Conditions = tuple["Only | None", "float | timedelta | None", bool, bool]
+Conditions = tuple["Only | None", "float | timedelta | str | None", bool, bool]
 """What all keys that a batch puts have in common."""
 
 
@@ -59,7 +59,7 @@ def put_parts(
     points: npt.ArrayLike | None,
     times: Any,
     only: Only | None,
-    ttl: float | timedelta | None,
+    ttl: float | timedelta | str | None,
     expire_times: Any,
     accuracies: Any,
 ) -> list[Part]:

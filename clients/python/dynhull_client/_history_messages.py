@@ -6,9 +6,8 @@ from typing import Any
 
 from dynhull_proto.v1 import hull_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
-from dynhull_surface.spans import FORMS, span_of
 
-from ._times import decode_time
+from ._times import as_timedelta, decode_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,27 +73,11 @@ def encode_history(history: Any, history_bytes: int | None) -> hull_pb2.History 
         raise ValueError(f"history_bytes is {history_bytes}, but must be from 1 to 2**63 - 1")
     message = hull_pb2.History(max_bytes=history_bytes or 0)
     if history is not True:
-        message.max_age.FromTimedelta(_span(history))
+        span = as_timedelta(history, "history")
+        if span <= timedelta():
+            raise ValueError(f"history is {history!r}, but must be more than 0")
+        message.max_age.FromTimedelta(span)
     return message
-
-
-def _span(history: Any) -> timedelta:
-    if isinstance(history, str):
-        span = span_of(history)
-        if span is None:
-            raise ValueError(f"history {history!r} is not a time span: {FORMS}")
-    else:
-        try:
-            span = history if isinstance(history, timedelta) else timedelta(seconds=history)
-        except OverflowError:
-            raise ValueError(f"history is {history!r} seconds, which is too long: True is for ever") from None
-        except ValueError:
-            raise ValueError(f"history is {history!r}, not a time span") from None
-        except TypeError:
-            raise TypeError(f"history is {history!r}, not True, a timedelta, seconds or text such as '30d'") from None
-    if span <= timedelta():
-        raise ValueError(f"history is {history!r}, but must be more than 0")
-    return span
 
 
 def decode_history(response: pb.GetHistoryResponse) -> History:

@@ -87,7 +87,7 @@ class Ingest:
         times: Any = None,
         remove: Any = None,
         only: Only | None = None,
-        ttl: float | timedelta | None = None,
+        ttl: float | timedelta | str | None = None,
         expire_times: Any = None,
         accuracies: Any = None,
     ) -> None:

@@ -33,7 +33,7 @@ def replay(
     end: When | None = None,
     *,
     speed: float = 0.0,
-    every: float | timedelta | None = None,
+    every: float | timedelta | str | None = None,
     max_rate: float = 0.0,
     progress_interval: float | None = None,
     measures: bool = False,

@@ -72,7 +72,7 @@ class Series(Value):
         return rates
 
 
-def series(name: str, last: float | timedelta | None = None, *, timeout: float | None = None) -> Call[Series]:
+def series(name: str, last: float | timedelta | str | None = None, *, timeout: float | None = None) -> Call[Series]:
     """How the measures of a hull were over the last hour: a row about every ten seconds in which it changed.
 
     The server keeps them in memory (`dynhull serve --series-kept`), and begins anew when it starts, or when another one

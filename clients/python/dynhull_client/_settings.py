@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from dynhull_surface.described import Documented, Setting
 
-SPAN = " Seconds or a timedelta."  # of an argument that is a time span
+SPAN = " Seconds, a timedelta, or text such as 30m."  # of an argument that is a time span
 
 
 def encode_settings(settings: type, given: Mapping[str, Any], config: Message) -> None:
@@ -98,7 +98,7 @@ def _numbers(setting: Setting, field: Any) -> dict[str, int]:
     return {each: numbers[f"{prefix}{word}"].number for each, word in words.items()}
 
 
-def _span(seconds: float | timedelta, name: str) -> Duration | None:
+def _span(seconds: float | timedelta | str, name: str) -> Duration | None:
     """A time span; None for 0, which means the same."""
     span = encode_duration(seconds, name)
     if span != Duration():

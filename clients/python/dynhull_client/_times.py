@@ -12,6 +12,7 @@ from google.protobuf.duration_pb2 import Duration
 
 from dynhull_proto.v1 import points_pb2
 from dynhull_surface.iso_times import from_iso
+from dynhull_surface.spans import span_of
 
 if TYPE_CHECKING:
     from google.protobuf.timestamp_pb2 import Timestamp
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 Times = npt.NDArray[np.datetime64]
 """Type of an (n,) array of datetime64[us], in UTC."""
 
+Span = float | timedelta | str
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 MICROSECOND = timedelta(microseconds=1)
 LARGEST_TIME = 2**53  # microseconds: the years 1685 to 2255
@@ -27,6 +29,7 @@ YEAR_1970 = 365 * 86_400 * 1_000_000  # microseconds
 OTHER_UNITS = {"seconds": 1, "milliseconds": 1000}
 EARLIEST, LATEST = 631_152_000, 4_102_444_800
 A_TIME = "a datetime or ISO 8601 with a time zone, a numpy.datetime64, or an integer of microseconds since 1970"
+A_SPAN = "a timedelta, or text such as 500ms, 90s, 30m, 2h or 7d"
 NO_ZONE = "has no time zone: write datetime.now(UTC), or value.replace(tzinfo=UTC) if it is in UTC"
 
 
@@ -73,15 +76,26 @@ def decode_time(message: Timestamp) -> datetime:
     return message.ToDatetime(UTC)
 
 
-def encode_duration(seconds: float | timedelta, name: str) -> Duration:
-    """A time span in the form of a message, rounded to microseconds; a number is seconds."""
-    try:
-        span = seconds if isinstance(seconds, timedelta) else timedelta(seconds=seconds)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} is {seconds!r}: must be a finite number of seconds or a timedelta") from None
+def encode_duration(span: Span, name: str) -> Duration:
+    """A time span in the form of a message, rounded to microseconds."""
     message = Duration()
-    message.FromTimedelta(span)
+    message.FromTimedelta(as_timedelta(span, name))
     return message
+
+
+def as_timedelta(span: Span, name: str) -> timedelta:
+    """A time span: a number is seconds, a text has a unit, as 30m.
+
+    Raises:
+        ValueError: it is none, or longer than timedeltas can be.
+    """
+    try:
+        found = span_of(span) if isinstance(span, str) else span
+        if found is None:
+            raise ValueError("is no time span")
+        return found if isinstance(found, timedelta) else timedelta(seconds=found)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} is {span!r}: must be a finite number of seconds, {A_SPAN}") from None
 
 
 def _microseconds(times: Any, name: str) -> npt.NDArray[np.int64]:

@@ -65,7 +65,7 @@ def track(
     start: When | None = None,
     end: When | None = None,
     *,
-    every: float | timedelta | None = None,
+    every: float | timedelta | str | None = None,
     timeout: float | None = None,
 ) -> Call[dict[str | int, Track]]:
     """Where keys were between two moments: a `Track` for each, in the order of `keys`.
@@ -88,8 +88,8 @@ def track(
         start: a revision, or a time as for `at`: the last revision committed at or before it. None for the oldest
             revision that can be read.
         end: the same; None for the newest revision.
-        every: of each key the last row in each span of this length alone, in seconds or as a timedelta. The first span
-            begins at the start.
+        every: of each key the last row in each span of this length alone, in seconds, as a timedelta, or as text
+            such as 30m. The first span begins at the start.
         timeout: seconds that all of it may take, instead of the client's.
     """
     wanted = checked_keys(keys)

@@ -83,7 +83,7 @@ class Writer:
         points: npt.ArrayLike | None = None,
         times: Any = None,
         only: Only | None = None,
-        ttl: float | timedelta | None = None,
+        ttl: float | timedelta | str | None = None,
         expire_times: Any = None,
         accuracies: Any = None,
         sequence: int | None = None,

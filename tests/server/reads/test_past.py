@@ -334,7 +334,7 @@ def test_the_asyncio_client_and_the_command_line_read_the_past(served):
         assert (json.loads(result.stdout)["area"], json.loads(result.stdout)["revision"]) == (area, revision)
 
 
-NO_MOMENT = "is no moment: write a revision, all digits, or a time with a time zone, such as 2026-11-24T16:00Z"
+NO_MOMENT = "must be a revision, all digits, or a time with a time zone, such as 2026-11-24T16:00Z"
 
 
 def test_a_text_that_is_no_moment_is_refused_with_the_name_that_it_was_given_by(served):
@@ -352,16 +352,18 @@ def test_a_text_that_is_no_moment_is_refused_with_the_name_that_it_was_given_by(
             ("fences", "between", "--area", "keyed", "--subjects", "keyed", "--from"),
         ):
             done = dynhull(*command, text, "--address", address)
-            assert (done.exit_code, done.stderr) == (2, f"error: {command[-1]} {text!r} {NO_MOMENT}\n")
+            assert (done.exit_code, done.stderr) == (2, f"error: {command[-1]} is {text!r}: {NO_MOMENT}\n")
         for path, name in (("?at=", "at"), ("/tracks?key=a&to=", "to"), ("/replay?from=", "from")):
             status, body = asyncio.run(streamed(f"/hulls/keyed{path}{text}"))
-            assert (status, json.loads(body)["detail"]) == (400, f"{name} {text!r} {NO_MOMENT}")
+            problem = json.loads(body)
+            assert (status, problem["detail"]) == (400, f"{name}: {NO_MOMENT}")
+            assert (problem["field"], problem["value"]) == (name, text)
     for text in (str(2**64), "9" * 5000):
-        refused = f"must be less than 2**64, got {text[:60]}"
+        refused = "must be less than 2**64"
         done = dynhull("measure", "keyed", "--at", text, "--address", address)
-        assert (done.exit_code, done.stderr) == (2, f"error: --at {refused}\n")
+        assert (done.exit_code, done.stderr) == (2, f"error: --at is {text[:60]!r}: {refused}\n")
         status, body = asyncio.run(streamed(f"/hulls/keyed?at={text}"))
-        assert (status, json.loads(body)["detail"]) == (400, f"at {refused}")
+        assert (status, json.loads(body)["detail"]) == (400, f"at: {refused}")
 
 
 def test_faces_of_a_replay(served):

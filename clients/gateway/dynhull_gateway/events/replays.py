@@ -7,9 +7,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from dynhull_client import AsyncReplay, DynhullError, Event, Sketch, Snapshot
-from dynhull_surface.as_of import moment_of
 
 from ..callers import Caller, token_of
+from ..numbers import SPAN, Moment, PastSpan
 from ..problems import ProblemError
 from ..schemas import HullPath
 from . import documents
@@ -22,18 +22,16 @@ router = APIRouter(tags=["events"])
 
 MOMENT = "A revision, all digits; or a time of RFC 3339, for the last revision committed at or before it."
 From = Annotated[
-    str | None,
+    Moment | None,
     Query(alias="from", description=f"{MOMENT} The oldest by default.", examples=["2026-11-24T06:00:00Z"]),
 ]
 To = Annotated[
-    str | None, Query(alias="to", description=f"{MOMENT} The newest by default.", examples=["2026-11-24T18:00:00Z"])
+    Moment | None, Query(alias="to", description=f"{MOMENT} The newest by default.", examples=["2026-11-24T18:00:00Z"])
 ]
 Speed = Annotated[
     float, Query(ge=0, le=1e6, description="How many seconds of the past go by in one; 0: as fast as they are read.")
 ]
-EveryEvent = Annotated[
-    float | None, Query(gt=0, le=86_400 * 366, description="The least number of seconds of the past between events.")
-]
+EveryEvent = Annotated[PastSpan | None, Query(description=f"The least time of the past between events. {SPAN}.")]
 ReplayRate = Annotated[float, Query(ge=0, le=1000, description="The most events a second; 0 for any number.")]
 
 
@@ -74,11 +72,11 @@ async def replay(
     place = resumed(last_event_id) if max_vertices is None else None
     view = View(token_of(request), name, f or "changes", rate, keys, measures, layer, max_vertices)
     texts = HullTexts(view)
-    begin = start if place is None else str(place[1])
+    begin = start if place is None else place[1]
     played = client.replay(
         name,
-        moment_of(begin, "from"),
-        moment_of(end, "to"),
+        begin,
+        end,
         speed=speed,
         every=every,
         copy=texts.copy,

@@ -10,7 +10,6 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from dynhull_client import Alarm, AsyncHullClient, DeadlineError, Fence, HullNotFoundError, UnavailableError
-from dynhull_surface.as_of import moment_of
 
 from .. import examples, schemas
 from ..bodies import JsonRoute
@@ -284,9 +283,7 @@ async def fence_events_between(
     """
     admit(request)
     state = request.app.state
-    given = arguments_of(fence)
-    given |= {name: moment_of(given[name], name) for name in ("start", "end")}
-    past = PastEvents(client.fence_events_between(**given))
+    past = PastEvents(client.fence_events_between(**arguments_of(fence)))
     await past.begin(PATIENCE_SECONDS)
     return EventStream(past.texts(state.settings.keepalive_seconds), state.health, state.figures)
 
