@@ -71,6 +71,24 @@ def test_moments_are_refused_by_the_names_that_the_request_has(gateway: Gateway,
     )
     for number, (answer, status, field) in enumerate(cases):
         assert (answer.status, answer.json.get("field")) == (status, field), (number, answer.json)
+    assert cases[2][0].json["detail"] == "to: is before the start, which is revision 1"
+
+
+def test_a_replay_after_an_event_of_a_hull_that_was_made_again_says_so(gateway: Gateway, square: str) -> None:
+    at = f"/hulls/{square}/replay?from=1&to=1"
+    uid = gateway.get(f"/hulls/{square}").json["info"]["uid"]
+    kept_no_more = gateway.get(at, Last_Event_ID=f"{uid}:9")
+    assert (kept_no_more.status, kept_no_more.json["field"]) == (410, "Last-Event-ID")
+    assert gateway.call("DELETE", f"/hulls/{square}").status == 204
+    assert gateway.post("/hulls", {"name": square}).status == 201
+    assert gateway.post(f"/hulls/{square}/points", [[0, 0]]).status == 200
+    for revision in (1, 9):  # one that the new hull has, and one that it has not
+        refused = gateway.get(at, Last_Event_ID=f"{uid}:{revision}")
+        assert (refused.status, refused.json["reason"], refused.json["field"]) == (
+            409,
+            "HULL_REPLACED",
+            "Last-Event-ID",
+        )
 
 
 def test_time_spans_are_seconds_or_text_everywhere(gateway: Gateway, address: str) -> None:

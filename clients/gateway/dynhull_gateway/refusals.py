@@ -61,6 +61,8 @@ def of_refusal(error: DynhullError, body: Any = None, *, waited: Sequence[str] =
         fields |= {name: each for name, each in named(cause, path).items() if each is not None}
     elif error.field is not None:
         fields["field"] = _parameter(error.field)
+        if error.problem != detail:  # its words have the argument of the SDK
+            detail = f"{fields['field']}: {error.problem}"
     return problem(status_of(error), detail, reason=error.reason or error.code.name, **(fields | more))
 
 

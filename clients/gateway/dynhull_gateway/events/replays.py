@@ -84,15 +84,24 @@ async def replay(
     )
     try:
         first = await anext(played)
-        if place is not None and isinstance(first, Snapshot | Sketch) and first.uid != place[0]:
-            detail = f"Last-Event-ID: the hull {name!r} was deleted and created again, or restored"
-            raise ProblemError(409, detail, "HULL_REPLACED", field="Last-Event-ID", value=last_event_id)
-    except BaseException:
+        if place is not None and isinstance(first, Snapshot | Sketch):
+            _require_same(first.uid, place[0], name, last_event_id)
+    except BaseException as error:
         await played.close()
+        if place is not None and isinstance(error, DynhullError) and error.reason == "REVISION_FORGOTTEN":
+            _require_same((await client.wait_for_hull(name)).uid, place[0], name, last_event_id)
+            raise ProblemError(410, str(error), error.reason, field="Last-Event-ID", value=last_event_id) from None
         raise
     state = request.app.state
     sent = ReplayTexts(played, texts, first, state.settings.keepalive_seconds)
     return EventStream(sent, state.health, state.figures)
+
+
+def _require_same(uid: str, seen: str, name: str, last_event_id: str | None) -> None:
+    """Raise ProblemError if the hull is not the one whose event a reader has seen."""
+    if uid != seen:
+        detail = f"Last-Event-ID: the hull {name!r} was deleted and created again, or restored"
+        raise ProblemError(409, detail, "HULL_REPLACED", field="Last-Event-ID", value=last_event_id)
 
 
 class ReplayTexts(AsyncIterator[bytes]):
