@@ -13,6 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from cases import slow
 from command_line import dynhull
 from forked import COMMAND, Process
 from patience import wait_until
@@ -187,6 +188,7 @@ def test_following_the_advice_works(served, name, failing, advice, following):
         assert done is None or (done.exit_code, "bad row" in done.stderr and "bad.csv" not in command) == (0, False)
 
 
+@slow
 @pytest.mark.usefixtures("files")
 def test_a_pipe_is_written_to_a_file(served, name):
     for options in ("--format parquet", "--format parquet --replace"):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import trustme
+from cases import slow
 from command_line import dynhull, on_a_terminal
 from forgetful import FORGETFUL
 from forked import COMMAND, Process
@@ -410,6 +411,7 @@ def test_a_full_disk_behind_standard_output(hull, served):
     assert (done.returncode, done.stderr) == (2, "error: standard output: No space left on device\n")
 
 
+@slow
 def test_what_the_encoding_lacks_is_escaped(hull, served):
     with HullClient(served) as client:
         client.create_hull(f"{hull}/towns", keyed="str")
@@ -422,6 +424,7 @@ def test_what_the_encoding_lacks_is_escaped(hull, served):
     assert [line.split("\t")[2] for line in done.stdout.splitlines()] == ["Kiel", "\\u0141ód\\u017a", "Oslo"]
 
 
+@slow
 def test_a_reader_of_a_quiet_hull_that_has_enough(hull, served):
     for options in ("", "--json"):
         command = f"{COMMAND} watch {hull} {options} --address {served} | head -1"

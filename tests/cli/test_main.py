@@ -8,6 +8,7 @@ from importlib.metadata import entry_points, version
 from pathlib import Path
 
 import pytest
+from cases import slow
 from command_line import dynhull
 from forked import COMMAND
 from patience import PATIENCE
@@ -99,7 +100,9 @@ def test_the_list_of_commands_imports_none(arguments, environment) -> None:
     assert set(done.stderr.split()) & {"numpy", "grpc", *FRAMES} == set()
 
 
-@pytest.mark.parametrize(("asked", "answer"), [("--", "--help"), ("--help", "Usage: ")], ids=["completion", "help"])
+@pytest.mark.parametrize(
+    ("asked", "answer"), [("--", "--help"), pytest.param("--help", "Usage: ", marks=slow)], ids=["completion", "help"]
+)
 def test_the_options_of_a_command_are_known_without_what_it_runs(asked, answer) -> None:
     commands = [[], *([entry.name] for entry in entry_points(group="dynhull.commands"))]
     done = run(sys.executable, "-c", ASKED.format(asked=asked, commands=commands))
@@ -150,6 +153,7 @@ def test_a_missing_extra_says_how_to_install_it(arguments: tuple[str, ...]) -> N
     assert "Traceback" not in result.stderr
 
 
+@slow
 def test_something_missing_that_is_loaded_late() -> None:
     result = run_without("pandas", "demo")
     assert result.returncode == 2
@@ -158,6 +162,7 @@ def test_something_missing_that_is_loaded_late() -> None:
     assert "Traceback" not in result.stderr
 
 
+@slow
 def test_a_format_that_is_not_installed(tmp_path: Path) -> None:
     file = tmp_path / "points.geojson"
     file.write_text("{}")
@@ -167,6 +172,7 @@ def test_a_format_that_is_not_installed(tmp_path: Path) -> None:
     assert "pip install 'dynhull[client,cli,files]'" in result.stderr
 
 
+@slow
 def test_help_works_without_the_extra() -> None:
     result = run_without("grpc", "--help")
     assert result.returncode == 0

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 
 import pytest
+from cases import slow
 from command_line import dynhull
 from postgresql import PostgreSQL, postgresql
 from psycopg.conninfo import conninfo_to_dict
@@ -28,6 +29,7 @@ def original() -> Iterator[PostgreSQL]:
         yield server
 
 
+@slow
 def test_nothing_of_a_copy_arrives_at_the_owners_of_the_original(original: PostgreSQL) -> None:
     url = original.new_database()
     with ExitStack() as stack:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from one_gateway import Place, entries
 from patience import wait_until
 
@@ -86,6 +87,7 @@ def test_what_is_of_its_own_stays_so(place: Place, client: HullClient) -> None:
         assert each.seen == [1]
 
 
+@slow
 def test_a_watcher_that_does_not_read_holds_nobody(place: Place, client: HullClient) -> None:
     """It gets what the feed has forgotten from the worker, and goes on with the feed."""
     keys, times = 400, 100

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from one_gateway import Place, entries
 
 from dynhull import DynamicHull
@@ -90,6 +91,7 @@ def test_everybody_sees_the_same_hull_at_the_same_revision(place: Place, client:
     assert min(len(each.seen) for each in watchers) < BATCHES
 
 
+@slow
 def test_a_watcher_that_does_not_read_holds_nobody(place: Place, client: HullClient) -> None:
     """It gets the changes since the event that it was sent last as one."""
     last, x = 120, np.arange(2500.0)

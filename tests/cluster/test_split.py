@@ -13,7 +13,7 @@ from subprocess import PIPE
 from typing import Any
 
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from cluster import processes
 from command_line import dynhull
 from forked import Process
@@ -160,6 +160,7 @@ def more(callers: Sequence[Caller]) -> None:
     wait_until(lambda: all(each.errors or each.calls > count + 1 for each, count in zip(callers, counts, strict=True)))
 
 
+@slow
 def test_a_database_is_divided_while_all_kinds_of_callers_go_on(url: str) -> None:
     with one_server(url) as client:
         fill(client)

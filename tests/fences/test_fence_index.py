@@ -8,6 +8,7 @@ from math import inf
 import fence_oracle
 import numpy as np
 import pytest
+from cases import slow
 from hulls import KEYED_HULLS
 
 from dynhull import Crossings, FenceIndex, _rings
@@ -283,7 +284,7 @@ def test_subjects_among_long_edges(make, name):
 
 
 @kinds
-@pytest.mark.parametrize("turn", [False, True], ids=["upright", "lying"])
+@pytest.mark.parametrize("turn", [False, pytest.param(True, marks=slow)], ids=["upright", "lying"])
 def test_subjects_on_one_line_leave_it(make, turn):
     """Many at one x have a zone of their own, which must not reach beyond what it was cut out of."""
     rng = np.random.default_rng(3)

@@ -17,6 +17,7 @@ import grpc
 import numpy as np
 import pytest
 import trustme
+from cases import slow
 from cluster import descendants, processes
 from command_line import dynhull
 from grpc_health.v1 import health_pb2, health_pb2_grpc
@@ -224,6 +225,7 @@ def logged(folder: Path, *options: str) -> Iterator[tuple[Server, Path]]:
         yield server, log
 
 
+@slow
 def test_refusals_do_not_fill_the_log_and_are_all_counted(tokens: Tokens, tmp_path: Path) -> None:
     calls, at_once = 1_000, 500  # of a thousand that wait to be looked at gRPC itself cancels some
     options = ("--tokens", str(tokens.path), "--log-format", "json", "--metrics-port", "0")

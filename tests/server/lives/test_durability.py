@@ -6,6 +6,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from patience import PATIENCE
 from server_process import run, server_process, shape_options
 
@@ -32,8 +33,15 @@ def kill(server):
     server.process.wait(PATIENCE)
 
 
-@pytest.mark.parametrize("sudden", [True, False])
-@pytest.mark.parametrize("durability", ["sync", "interval", "none"])
+@pytest.mark.parametrize(
+    ("durability", "sudden"),
+    [
+        ("sync", True),
+        ("sync", False),
+        ("interval", True),
+        *(pytest.param(*each, marks=slow) for each in [("interval", False), ("none", True), ("none", False)]),
+    ],
+)
 def test_acknowledged_batches_are_there_after_a_restart(tmp_path, sudden, durability):
     options = ["--data", str(tmp_path / "data"), "--durability", durability]
     points = random_points(3000, 1)

@@ -117,6 +117,7 @@ def test_what_was_written_faster_than_snapshots_come_is_in_segments_without_more
         assert points.tolist() == [positions(revision)[0].tolist() for revision in range(1, batches + 1)]
 
 
+@slow
 def test_what_is_in_memory_or_a_part_of_a_file_does_not_hide_a_hole(tmp_path):
     with (
         measured("--data", str(tmp_path), *SNAPSHOTS, complaints=HOLE) as (server, metrics),

@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from itertools import count
 
 import pytest
+from cases import slow
 from postgresql import postgresql
 from server_process import run, server_process, shape_options
 
@@ -126,6 +127,7 @@ def test_a_place_that_cannot_be_written_adds_no_marks(tmp_path):
     assert len(marks.known()) == 2  # who takes a place that nobody has, and then the process
 
 
+@slow
 def test_a_copy_of_the_files_of_postgresql_is_noticed_too(tmp_path):
     with ExitStack() as stack:
         original = stack.enter_context(postgresql())

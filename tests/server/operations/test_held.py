@@ -9,6 +9,7 @@ from subprocess import PIPE
 
 import counted_server
 import pytest
+from cases import slow
 from forked import Process
 from holdings import KINDS, OPTIONS, Hold
 from patience import PATIENCE
@@ -24,6 +25,8 @@ PAGE = Path(__file__).parents[3] / "docs" / "performance.md"
 MORE, LESS = 1.15, 0.75
 # Few are enough: a count has no noise.
 FEWER = 10
+# The others fill servers for seconds.
+QUICK = {"point", "key, an integer", "hull, empty", "watch of a hull"}
 
 
 def table() -> dict[str, int]:
@@ -37,7 +40,7 @@ def test_each_kind_has_its_row() -> None:
     assert list(table()) == list(KINDS)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=() if kind in QUICK else slow) for kind in KINDS])
 def test_each_takes_what_is_documented(kind: str) -> None:
     count, hold = KINDS[kind]
     counted, documented = asyncio.run(_counted(hold, max(count // FEWER, 50))), table()[kind]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import slow
 from command_line import dynhull
 from proxy import Proxy
 from server_process import server_process
@@ -47,7 +48,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path
         yield server.address, folder, filled(client)
 
 
-@pytest.mark.parametrize("suffix", ["csv", "parquet", "geojson"])
+@pytest.mark.parametrize("suffix", ["csv", "parquet", pytest.param("geojson", marks=slow)])
 def test_a_server_exports_what_its_folder_does(
     served: tuple[str, Path, list[str]], tmp_path: Path, suffix: str
 ) -> None:
