@@ -148,8 +148,9 @@ class Entities(HullTree):
         """Put all rows, like `update`; a time that is NaN means none."""
         self._put_rows(*self._checked(keys, xy, times, or_none=not self.ordered), None)
 
-    def begin_load(self) -> None:
+    def begin_load(self, room: int = 0) -> None:
         """Put off the tree, for some calls of `load` and `remove_many`: of several batches it is built once."""
+        del room
         if type(self) is not Entities or self._held:
             raise ValueError("only an empty hull of a plane is loaded so")
         self._whole = False

@@ -250,8 +250,10 @@ class Entities:
     def load(self, keys: object | None, xy: object | None, times: object | None) -> None:
         """Put all rows; a time that is NaN means none."""
 
-    def begin_load(self) -> None:
-        """Put off the tree, for some calls of `load` and `remove_many`."""
+    def begin_load(self, room: int = 0) -> None:
+        """
+        Put off the tree, for some calls of `load` and `remove_many`; with room for that many entities.
+        """
 
     def end_load(self) -> None:
         """Build the tree. O(n log n)."""

@@ -281,8 +281,10 @@ class KeyedHull(Keyed, Hull):
         return hull
 
     @classmethod
-    def loader(cls, key_type: KeyType = "str", *, ordered: bool = False) -> KeyedLoader:
+    def loader(cls, key_type: KeyType = "str", *, ordered: bool = False, room: int = 0) -> KeyedLoader:
         """What takes the entities of a new hull in several batches, as from a log, and builds the hull once.
+
+        With room for that many entities from the beginning; there may be more.
 
         >>> from dynhull import KeyedHull
         >>> loader = KeyedHull.loader()
@@ -292,7 +294,7 @@ class KeyedHull(Keyed, Hull):
         >>> loader.hull().vertex_keys()
         ['AF84', 'UA17']
         """
-        return KeyedLoader(cls(key_type, ordered=ordered))
+        return KeyedLoader(cls(key_type, ordered=ordered), room)
 
     # As a value
 
@@ -312,9 +314,11 @@ class KeyedLoader:
 
     __slots__ = ("_hull",)
 
-    def __init__(self, hull: KeyedHull) -> None:
+    def __init__(self, hull: KeyedHull, room: int = 0) -> None:
+        if room < 0:
+            raise ValueError(f"room must be a number of entities, got {room}")
         self._hull: KeyedHull | None = hull
-        hull._tree.begin_load()
+        hull._tree.begin_load(room)
 
     def update(self, keys: Any, xy: npt.ArrayLike, times: npt.ArrayLike | None = None) -> None:
         """Insert or move k entities, as `KeyedHull.update` does; a time that is NaN means none. O(k).

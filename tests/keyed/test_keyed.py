@@ -138,6 +138,19 @@ def test_a_loader_gives_the_hull_of_all_batches():
         KeyedHull.loader(ordered=True).update(["a"], [[0, 0]])
     with pytest.raises(ValueError, match="key_type must be"):
         KeyedHull.loader("float")
+    with pytest.raises(ValueError, match=r"^room must be a number of entities, got -1$"):
+        KeyedHull.loader(room=-1)
+
+
+@pytest.mark.parametrize("room", [0, 3, 500, 5000])
+def test_a_loader_has_room_for_some_entities_and_takes_more(room):
+    keys, places = [f"key {number}" for number in range(2000)], np.random.default_rng(2).random((2000, 2))
+    loader = KeyedHull.loader(room=room)
+    for first in range(0, 2000, 300):
+        loader.update(keys[first : first + 300], places[first : first + 300])
+    hull = loader.hull()
+    hull.check()
+    assert hull == KeyedHull.from_entities(keys, places)
 
 
 def test_missing_keys(hull):

@@ -15,9 +15,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from dynhull_server.state.contents.joining import in_one
 from dynhull_server.state.errors import HullNotFoundError, NotStoredError
 from dynhull_server.state.hull_state import HullState
-from dynhull_server.state.records import CommitStamp, Kept, Record
+from dynhull_server.state.records import CommitStamp, Kept, Parts, Record
 from dynhull_server.state.requests import ReadHull
 from dynhull_server.storage.port import DamagedError, Progress, StorageError, StoredContents, TakenOverError
 from dynhull_server.storage.rows.examine import Findings, examine
@@ -298,13 +299,13 @@ async def read_past(process: "Process", model: "Model", name: str) -> None:
     if truth.past.whole and first:
         raise model.finds(f"the past of {name} was to be kept for ever, and begins with {first}")
     _compare(model, truth, first, records)
-    for state in kept:
-        found = content(points(name, state.contents.points))
+    for state, parts in kept:
+        found = content(points(name, in_one(parts.parts).points))
         if found != truth.contents[state.revision]:
             raise model.finds(f"{name} was {found} at {state.revision} in the past: {truth.contents[state.revision]}")
 
 
-def _read(storage: Any, number: int, last: int) -> tuple[int, list[Record], list[Kept]]:
+def _read(storage: Any, number: int, last: int) -> tuple[int, list[Record], list[tuple[Kept, Parts]]]:
     """The first revision, all batches after it, and the states on the way."""
     first = after = storage.oldest_moment(number).revision
     records: list[Record] = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from dynhull_server.state.feed_consumers import FeedConsumer
 from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
-from dynhull_server.state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
+from dynhull_server.state.records import CommitStamp, Contents, HullRow, Kept, Keys, Parts, Record
 from dynhull_server.state.tracks import KeyChanges
 from dynhull_server.storage.past import Erasure, Hole, Moment, StoredHistory
 from dynhull_server.storage.port import NEWEST, NotCommittedError, Progress, Storage, StorageStep, StoredContents
@@ -274,7 +274,7 @@ class FaultyStorage:
         """The revision as of a time."""
         return self._of_past(lambda: self._inner.moment(number, time))
 
-    def state(self, number: int, until: int) -> Kept:
+    def state(self, number: int, until: int) -> tuple[Kept, Parts]:
         """A kept state."""
         return self._of_past(lambda: self._inner.state(number, until))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dynhull.keys import PackedKeys
+from dynhull_server.state.contents.joining import in_one
 from dynhull_server.state.fences.events.block import AppendEvents, block_of
 from dynhull_server.state.fences.model.config import FenceConfig, PolygonArea
 from dynhull_server.state.fences.model.records import (
@@ -155,3 +156,11 @@ def flip(file, needle, nth=0):
     content = bytearray(file.read_bytes())
     content[content.index(needle) + nth] ^= 0x40
     file.write_bytes(content)
+
+
+def state(storage, number, until):
+    """The newest state of a revision not after another one, with its contents."""
+    kept, parts = storage.state(number, until)
+    found = list(parts.parts)
+    assert sum(map(len, found)) == parts.count
+    return dataclasses.replace(kept, contents=in_one(found))

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from dynhull.keys import PackedKeys
+from dynhull_server.state.contents.joining import in_one
 from dynhull_server.state.records import (
     FOREVER,
     NO_TIME,
@@ -174,7 +175,7 @@ def test_contents_come_back_from_chunks(given, size):
     longest_row = 16 + 6 * 8 + 256  # in quarantine
     assert max(map(len, parts)) <= chunks.HEADER.size + size + longest_row
     *_, decoded = chunks.state_from(chunks.state(Kept()))
-    same(chunks.joined([decoded(part) for part in parts]), given)
+    same(in_one([decoded(part) for part in parts]), given)
 
 
 @given(st.dictionaries(st.text(), st.integers(1, 2**64 - 1)) | st.just({"producers": 3, "clock": 4}), st.none() | times)
@@ -201,8 +202,8 @@ def test_snapshots_of_earlier_formats(state):
     assert kept.producers == ({"producers": 3, "clock": 4} if len(state) > 2 else {})
     assert (kept.clock, kept.center) == (None, None)
     points = np.arange(6.0).reshape(-1, 2)
-    same(chunks.joined([decoded(points.tobytes()), decoded(b"")]), Contents(points))
-    same(chunks.joined([]), Contents())
+    same(in_one([decoded(points.tobytes()), decoded(b"")]), Contents(points))
+    same(in_one([]), Contents())
 
 
 windows = st.builds(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from filed_fleet import KEYS, SECOND, Fleet, read_back
-from folders import no_progress, same
+from folders import no_progress, same, state
 
 from dynhull.keys import PackedKeys, take_keys
 from dynhull_server.state.contents import replayed
@@ -101,7 +101,7 @@ def test_a_key_is_in_no_file_and_in_no_revision_any_more(fleet):
         same(found, expected)
         assert [each.committed for each in found] == [each.committed for each in expected]
         for revision in range(0, len(expected), 3):
-            kept = fleet.storage.state(1, revision)
+            kept = state(fleet.storage, 1, revision)
             wanted = replayed(Kept(records=expected[: kept.revision]), fleet.settings).stored()
             same(kept.contents, wanted if kept.revision else kept.contents)
         (erasure,) = fleet.storage.erasures(1)

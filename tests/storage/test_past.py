@@ -3,7 +3,7 @@
 import shutil
 
 import pytest
-from folders import OLD_FOLDERS, no_progress, same
+from folders import OLD_FOLDERS, no_progress, same, state
 from test_contract import Opened, make, points, record, records, row  # noqa: F401  (make is a fixture)
 
 from dynhull_server.state.records import Append, CommitStamp, Create
@@ -68,11 +68,11 @@ def test_a_state_and_the_batches_after_it_are_every_revision_that_is_kept(opened
         assert opened.storage.moment(1, NOW + 2 * SECOND + 1) is None  # revision 4
         assert opened.storage.moment(1, NOW + 3 * SECOND) == Moment(6, stamps[6])
         for until in range(5, 25):
-            state = opened.storage.state(1, until)
-            assert (state.revision, state.records) == (14 if until >= 14 else 5, [])
-            assert state.committed == stamps[state.revision]
-            same(state.contents.points, points(9, state.revision))
-            same(all_batches(opened.storage, state.revision, until), records(state.revision + 1, until))
+            kept = state(opened.storage, 1, until)
+            assert (kept.revision, kept.records) == (14 if until >= 14 else 5, [])
+            assert kept.committed == stamps[kept.revision]
+            same(kept.contents.points, points(9, kept.revision))
+            same(all_batches(opened.storage, kept.revision, until), records(kept.revision + 1, until))
         for read in (lambda: opened.storage.state(1, 4), lambda: opened.storage.batches(1, 4, 6)):
             with pytest.raises(DamagedError, match="no longer kept"):
                 read()

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import pytest
 from filed_fleet import SECOND, SETTINGS, Fleet, move, read_back
-from folders import no_progress, same
+from folders import no_progress, same, state
 from postgresql import query
 
 from dynhull_cluster.postgres.database import Database
@@ -133,7 +133,7 @@ def test_what_cannot_be_put_right_is_a_hole_of_one_hull_with_its_revisions(fleet
             storage.moment(1, time)
     assert storage.moment(1, fleet.records[3].committed.time).revision == 4
     same(storage.batches(1, 15, 20)[:3], fleet.records[15:18])
-    assert storage.state(1, 16).revision == 15
+    assert state(storage, 1, 16).revision == 15
     assert [(each.first, each.last) for each in storage.holes()] == [(8, 15)]
     storage.close()
 

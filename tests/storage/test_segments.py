@@ -1,6 +1,7 @@
 """What the journal drops of hulls with a history becomes segments: whole, once, checked, and no longer than wanted."""
 
 import errno
+import json
 import os
 import shutil
 import time
@@ -12,13 +13,14 @@ import pyarrow.parquet as pq
 import pytest
 from cases import slow
 from filed_fleet import BEGIN, KEYS, SECOND, SETTINGS, Fleet, move, read_back
-from folders import no_progress, same
+from folders import no_progress, same, state
 from postgresql import query
 
 from dynhull.keys import PackedKeys
 from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
 from dynhull_server.state.contents import replayed
+from dynhull_server.state.contents.joining import in_one
 from dynhull_server.state.records import (
     FOREVER,
     NO_TIME,
@@ -31,6 +33,7 @@ from dynhull_server.state.records import (
     HeldChange,
     HeldRows,
     HullRow,
+    HullSettings,
     Kept,
     KeyRows,
     PointRows,
@@ -58,7 +61,7 @@ def require_all(storage, records):
     same(found, records)
     assert [each.committed for each in found] == [each.committed for each in records]
     for until in range(0, len(records) + 1, 3):
-        kept = storage.state(1, until)
+        kept = state(storage, 1, until)
         expected = replayed(Kept(records=records[: kept.revision]), SETTINGS).stored()
         same(kept.contents.points, expected.points if kept.revision else np.empty((0, 2)))
         assert kept.revision <= until
@@ -86,7 +89,7 @@ def require_all_of_keys(storage, records):
                 if key in wanted
             )
             assert [revision for revision, *_ in found] == sorted(revision for revision, *_ in found)
-            whole = storage.state(1, after)
+            whole = state(storage, 1, after)
             revision, rows, contents = storage.key_state(1, keys, after)
             expected = dict(zip(whole.contents.keys or (), whole.contents.points.tolist(), strict=True))
             there = {wanted[row]: point for row, point in zip(rows.tolist(), contents.points.tolist(), strict=True)}
@@ -352,7 +355,7 @@ def test_no_flipped_bit_cut_or_exchange_of_a_file_goes_unnoticed(tmp_path):
 
     def read_all(storage):
         for until in range(0, len(fleet.records), 4):
-            storage.state(1, until)
+            state(storage, 1, until)
         read_back(storage, len(fleet.records))
 
     def refused(path):
@@ -537,7 +540,42 @@ def test_the_state_of_an_empty_hull_comes_back():
         empty = Contents(np.empty((0, 2)), keys)
         columns = columns_of_state(empty, 7, None, identity)
         found, _, _ = from_parquet(to_parquet(columns, {}), "a file")
-        same(contents_of(found, times=False, deadlines=False), empty)
+        same(contents_of(found, {"times": "False", "deadlines": "False"}), empty)
+
+
+@pytest.mark.parametrize("identity", ["str", "int", "multiset"])
+@pytest.mark.parametrize("columns", ["none", "times", "deadlines", "accuracies", "held"])
+def test_a_state_is_read_a_group_of_rows_at_a_time(monkeypatch, identity, columns):
+    monkeypatch.setattr(parquet, "GROUP_ROWS", 64)
+    rng, count = np.random.default_rng(1), 500
+    keys = {"str": PackedKeys.pack([f"vehicle {i:03}" for i in range(count)]), "int": np.arange(count, dtype=np.uint64)}
+    late = np.arange(count) > 100  # none in the first group
+    contents = Contents(
+        rng.random((count, 2)),
+        keys.get(identity),
+        np.where(late, 7, NO_TIME) if columns == "times" else None,
+        np.where(late, 7, FOREVER) if columns == "deadlines" else None,
+        accuracies=np.where(late, 0.1, 0.0) if columns == "accuracies" and identity != "multiset" else None,
+    )
+    if columns == "held" and identity != "multiset":
+        times, numbers = np.full(count, 3), np.full(count, 1.5)
+        contents.held = HeldRows(
+            contents.keys, contents.points, times, times, numbers, numbers, times, times, np.zeros(count)
+        )
+    file = filing.state_file(HullRow(1, "a", "uid", 0.0, HullSettings(identity)), Kept(revision=9, contents=contents))
+    parts, told = parquet.state_from_parquet(file, "a file")
+    found = list(parts.parts)
+    assert parts.count == count
+    in_groups = identity != "multiset" and columns != "held"
+    assert [len(each) for each in found] == ([64] * 7 + [52] if in_groups else [count])
+    same(in_one(found), contents)
+    assert json.loads(told)["producers"] == {}
+    if in_groups:
+        middle = len(file) // 2  # zeros in the middle of the rows: the first of them come, and the rest is refused
+        parts, _ = parquet.state_from_parquet(file[: middle - 400] + bytes(800) + file[middle + 400 :], "a file")
+        same(next(reading := iter(parts.parts)), found[0])
+        with pytest.raises(DamagedError, match=r"^a file is damaged: "):
+            list(reading)
 
 
 def test_positions_of_few_decimals_take_few_bytes():
@@ -746,7 +784,7 @@ def test_history_begins_where_the_journal_does_when_it_is_set(tmp_path):
     assert fleet.storage.moment(1, BEGIN) is None
     same(read_back(fleet.storage, len(fleet.records)), fleet.records[begin:])
     same(fleet.storage.read(1, NEWEST).records, fleet.records[fleet.storage.read(1).revision :])
-    assert isinstance(fleet.storage.state(1, begin).contents, Contents)
+    assert isinstance(state(fleet.storage, 1, begin).contents, Contents)
     fleet.storage.close()
 
 

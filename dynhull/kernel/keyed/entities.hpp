@@ -68,8 +68,13 @@ class Entities {
   void detach() { reports_ = nullptr; }
 
   // Puts and removes do not reach the tree until `build`, which is asked nothing before: of several batches it is built
-  // once. To be called before the first entity of a plane.
-  void put_off() { whole_ = false; }
+  // once. To be called before the first entity of a plane. Makes room for that many entities: to grow takes new memory
+  // for what is there already.
+  void put_off(std::size_t room) {
+    slots_.reserve(room, 0);
+    table_.reserve(room);
+    whole_ = false;
+  }
   void build(FramedTree& tree) {
     if (whole_) return;
     rebuild(tree);

@@ -55,10 +55,10 @@ class KeyedHull : public Hull {
     put_all(keys, xy, times, Only::ALL, !ordered());
   }
 
-  void begin_load() {
+  void begin_load(std::size_t room) {
     if (tree_.frame().on_globe() || size() > 0) throw nb::value_error("only an empty hull of a plane is loaded so");
     const WriteLock lock(lock_);
-    entities_.put_off();
+    entities_.put_off(room);
   }
   void end_load() {
     const WriteLock lock(lock_);

@@ -172,7 +172,8 @@ void add_entities(nb::module_& module) {
            "unmoved, stale and skipped.")
       .def("load", &KeyedHull::load, "keys"_a.none(), "xy"_a.none(), "times"_a.none(),
            "Put all rows; a time that is NaN means none.")
-      .def("begin_load", &KeyedHull::begin_load, "Put off the tree, for some calls of `load` and `remove_many`.")
+      .def("begin_load", &KeyedHull::begin_load, "room"_a = 0,
+           "Put off the tree, for some calls of `load` and `remove_many`; with room for that many entities.")
       .def("end_load", &KeyedHull::end_load, "Build the tree. O(n log n).")
       .def("put", &KeyedHull::put,
            nb::sig("def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool"),

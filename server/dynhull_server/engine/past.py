@@ -25,7 +25,7 @@ from ..state.errors import (
 from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
-from ..state.records import CommitStamp, Kept, Keys, Record
+from ..state.records import CommitStamp, Kept, Keys, Parts, Record
 from ..state.root_state import state_of
 from ..state.tracks import Moves, Tracker
 from ..storage.past import Erasure, Hole, Moment, Past, created, erased_since
@@ -316,9 +316,9 @@ class PastHulls:
         while rebuilt is None or rebuilt.state.counts.revision < revision:
             try:
                 if rebuilt is None:
-                    erasures, kept = await self._stored(hull, revision)
+                    erasures, kept, parts = await self._stored(hull, revision)
                     at = kept.revision
-                    rebuilt, ahead = await self._begin(hull, revision, erasures, kept)
+                    rebuilt, ahead = await self._begin(hull, revision, erasures, kept, parts)
                 else:
                     at = rebuilt.state.counts.revision
                     ahead = await self._step(rebuilt, ahead, revision)
@@ -333,23 +333,23 @@ class PastHulls:
                 rebuilt, at = None, NEWEST  # what followed it has been dropped meanwhile: a newer state leads there
         return rebuilt
 
-    async def _stored(self, hull: Hull, revision: int) -> tuple[tuple[Erasure, ...], Kept]:
-        """The newest stored state at or before a revision, and the erasures before it was read."""
+    async def _stored(self, hull: Hull, revision: int) -> tuple[tuple[Erasure, ...], Kept, Parts]:
+        """The newest stored state at or before a revision, its points, and the erasures before it was read."""
         number = hull.row.number
 
-        def stored() -> tuple[tuple[Erasure, ...], Kept]:
+        def stored() -> tuple[tuple[Erasure, ...], Kept, Parts]:
             erasures = self._past.erasures(number)
-            kept = self._past.state(number, revision)
-            self._require_room(len(kept.contents))
+            kept, parts = self._past.state(number, revision)
+            self._require_room(parts.count)
             if not kept.revision:
                 kept.committed = created(hull.row)
-            return erasures, kept
+            return erasures, kept, parts
 
-        found: tuple[tuple[Erasure, ...], Kept] = await self.ask(hull.name, stored)
+        found: tuple[tuple[Erasure, ...], Kept, Parts] = await self.ask(hull.name, stored)
         return found
 
     async def _begin(
-        self, hull: Hull, revision: int, erasures: tuple[Erasure, ...], kept: Kept
+        self, hull: Hull, revision: int, erasures: tuple[Erasure, ...], kept: Kept, parts: Parts
     ) -> tuple[_Rebuilt, list[Record]]:
         """A hull from a stored state and some batches after it, which are read while the state is loaded.
 
@@ -369,9 +369,9 @@ class PastHulls:
             return found
 
         contents, records = await self._both(
-            hull.name, partial(begun, kept, settings, limits.points_of(settings)), read
+            hull.name, partial(begun, kept, settings, limits.points_of(settings), parts), read
         )
-        rows = len(kept.contents) + sum(1 + len(each.rows) for each in records)
+        rows = parts.count + sum(1 + len(each.rows) for each in records)
         self._require_room(rows)
         kept.records = records
         last = kept.last_revision

@@ -1,5 +1,6 @@
 """The data that the storage keeps: hulls, and the batches applied to them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -388,6 +389,19 @@ class Contents:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+@dataclass(slots=True)
+class Parts:
+    """The points of a hull in parts, each made when its turn comes: all of them at once would take new memory.
+
+    Attributes:
+        count: the number of points.
+        parts: some of the points each, to be read once; the quarantine is in one of them alone.
+    """
+
+    count: int
+    parts: Iterable[Contents]
 
 
 @dataclass(slots=True)

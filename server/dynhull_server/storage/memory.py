@@ -22,7 +22,7 @@ from ..state.fences.model.records import (
     PutConsumer,
     PutDelays,
 )
-from ..state.records import Append, CommitStamp, Contents, Create, Delete, HullRow, Kept, Keys, Record
+from ..state.records import Append, CommitStamp, Contents, Create, Delete, HullRow, Kept, Keys, Parts, Record
 from ..state.tracks import KeyChanges
 from ..state.ways import KeyWays
 from .of_keys import changes_of_keys, contents_of_keys, ways_of
@@ -165,9 +165,10 @@ class MemoryStorage:
         before = [each for each in found if each.committed is not None and each.committed.time <= time]
         return before[-1] if before else None
 
-    def state(self, number: int, until: int) -> Kept:
-        """The newest snapshot of a revision not after `until`, without the batches after it."""
-        return replace(self.read(number, until), records=[])
+    def state(self, number: int, until: int) -> tuple[Kept, Parts]:
+        """The newest snapshot of a revision not after `until`, and its contents."""
+        kept = self.read(number, until)
+        return replace(kept, records=[], contents=Contents()), Parts(len(kept.contents), [kept.contents])
 
     def batches(self, number: int, after: int, until: int) -> list[Record]:
         """The batches that follow a revision."""
@@ -182,7 +183,7 @@ class MemoryStorage:
 
     def key_state(self, number: int, keys: Keys, until: int) -> tuple[int, npt.NDArray[np.int32], Contents]:
         """What the newest snapshot has of some keys."""
-        kept = self.state(number, until)
+        kept = self.read(number, until)
         return kept.revision, *contents_of_keys(kept.contents, keys)
 
     def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:

@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from ..state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
+from ..state.records import CommitStamp, Contents, HullRow, Kept, Keys, Parts, Record
 from ..state.tracks import KeyChanges
 from ..state.ways import KeyWays
 
@@ -115,8 +115,11 @@ class Past(Protocol):
         None if the time is before that of the oldest revision whose commit is known.
         """
 
-    def state(self, number: int, until: int) -> Kept:
-        """The newest state that is kept of a revision not after `until`, without the batches after it."""
+    def state(self, number: int, until: int) -> tuple[Kept, Parts]:
+        """The newest state that is kept of a revision not after `until`, without its points, and these.
+
+        To read a part of them may raise DamagedError, too. No batches come with it.
+        """
 
     def batches(self, number: int, after: int, until: int) -> list[Record]:
         """The batches that follow revision `after`, in order and without a gap, none after `until`.

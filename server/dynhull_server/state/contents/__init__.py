@@ -1,7 +1,8 @@
 """The points of hulls: multisets, keyed hulls, and windows."""
 
 from ..frames import Globe
-from ..records import DEFAULT, HullSettings, Kept
+from ..records import DEFAULT, HullSettings, Kept, Parts
+from .joining import in_one
 from .keyed import Keyed
 from .live import LiveContents
 from .multiset import Multiset
@@ -10,19 +11,24 @@ from .windowed import Windowed
 UNLIMITED = 2**63
 
 
-def begun(kept: Kept, settings: HullSettings = DEFAULT, most_points: int = UNLIMITED) -> LiveContents:
+def begun(
+    kept: Kept, settings: HullSettings = DEFAULT, most_points: int = UNLIMITED, parts: Parts | None = None
+) -> LiveContents:
     """The contents of a hull with these settings as a snapshot has them, for `replayed`. O(n log n).
 
-    The root of a hull over shards has vertices in place of points: they leave when their shard says so.
+    `parts` are its points, unless the snapshot has these itself. The root of a hull over shards has vertices in place
+    of points: they leave when their shard says so.
     """
+    if parts is None:
+        parts = Parts(len(kept.contents), [kept.contents])
     if settings.divided:
         settings = HullSettings(settings.identity)
     globe = Globe(kept.center or settings.center) if settings.geographic else None
     if settings.identity == "multiset" and settings.window is None:
-        return Multiset(kept.contents, most_points, globe)
+        return Multiset(in_one(parts.parts), most_points, globe)
     if settings.identity == "multiset":
-        return Windowed(settings, kept.contents, kept.clock, most_points, globe)
-    return Keyed(settings, kept.contents, kept.clock, most_points, globe, kept.rules)
+        return Windowed(settings, in_one(parts.parts), kept.clock, most_points, globe)
+    return Keyed(settings, parts, kept.clock, most_points, globe, kept.rules)
 
 
 def replayed(

@@ -1,12 +1,44 @@
-"""The points of several hulls as those of one."""
+"""Several points as one: those of a hull in parts, and those of several hulls."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from dynhull.keys import PackedKeys, key_list
 
-from ..records import FOREVER, NO_TIME, Contents, Keys, Times
+from ..records import FOREVER, NO_TIME, Contents, HeldRows, Keys, Times
+
+
+def in_one(parts: Iterable[Contents]) -> Contents:
+    """The contents of a hull in parts, one after the other. These have the same columns, but those without points."""
+    parts = list(parts)
+    if len(parts) == 1:
+        return parts[0]
+    points = np.concatenate([np.empty((0, 2)), *(part.points for part in parts)])
+    columns = {name: [getattr(part, name) for part in parts] for name in ("times", "deadlines", "accuracies")}
+    there = {name: [each for each in column if each is not None] for name, column in columns.items()}
+    found = {name: np.concatenate(column) for name, column in there.items() if column}
+    keys = [part.keys for part in parts if part.keys is not None]
+    held = held_in_one([part.held for part in parts if part.held is not None])
+    return Contents(points, _keys_in_one(keys) if keys else None, held=held, **found)
+
+
+def held_in_one(parts: Sequence[HeldRows]) -> HeldRows | None:
+    """All positions in quarantine of several parts; None without any part."""
+    if len(parts) <= 1:
+        return parts[0] if parts else None
+    columns = ("points", "times", "deadlines", "speeds", "growths", "revisions", "confirmed", "accuracies")
+    return HeldRows(
+        _keys_in_one([part.keys for part in parts]),
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in columns},
+    )
+
+
+def _keys_in_one(parts: Sequence[Keys]) -> Keys:
+    strings = [each for each in parts if isinstance(each, PackedKeys)]
+    if strings:
+        return PackedKeys(b"".join(each.lengths for each in strings), b"".join(each.data for each in strings))
+    return np.concatenate([each for each in parts if isinstance(each, np.ndarray)])
 
 
 def joined(parts: Sequence[Contents]) -> Contents:

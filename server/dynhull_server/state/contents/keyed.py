@@ -23,9 +23,11 @@ from ..records import (
     Center,
     Contents,
     Expiry,
+    HeldRows,
     HullSettings,
     KeyRows,
     Keys,
+    Parts,
     QuarantineRules,
     Record,
     Times,
@@ -33,6 +35,7 @@ from ..records import (
 from .accuracies import NO_ACCURACIES, given_accuracies
 from .deadlines import NO_DEADLINES, Key, given_deadlines
 from .gate import NOTHING_HELD, AdmittedPuts, Gate
+from .joining import in_one
 from .key_rows import (
     key_at,
     library_times,
@@ -51,6 +54,8 @@ from .quarantine import Quarantine
 
 # Keys whose deadline has come are removed in parts of this size: reading a list of keys keeps other threads waiting.
 REMOVED_TOGETHER = 8192
+# Keys that are loaded at once: for each of them the loader needs memory, which is new where it was not used before.
+LOADED_TOGETHER = 2**15
 # Beyond twice the number of keys, deadlines and accuracies of keys that have left are dropped.
 MOST_SPARE = 1024
 KINDS = {"str": "strings", "int": "integers"}
@@ -79,7 +84,7 @@ class Keyed:
 
     Args:
         settings: the settings of the hull.
-        stored: its points.
+        stored: its points; those of a hull of the plane need not be there at once.
         clock: its clock.
         most_points: the limit on the number of points.
         globe: the frame of a geographic hull; None for a plane.
@@ -112,7 +117,7 @@ class Keyed:
     def __init__(
         self,
         settings: HullSettings,
-        stored: Contents,
+        stored: Parts,
         clock: int | None,
         most_points: int,
         globe: Globe | None,
@@ -136,9 +141,8 @@ class Keyed:
         self.ended: Sequence[Key] = ()
         self._earliest: int | None = None  # no point has an earlier time
         self.timed = settings.window is not None or settings.by_event_time
-        if stored.keys is not None:
-            self._load(stored.keys, stored)
-        self._gate = Gate(settings, rules, stored.held)
+        held = self._load(stored)
+        self._gate = Gate(settings, rules, held)
 
     @property
     def quarantine(self) -> Quarantine | None:
@@ -350,16 +354,29 @@ class Keyed:
 
     # Changes
 
-    def _load(self, keys: Keys, stored: Contents) -> None:
+    def _load(self, stored: Parts) -> HeldRows | None:
+        """Have what was stored. Returns what is in quarantine."""
+        parts, held = stored.parts if self.globe is None else [in_one(stored.parts)], None
+        if self.globe is None and stored.count:
+            self._loader = KeyedHull.loader(self._kind, ordered=self._settings.by_event_time, room=stored.count)
+        for part in parts:
+            held = part.held if held is None else held
+            if part.keys is not None:
+                self._load_part(part.keys, part)
+        return held
+
+    def _load_part(self, keys: Keys, stored: Contents) -> None:
         times = None if stored.times is None else library_times(stored.times)
-        ordered = self._settings.by_event_time
-        if self.globe is None:
-            self._loader = KeyedHull.loader(self._kind, ordered=ordered)
+        if self._loader is not None:
             self._loader.update(keys, stored.points, times)
-        else:
-            center = self.globe.center
+        elif self.globe is not None:
             self.hull = GeoKeyedHull.from_entities(
-                keys, stored.points, times, self._kind, ordered=ordered, center=center
+                keys,
+                stored.points,
+                times,
+                self._kind,
+                ordered=self._settings.by_event_time,
+                center=self.globe.center,
             )
         if stored.times is not None:
             self._note_times(stored.times)
@@ -382,8 +399,10 @@ class Keyed:
             return
         if len(rows.removes):
             loader.remove_many(rows.removes)
-        if len(rows.keys):
-            loader.update(rows.keys, rows.points, None if rows.times is None else library_times(rows.times))
+        times = None if rows.times is None else library_times(rows.times)
+        for first in range(0, len(rows.keys), LOADED_TOGETHER):
+            some = slice(first, first + LOADED_TOGETHER)
+            loader.update(rows.keys[some], rows.points[some], None if times is None else times[some])
         if rows.times is not None:
             self._note_times(rows.times)
 

@@ -2,7 +2,7 @@
 
 import json
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, astuple
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from dynhull.keys import PackedKeys
 
-from ...state.records import CommitStamp, Contents, Division, Kept, Keys, QuarantineRules, Tally, Times
+from ...state.records import CommitStamp, Contents, Division, Kept, Keys, QuarantineRules, Tally
 from .columns import (
     ACCURACY_BYTES,
     INTEGER_BYTES,
@@ -22,7 +22,7 @@ from .columns import (
     point_bytes,
     time_bytes,
 )
-from .held_rows import held_bytes, held_starts, inaccurate, joined_held, take_held
+from .held_rows import held_bytes, held_starts, inaccurate, take_held
 
 CHUNK_BYTES = 2**19  # a commit that delays later ones only briefly; a chunk of strings can be one row longer
 
@@ -129,18 +129,6 @@ def state_from(data: bytes) -> tuple[Kept, Callable[[bytes], Contents]]:
     return kept, _decoded
 
 
-def joined(parts: Sequence[Contents]) -> Contents:
-    """The contents of a snapshot from those of its chunks."""
-    if len(parts) == 1:
-        return parts[0]
-    points = np.concatenate([np.empty((0, 2)), *(part.points for part in parts)])
-    times, deadlines = (_joined_times([getattr(part, name) for part in parts]) for name in ("times", "deadlines"))
-    held = joined_held([part.held for part in parts if part.held is not None])
-    found = [part.accuracies for part in parts if part.accuracies is not None]
-    accuracies = np.concatenate(found) if found else None
-    return Contents(points, _joined_keys([part.keys for part in parts]), times, deadlines, held, accuracies)
-
-
 def _decoded(data: bytes) -> Contents:
     cursor = Cursor(memoryview(data))
     count, flags = HEADER.unpack(cursor.take(HEADER.size))
@@ -159,16 +147,3 @@ def _decoded(data: bytes) -> Contents:
 
 def _points_only(data: bytes) -> Contents:
     return Contents(Cursor(memoryview(data)).points(len(data) // POINT_BYTES))
-
-
-def _joined_times(parts: Sequence[Times | None]) -> Times | None:
-    found = [part for part in parts if part is not None]
-    return np.concatenate(found) if found else None
-
-
-def _joined_keys(parts: Sequence[Keys | None]) -> Keys | None:
-    strings = [part for part in parts if isinstance(part, PackedKeys)]
-    if strings:
-        return PackedKeys(b"".join(part.lengths for part in strings), b"".join(part.data for part in strings))
-    integers = [part for part in parts if isinstance(part, np.ndarray)]
-    return np.concatenate(integers) if integers else None

@@ -2,7 +2,7 @@
 
 import logging
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
@@ -10,8 +10,9 @@ from functools import partial
 from itertools import chain, zip_longest
 from threading import Lock, Thread
 
+from ...state.contents.joining import in_one
 from ...state.errors import words_for_callers
-from ...state.records import CommitStamp, Kept, Keys, Record
+from ...state.records import CommitStamp, Contents, Kept, Keys, Parts, Record
 from ...state.tracks import KeyChanges
 from ...state.ways import KeyWays
 from ..of_keys import changes_of_keys
@@ -24,9 +25,9 @@ from ..segments.gathered import gathered
 from ..segments.parquet import (
     RowsOfKeys,
     columns_of_keys,
-    from_parquet,
     keys_from_parquet,
     rows_from_parquet,
+    state_from_parquet,
     ways_from_parquet,
 )
 from .chunks import state_from
@@ -90,12 +91,21 @@ class Filed:
             return None
         return oldest
 
-    def state(self, hull: HullRows, until: int) -> Kept:
-        """The newest state that lies beside a segment and is not after a revision."""
+    def state(self, hull: HullRows, until: int) -> tuple[Kept, Parts]:
+        """The newest state that lies beside a segment and is not after a revision, and its contents."""
         segment = _begins(hull, until)
         if until >= segment.first:
             self._read_ahead(segment)
-        return self._read_state(segment, None)
+        if segment.first == 1:
+            return Kept(), Parts(0, [Contents()])
+        with self._named(segment, STATE):
+            kept, parts = state_in_parts(self._archive, segment)
+        return kept, replace(parts, parts=self._parts(segment, parts.parts))
+
+    def _parts(self, segment: StoredSegment, parts: Iterable[Contents]) -> Iterator[Contents]:
+        with self._named(segment, STATE):
+            yield from parts
+        self._readable(segment.file + STATE)
 
     def batches(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """Some batches after a revision: no more than one segment has."""
@@ -109,9 +119,13 @@ class Filed:
             return [record]
         return _some(gathered(rows.batches_between(after, until), settings, after, until))
 
-    def key_state(self, hull: HullRows, keys: Keys, until: int) -> Kept:
+    def key_state(self, hull: HullRows, keys: Keys, until: int) -> tuple[Kept, Parts]:
         """The newest state that lies beside a segment, with the points of some keys alone."""
-        return self._read_state(_begins(hull, until), keys)
+        segment = _begins(hull, until)
+        if segment.first == 1:
+            return Kept(), Parts(0, [Contents()])
+        with self._named(segment, STATE):
+            return _key_state(self._archive, segment, keys)
 
     def key_changes(self, hull: HullRows, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What the batches of some segments do to some keys, from a revision on."""
@@ -229,15 +243,6 @@ class Filed:
             self._ahead = Thread(target=self._read, args=(segment, reading, ordered), name="read ahead")
             self._ahead.start()
 
-    def _read_state(self, segment: StoredSegment, keys: Keys | None) -> Kept:
-        if segment.first == 1:
-            return Kept()
-        with self._named(segment, STATE):
-            found = read_state(self._archive, segment, keys)
-        if keys is None:
-            self._readable(segment.file + STATE)
-        return found
-
     @contextmanager
     def _named(self, segment: StoredSegment, end: str) -> Iterator[None]:
         """Say which revisions cannot be read without a file, and take note that it cannot."""
@@ -292,21 +297,31 @@ def read_batches(archive: Archive, segment: StoredSegment) -> Batches:
     return read_rows(archive, segment).batches()
 
 
-def read_state(archive: Archive, segment: StoredSegment, keys: Keys | None = None) -> Kept:
-    """The state beside a segment, with some keys alone if they are given.
+def read_state(archive: Archive, segment: StoredSegment) -> Kept:
+    """The state beside a segment. Raises the errors of `state_in_parts`."""
+    kept, parts = state_in_parts(archive, segment)
+    return replace(kept, contents=in_one(parts.parts))
 
-    Raises DamagedError, which names the file, or StorageError.
+
+def state_in_parts(archive: Archive, segment: StoredSegment) -> tuple[Kept, Parts]:
+    """The state beside a segment without its contents, and these.
+
+    Raises DamagedError, which names the file, or StorageError; the first also when a part is read.
     """
     name, facts = segment.file + STATE, segment.facts
-    if keys is None:
-        columns, about, told = from_parquet(archive.read(name, facts.state_wrote), name)
-    else:
-        with archive.parts(name, facts.state_wrote) as file:
-            some = keys_from_parquet(file, name, keys)
-        columns, about, told = columns_of_keys([some]), some.about, some.state
+    parts, told = state_from_parquet(archive.read(name, facts.state_wrote), name)
     kept, _ = state_from(told)
-    contents = contents_of(columns, times=about["times"] == "True", deadlines=about["deadlines"] == "True")
-    return replace(kept, revision=segment.first - 1, contents=contents)
+    return replace(kept, revision=segment.first - 1), parts
+
+
+def _key_state(archive: Archive, segment: StoredSegment, keys: Keys) -> tuple[Kept, Parts]:
+    """The same with some keys alone."""
+    name, facts = segment.file + STATE, segment.facts
+    with archive.parts(name, facts.state_wrote) as file:
+        some = keys_from_parquet(file, name, keys)
+    kept, _ = state_from(some.state)
+    contents = contents_of(columns_of_keys([some]), some.about)
+    return replace(kept, revision=segment.first - 1), Parts(len(contents), [contents])
 
 
 def holes(hulls: Mapping[int, HullRows], files: Set[str]) -> Iterator[Hole]:

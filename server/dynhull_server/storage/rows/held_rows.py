@@ -85,21 +85,6 @@ def held_starts(held: HeldRows, size: int) -> list[int]:
     return [0, *np.searchsorted(ends, np.arange(size, int(ends[-1]), size), side="right").tolist()]
 
 
-def joined_held(parts: list[HeldRows]) -> HeldRows | None:
-    """All positions of several parts."""
-    if len(parts) <= 1:
-        return parts[0] if parts else None
-    keys = [part.keys for part in parts]
-    strings = [each for each in keys if isinstance(each, PackedKeys)]
-    columns = ("points", "times", "deadlines", "speeds", "growths", "revisions", "confirmed", "accuracies")
-    return HeldRows(
-        PackedKeys(b"".join(each.lengths for each in strings), b"".join(each.data for each in strings))
-        if strings
-        else np.concatenate([each for each in keys if isinstance(each, np.ndarray)]),
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in columns},
-    )
-
-
 def _number(limit: float | None) -> float:
     return np.nan if limit is None else limit
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...compiled import Native, native
-from ...state.records import NO_TIME, CommitStamp, Kept, KeyRows, Keys, Record
+from ...state.records import NO_TIME, CommitStamp, Kept, KeyRows, Keys, Parts, Record
 from ..past import Moment, created
 from ..port import DamagedError
 from ..segments.columns import CAUSES, NONE, Batches, SegmentColumns, joined
@@ -15,7 +15,7 @@ from ..segments.gathered import gathered, last_places_count
 from .batch_columns import KINDS, BatchRow, columns_of_rows, keys_of
 from .batch_rows import is_whole
 from .ledger import HullRows
-from .reading import as_damage, batch_rows, commit_of, newest_snapshot, whole_records, whole_rows
+from .reading import as_damage, batch_rows, commit_of, newest_in_parts, whole_records, whole_rows
 from .tables import Reader
 
 # About the rows of points that one read has, and the rows of batches that it looks at.
@@ -70,11 +70,11 @@ def moment_at(reader: Reader, hull: HullRows, time: int) -> Moment | None:
     return oldest if oldest.committed is not None and oldest.committed.time <= time else None
 
 
-def state_until(reader: Reader, hull: HullRows, until: int) -> Kept:
-    """The newest snapshot of a revision not after `until`; the empty hull where there is none."""
+def state_until(reader: Reader, hull: HullRows, until: int) -> tuple[Kept, Parts]:
+    """The newest snapshot of a revision not after `until`, and its contents; the empty hull where there is none."""
     _require_kept(hull, until, hull.oldest)
     with as_damage(hull):
-        return newest_snapshot(reader, hull, until)
+        return newest_in_parts(reader, hull, until)
 
 
 def batches_after(reader: Reader, hull: HullRows, after: int, until: int) -> list[Record]:

@@ -6,10 +6,11 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
-from ...state.records import CommitStamp, Kept, Record
+from ...state.contents.joining import held_in_one, in_one
+from ...state.records import CommitStamp, Contents, Kept, Parts, Record
 from ..port import DamagedError
 from .batch_rows import batch_records, commit_columns, is_whole
-from .chunks import joined, state_from
+from .chunks import state_from
 from .encoding import checksum
 from .ledger import HullRows, StoredSnapshot
 from .tables import Reader, UnreadableError
@@ -119,12 +120,19 @@ def _unreadable(hull: HullRows, error: UnreadableError) -> DamagedError:
 
 def newest_snapshot(reader: Reader, hull: HullRows, until: int) -> Kept:
     """The newest snapshot of a revision not after `until` that is not damaged; the empty hull where there is none."""
+    kept, parts = newest_in_parts(reader, hull, until)
+    kept.contents = in_one(parts.parts)
+    return kept
+
+
+def newest_in_parts(reader: Reader, hull: HullRows, until: int) -> tuple[Kept, Parts]:
+    """The same without its contents, and these."""
     for snapshot in reversed(hull.snapshots):
         if snapshot.revision <= until:
-            kept = _snapshot(reader, hull.row.number, snapshot)
-            if kept is not None:
-                return kept
-    return Kept()
+            found = _snapshot(reader, hull.row.number, snapshot)
+            if found is not None:
+                return found
+    return Kept(), Parts(0, [Contents()])
 
 
 def snapshot_state(reader: Reader, number: int, snapshot: StoredSnapshot) -> Kept | None:
@@ -145,8 +153,8 @@ def _state(reader: Reader, number: int, snapshot: StoredSnapshot) -> bytes | Non
     return state
 
 
-def _snapshot(reader: Reader, number: int, snapshot: StoredSnapshot) -> Kept | None:
-    """A snapshot, None if it is damaged."""
+def _snapshot(reader: Reader, number: int, snapshot: StoredSnapshot) -> tuple[Kept, Parts] | None:
+    """A snapshot without its contents, and these; None if it is damaged."""
     state = _state(reader, number, snapshot)
     if state is None:
         return None
@@ -159,8 +167,11 @@ def _snapshot(reader: Reader, number: int, snapshot: StoredSnapshot) -> Kept | N
         parts.append(decode_chunk(data))
     if len(parts) != len(snapshot.chunks):
         return None
-    kept.revision, kept.contents = snapshot.revision, joined(parts)
-    return kept
+    kept.revision = snapshot.revision
+    held = [part.held for part in parts if part.held is not None]
+    if len(held) > 1:
+        parts = [*(part for part in parts if part.held is None), Contents(held=held_in_one(held))]
+    return kept, Parts(sum(map(len, parts)), parts)
 
 
 def _add_records(kept: Kept, hull: HullRows, rows: Iterable[tuple[Any, ...]], until: int) -> None:

@@ -15,10 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ...state.changes import Change
+from ...state.contents.joining import in_one
 from ...state.errors import words
 from ...state.feed_consumers import FeedConsumer
 from ...state.fences.model.records import FenceEvent, Inside, KeptFence
-from ...state.records import CommitStamp, Contents, HullRow, Kept, Keys, Record
+from ...state.records import CommitStamp, Contents, HullRow, Kept, Keys, Parts, Record
 from ...state.tracks import KeyChanges
 from ...state.ways import KeyWays
 from ..of_keys import changes_of_keys, contents_of_keys, ways_of
@@ -212,8 +213,8 @@ class RowStorage(ABC):
             return found
         return self._of_past(number, lambda filed, hull: filed.moment(hull, time), lambda *_: None)
 
-    def state(self, number: int, until: int) -> Kept:
-        """The newest snapshot of a revision not after `until`, without the batches after it."""
+    def state(self, number: int, until: int) -> tuple[Kept, Parts]:
+        """The newest snapshot of a revision not after `until`, and its contents."""
         return self._of_past(
             number,
             lambda filed, hull: filed.state(hull, until) if until < hull.oldest else None,
@@ -238,12 +239,12 @@ class RowStorage(ABC):
 
     def key_state(self, number: int, keys: Keys, until: int) -> tuple[int, npt.NDArray[np.int32], Contents]:
         """What the newest snapshot has of some keys."""
-        kept = self._of_past(
+        kept, parts = self._of_past(
             number,
             lambda filed, hull: filed.key_state(hull, keys, until) if until < hull.oldest else None,
             lambda reader, hull: state_until(reader, hull, until),
         )
-        return kept.revision, *contents_of_keys(kept.contents, keys)
+        return kept.revision, *contents_of_keys(in_one(parts.parts), keys)
 
     def key_changes(self, number: int, keys: Keys, after: int, until: int) -> tuple[int, KeyChanges]:
         """What some of the batches after a revision do to some keys."""

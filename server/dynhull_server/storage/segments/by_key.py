@@ -16,7 +16,7 @@ from dynhull.keys import Keys
 
 from ...state.records import HullSettings, Identity, Record
 from .columns import NONE, ROWS, Batches, Integers, SegmentColumns
-from .gathered import last_of_keys, last_places_count
+from .gathered import last_of_keys, last_places_count, taken
 
 Places = npt.NDArray[np.int32]
 
@@ -43,7 +43,7 @@ class RowsByKey:
 
     identity: Identity
     first: int
-    starts: Integers
+    starts: Places
     places: Places
     rows: Places
     of_revisions: dict[str, Integers]
@@ -75,17 +75,17 @@ class RowsByKey:
         if self._are_few(begin, end) or self.detail or not last_places_count(settings):
             return None
         start, stop = int(self.starts[begin]), int(self.starts[end])
-        there = np.flatnonzero((self.places >= start) & (self.places < stop))
-        rows: Any = slice(None) if len(there) == len(self) else there
-        of_rows = {name: values[rows] for name, values in self.of_rows.items()}
-        if (of_rows["kind"] != ROWS).any():
+        rows: Any = slice(None)
+        if stop - start < len(self):
+            rows = np.flatnonzero((self.places >= start) & (self.places < stop))
+        if (taken(self.of_rows["kind"], rows, stop - start) != ROWS).any():
             return None
         codes = self.codes[rows]
         if (codes == NONE).any():  # a batch of nothing
-            keyed = codes != NONE
-            codes, of_rows = codes[keyed], {name: values[keyed] for name, values in of_rows.items()}
+            keyed = np.flatnonzero(codes != NONE)
+            rows, codes = keyed if isinstance(rows, slice) else rows[keyed], codes[keyed]
         newest = np.append(codes[1:] != codes[:-1], True)[: len(codes)]
-        found = last_of_keys(of_rows, newest, lambda which: self.packed(codes[which]))
+        found = last_of_keys(self.of_rows, rows, newest, lambda which: self.packed(codes[which]))
         if found is None:
             return None
         return replace(Batches(self.columns(end - 1, end)).at(0), rows=found)
@@ -109,7 +109,7 @@ class RowsByKey:
         columns: dict[str, Any] = {
             name: _repeated(values[begin:end], counts) for name, values in self.of_revisions.items()
         }
-        columns |= {name: _taken(values, ordered, stop - start) for name, values in self.of_rows.items()}
+        columns |= {name: taken(values, ordered, stop - start) for name, values in self.of_rows.items()}
         return SegmentColumns(
             identity=self.identity,
             revision=_repeated(self.first + np.arange(begin, end), counts),
@@ -130,20 +130,8 @@ class RowsByKey:
         return begin, max(begin, end)
 
 
-def _repeated(values: Integers, counts: Integers) -> Integers:
+def _repeated(values: npt.NDArray[Any], counts: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The value of each revision for all of its rows. What has the same in all takes no memory for each."""
     if len(values) == 1 or (values.strides == (0,) and len(values)):
         return np.broadcast_to(values[0], int(counts.sum()))
     return np.repeat(values, counts)
-
-
-def _taken(values: npt.NDArray[Any], rows: Any, count: int) -> npt.NDArray[Any]:
-    """Some rows of a column."""
-    if values.strides[0] == 0:
-        return values[:count]
-    found: npt.NDArray[Any]
-    if values.ndim == 1 or isinstance(rows, slice):
-        found = values[rows]
-    else:  # those of two numbers as one item each: these are copied in a third of the time
-        found = values.view(np.complex128)[:, 0][rows].view(np.float64).reshape(-1, 2)
-    return found

@@ -1,7 +1,7 @@
 """Batches and states as columns: a row for each point or key, in the order in which a batch has them."""
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from itertools import chain
 from typing import Any, Literal, get_args
@@ -187,15 +187,15 @@ def records_of(columns: SegmentColumns) -> Iterator[Record]:
     yield from Batches(columns).between(0, FOREVER)
 
 
-def contents_of(columns: SegmentColumns, *, times: bool, deadlines: bool) -> Contents:
-    """The contents of a hull in columns, with times and with deadlines if they say so."""
+def contents_of(columns: SegmentColumns, about: Mapping[str, str]) -> Contents:
+    """The contents of a hull in columns, with times and with deadlines if their file says so."""
     reader = Batches(columns)
     rows = int((columns.kind == ROWS).sum())
     return Contents(
         columns.points[:rows],
         None if columns.identity == "multiset" else reader.keys(0, rows),
-        np.ascontiguousarray(columns.event_time[:rows]) if times else None,
-        np.ascontiguousarray(columns.expire_time[:rows]) if deadlines else None,
+        np.ascontiguousarray(columns.event_time[:rows]) if about["times"] == "True" else None,
+        np.ascontiguousarray(columns.expire_time[:rows]) if about["deadlines"] == "True" else None,
         reader.held(rows, len(columns)) if rows < len(columns) else None,
         _accuracies(columns.accuracy[:rows]),
     )

@@ -113,30 +113,52 @@ def _keys(batches: Batches, settings: HullSettings, first: int, last: int) -> Ro
     names = ("op", "points", "event_time", "expire_time", "accuracy")
     found = {name: getattr(columns, name)[at] for name in names}
     newest = _newest(key_codes(keys), found["event_time"] if settings.by_event_time else None)
-    return last_of_keys(found, newest, partial(select_keys, keys))
+    return last_of_keys(found, slice(None), newest, partial(select_keys, keys))
 
 
-def last_of_keys(columns: dict[str, npt.NDArray[Any]], newest: Flags, select: Callable[[Flags], Keys]) -> Rows | None:
+def last_of_keys(
+    columns: dict[str, npt.NDArray[Any]], rows: Any, newest: Flags, select: Callable[[Flags], Keys]
+) -> Rows | None:
     """The last place of each key; None if only some of the points have times.
 
     Args:
-        columns: columns of rows that have a key.
-        newest: which rows are the last ones of their keys.
-        select: returns the keys of some rows.
+        columns: columns of rows.
+        rows: which of these count, numbers or all; each has a key.
+        newest: which of those that count are the last ones of their keys.
+        select: returns the keys of some of those that count.
     """
-    put = columns["op"] == PUT
-    times, deadlines, accuracies = columns["event_time"], columns["expire_time"], columns["accuracy"]
-    if _some_only(times[put], NO_TIME) or _some_only(deadlines[put], FOREVER):
+    put = taken(columns["op"], rows, len(newest)) == PUT
+    puts, count = _among(rows, put), int(np.count_nonzero(put))
+    times, deadlines = (taken(columns[name], puts, count) for name in ("event_time", "expire_time"))
+    if _some_only(times, NO_TIME) or _some_only(deadlines, FOREVER):
         return None
-    stays, leaves = newest & put, newest & ~put
+    stays = newest & put
+    at, count = _among(rows, stays), int(np.count_nonzero(stays))
     return KeyRows(
         select(stays),
-        columns["points"][stays],
-        select(leaves),
-        times[stays] if _dated(times[put], NO_TIME) else None,
-        deadlines[stays] if _dated(deadlines[put], FOREVER) else None,
-        accuracies=accuracies[stays],
+        taken(columns["points"], at, count),
+        select(newest & ~put),
+        taken(columns["event_time"], at, count) if _dated(times, NO_TIME) else None,
+        taken(columns["expire_time"], at, count) if _dated(deadlines, FOREVER) else None,
+        accuracies=taken(columns["accuracy"], at, count),
     )
+
+
+def _among(rows: Any, which: Flags) -> Any:
+    """Some of the rows that are given by their numbers, or are all there are."""
+    return which if isinstance(rows, slice) else rows[which]
+
+
+def taken(values: npt.NDArray[Any], rows: Any, count: int) -> npt.NDArray[Any]:
+    """The `count` rows of a column that are chosen. What is the same in all rows takes no memory for each."""
+    if values.strides[0] == 0:
+        return values[:count]
+    found: npt.NDArray[Any]
+    if values.ndim == 1 or isinstance(rows, slice):
+        found = values[rows]
+    else:  # those of two numbers as one item each: these are copied in a third of the time
+        found = values.view(np.complex128)[:, 0][rows].view(np.float64).reshape(-1, 2)
+    return found
 
 
 def _newest(codes: Codes, times: Times | None) -> Flags:

@@ -17,11 +17,11 @@ import numpy as np
 from dynhull.keys import PackedKeys, key_list
 
 from ...state.contents.key_rows import select_keys
-from ...state.records import FOREVER, NO_TIME, Identity
+from ...state.records import FOREVER, NO_TIME, Contents, Identity, Parts
 from ...state.ways import KeyWays, Stamps
 from ..port import DamagedError
 from .by_key import RowsByKey
-from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns, joined
+from .columns import CAUSES, KINDS, NONE, OPS, Codes, Integers, SegmentColumns, contents_of, joined
 from .gathered import key_codes
 
 if TYPE_CHECKING:
@@ -76,6 +76,7 @@ CODED = ("key", "cause", "kind", "op", "detail")  # what is read as places in a 
 # Numbers that differ from row to row take the fewest bytes with each of their bytes in a stream of its own.
 SPLIT: tuple[str, ...] = ("revision", "commit", "row", "x", "y")
 MOVES = ("put", "remove")
+OF_CONTENTS = ("key", "x", "y", "event_time", "expire_time", ACCURACY)
 TOGETHER = 4  # groups that are read at once where one after the other is needed
 SHARED = 4  # rows of a commit, or of a key, on average, from which on its time, or it, is an index into those of all
 
@@ -186,20 +187,68 @@ def rows_from_parquet(data: bytes, name: str) -> tuple[RowsByKey, dict[str, str]
         DamagedError: it is no file of ours, or of a newer version.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        file = _opened(pa.BufferReader(data), name)
+        file = _whole(data, name)
         found = file.metadata.metadata
-        if not _has_places(file):
-            file = pq.ParquetFile(
-                pa.BufferReader(data),
-                metadata=file.metadata,
-                read_dictionary=CODED[1:],
-            )
         return _by_key(file), _about(found), found.get(STATE, b"")
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
         raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def state_from_parquet(data: bytes, name: str) -> tuple[Parts, bytes]:
+    """The contents of a state, those of keys a group of rows at a time, and what is not in its rows.
+
+    Raises:
+        DamagedError: it is no file of ours, or of a newer version; also when a part is read.
+    """
+    import pyarrow as pa
+
+    try:
+        file = _whole(data, name)
+        found = file.metadata.metadata
+        same = _same([file.metadata.row_group(group) for group in range(file.num_row_groups)])
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{name} is damaged: {error}") from error
+    if (same.get("kind"), same.get("op")) == ("rows", "put"):
+        return Parts(file.metadata.num_rows, _contents(file, name, same)), found.get(STATE, b"")
+    columns, about, told = from_parquet(data, name)
+    contents = contents_of(columns, about)
+    return Parts(len(contents), [contents]), told
+
+
+def _contents(file: pq.ParquetFile, name: str, same: dict[str, str | None]) -> Iterator[Contents]:
+    """The contents of a state that has nothing but keys with points, as its statistics say."""
+    import pyarrow as pa
+
+    about = _about(file.metadata.metadata)
+    identity: Any = about["identity"]
+    names = [each for each in file.schema_arrow.names if each in OF_CONTENTS and each not in same]
+    try:
+        for group in range(file.num_row_groups):
+            table = file.read_row_group(group, columns=names, use_threads=False)
+            codes, words = _coded(table.column("key"))
+            found = {each: _constant(none, len(table)) for each, none in NOTHING.items()} | _arrays(table)
+            yield Contents(
+                found["points"],
+                _packed(words, codes, identity),
+                np.ascontiguousarray(found["event_time"]) if about["times"] == "True" else None,
+                np.ascontiguousarray(found["expire_time"]) if about["deadlines"] == "True" else None,
+                accuracies=found.get(ACCURACY),
+            )
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{name} is damaged: {error}") from error
+
+
+def _whole(data: bytes, name: str) -> pq.ParquetFile:
+    """A file all of whose rows are read."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    file = _opened(pa.BufferReader(data), name)
+    if _has_places(file):
+        return file
+    return pq.ParquetFile(pa.BufferReader(data), metadata=file.metadata, read_dictionary=CODED[1:])
 
 
 class RowsOfKeys(NamedTuple):
@@ -476,7 +525,8 @@ def _by_key(file: pq.ParquetFile) -> RowsByKey:
         if name not in apart:
             of_rows.setdefault(name, _constant(none, count))
     of_rows.setdefault(ACCURACY, _exact(count))
-    of_rows.setdefault("points", np.full((count, 2), np.nan))
+    if "points" not in of_rows:
+        of_rows["points"] = np.full((count, 2), np.nan)
     of_revisions = _of_revisions(file, [name for name in apart if name not in same], placed)
     of_revisions |= {name: _constant(NO_TIME, revisions) for name in apart if name in same}
     return RowsByKey(identity, *placed, of_revisions, of_rows, codes, words.keys, detail)
@@ -526,11 +576,22 @@ class _Words:
         return codes
 
     def keys(self, codes: npt.NDArray[np.int32]) -> Keys:
-        """The keys with some numbers. Those of all, as of a state, are copied once: new memory takes its time."""
-        if self._identity == "str" and len(codes) == self._count and np.array_equal(codes, np.arange(self._count)):
-            texts = [_text(part) for part in self._parts]
-            return PackedKeys(*(b"".join(each) for each in zip(*texts, strict=True)) if texts else (b"", b""))
-        return _packed(self._together(), codes, self._identity)
+        """The keys with some numbers. Strings in order are copied once, from their parts: new memory takes its time."""
+        import pyarrow as pa
+
+        if self._identity == "int" or not bool((codes[1:] > codes[:-1]).all()):
+            return _packed(self._together(), codes, self._identity)
+        parts, first, texts = self._parts, 0, []
+        bounds = np.searchsorted(codes, np.cumsum([0, *map(len, parts)])).tolist()
+        for part, start, end in zip(parts, bounds, bounds[1:], strict=False):
+            texts.append(_text(part if end - start == len(part) else part.take(pa.array(codes[start:end] - first))))
+            first += len(part)
+        keys = PackedKeys(*(b"".join(each) for each in zip(*texts, strict=True)) if texts else (b"", b""))
+        if len(keys) == self._count:  # all of them: the parts are not needed any more
+            ends = np.zeros(len(keys) + 1, np.int32)
+            np.cumsum(np.frombuffer(keys.lengths, np.uint8), out=ends[1:])
+            self._parts = [pa.StringArray.from_buffers(len(keys), pa.py_buffer(ends), pa.py_buffer(keys.data))]
+        return keys
 
     def _together(self) -> pa.Array:
         """All keys as one array."""
@@ -544,11 +605,13 @@ class _Words:
 
 def _of_revisions(file: pq.ParquetFile, names: list[str], placed: _Placed) -> dict[str, Integers]:
     """What all rows of a revision have in common: no more is read than each of them once."""
+    if not names:
+        return {}
     counts = np.diff(placed.starts)
     since = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
     found = {name: np.full(len(counts), NO_TIME, np.int64) for name in names}
     seen, group, at = np.zeros(len(counts), np.bool_), 0, 0
-    while found and group < file.num_row_groups and not seen.all():
+    while group < file.num_row_groups and not seen.all():
         table = file.read_row_group(group, columns=list(found), use_threads=False)
         which = since[placed.places[at : at + len(table)]]
         for name, values in found.items():
@@ -562,7 +625,7 @@ class _Placed(NamedTuple):
     """Where rows belong, which say that themselves: what RowsByKey has of it."""
 
     first: int
-    starts: Integers
+    starts: npt.NDArray[np.int32]
     places: npt.NDArray[np.int32]
     rows: npt.NDArray[np.int32]
 
@@ -571,20 +634,25 @@ def _placed(file: pq.ParquetFile) -> _Placed:
     """Where the rows of a file belong. ValueError if one is missing."""
     count = file.metadata.num_rows
     if not count:
-        return _Placed(0, np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.int32))
+        return _Placed(0, np.zeros(1, np.int32), np.empty(0, np.int32), np.empty(0, np.int32))
     first, last = _bounds(file, "revision")
     if last - first >= count or _bounds(file, "row")[0] < 0:
         raise ValueError("a row is missing")
     numbers = _numbers(file, "row")
     since = _numbers(file, "revision", first)
     if first == last:
-        starts, places = np.array([0, count]), numbers
+        starts, places = np.array([0, count], np.int32), numbers
     else:
-        counts = np.bincount(since, minlength=last - first + 1)
-        if not counts.all():
-            raise ValueError("a row is missing")
-        starts = np.concatenate([[0], np.cumsum(counts)])
-        places = since if len(counts) == count else starts.astype(np.int32)[since]
+        revisions = last - first + 1
+        if revisions == count:  # as many as rows: if some has two, a place stays empty
+            starts, places = np.arange(count + 1, dtype=np.int32), since
+        else:
+            counts = np.bincount(since, minlength=revisions)
+            if not counts.all():
+                raise ValueError("a row is missing")
+            starts = np.zeros(revisions + 1, np.int32)
+            np.cumsum(counts, out=starts[1:])
+            places = starts[since]
         if numbers.strides != (0,):
             places = places + numbers
     if places.max() >= count:
