@@ -60,6 +60,11 @@ def points_message(data: bytes) -> tuple[bytes, bool, int] | None:
     The name in a StreamRequest, whether its points are inserts, and where they begin; None if it has anything else, or none.
     """
 
+def puts_message(data: bytes) -> tuple[bytes, bool, list[tuple[int, bytes | None, bytes, bytes, bytes]]] | None:
+    """
+    The name in a StreamRequest whose batches put keys, whether it may have several, and of each its number, the keys as integers, or None and their lengths and text, and the points; None if it has anything else, or none.
+    """
+
 def acknowledged(sequence: int, revision: int, inserted: int, deleted: int, missing: int, hull_changed: bool, points: int) -> bytes:
     """The StreamResponse to a batch with this result."""
 

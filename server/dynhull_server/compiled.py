@@ -116,6 +116,11 @@ class Native(Protocol):
     def points_message(self, data: bytes) -> "tuple[bytes, bool, int] | None":
         """What `rpc/short_batches.py` makes of a message; None for one that goes the whole way."""
 
+    def puts_message(
+        self, data: bytes
+    ) -> "tuple[bytes, bool, list[tuple[int, bytes | None, bytes, bytes, bytes]]] | None":
+        """The same of a message with batches that put keys."""
+
     def acknowledged(
         self,
         sequence: int,

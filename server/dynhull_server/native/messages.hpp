@@ -1,11 +1,13 @@
 // The messages of Stream that come most often, as their bytes: what a StreamRequest has that is a batch of points to
-// insert or to delete and nothing else, and the StreamResponse to it.
+// insert or to delete and nothing else, and the StreamResponse to it; and those with batches that put keys.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "encoding.hpp"
 
@@ -13,6 +15,17 @@ namespace dynhull_server {
 
 // The tags of fields with a length, which are read and written here, and of numbers, which are written.
 enum Tag : std::uint8_t { NAME = 0x0a, BATCH = 0x12, INSERTS = 0x0a, DELETES = 0x12, PACKED = 0x0a, RESULT = 0x0a };
+enum PutsTag : std::uint8_t {
+  BATCHES = 0x2a,
+  NUMBERED = 0x0a,
+  NUMBER = 0x10,
+  PUTS = 0x2a,
+  KEYS = 0x0a,
+  LENGTHS = 0x0a,
+  TEXT = 0x12,
+  INTEGERS = 0x22,
+  POSITIONS = 0x12
+};
 enum NumberTag : std::uint8_t {
   REVISION = 0x08,
   INSERTED = 0x10,
@@ -24,6 +37,7 @@ enum NumberTag : std::uint8_t {
 };
 constexpr std::size_t POINT_BYTES = 16;
 constexpr int LENGTH_BYTES = 5;  // of a length, at most
+constexpr int NUMBER_BYTES = 9;  // of a number that is read, at most: those of ten bytes are left to Python
 
 struct PointsMessage {
   std::string_view name;  // empty if it has none
@@ -31,31 +45,56 @@ struct PointsMessage {
   std::string_view points;
 };
 
+// A batch that puts keys, each at a point.
+struct PutsBatch {
+  std::uint64_t sequence;
+  std::string_view integers;       // the keys,
+  std::string_view lengths, text;  // or these
+  std::string_view points;
+};
+
+struct PutsMessage {
+  std::string_view name;  // empty if it has none
+  bool several;           // whether it may have several
+  std::vector<PutsBatch> batches;
+};
+
 class FieldReader {
  public:
   explicit FieldReader(std::string_view rest) : rest_(rest) {}
 
-  bool at(Tag tag) const { return !rest_.empty() && static_cast<std::uint8_t>(rest_[0]) == tag; }
+  bool empty() const { return rest_.empty(); }
+
+  bool at(std::uint8_t tag) const { return !rest_.empty() && static_cast<std::uint8_t>(rest_[0]) == tag; }
 
   // The field at which this is, if all of it is there.
   std::optional<std::string_view> take() {
-    std::uint64_t length = 0;
-    for (std::size_t i = 1; i <= LENGTH_BYTES && i < rest_.size(); ++i) {
+    const auto length = number(LENGTH_BYTES);
+    if (!length || *length > rest_.size()) return {};
+    const std::string_view found = rest_.substr(0, *length);
+    rest_.remove_prefix(*length);
+    return found;
+  }
+
+  // The number at which this is, if it has at most so many bytes.
+  std::optional<std::uint64_t> number(std::size_t most) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 1; i <= most && i < rest_.size(); ++i) {
       const auto byte = static_cast<std::uint8_t>(rest_[i]);
-      length |= std::uint64_t{byte & 127u} << 7 * (i - 1);
+      value |= std::uint64_t{byte & 127u} << 7 * (i - 1);
       if (byte > 127) continue;
-      if (length > rest_.size() - i - 1) return {};
-      const std::string_view found = rest_.substr(i + 1, length);
-      rest_.remove_prefix(i + 1 + length);
-      return found;
+      rest_.remove_prefix(i + 1);
+      return value;
     }
     return {};
   }
 
+  // The field with this tag, if it comes next.
+  std::optional<std::string_view> take(std::uint8_t tag) { return at(tag) ? take() : std::nullopt; }
+
   // The same for the last field; nothing if others follow.
-  std::optional<std::string_view> take_last(Tag tag) {
-    if (!at(tag)) return {};
-    const auto found = take();
+  std::optional<std::string_view> take_last(std::uint8_t tag) {
+    const auto found = take(tag);
     return rest_.empty() ? found : std::nullopt;
   }
 
@@ -82,6 +121,72 @@ inline std::optional<PointsMessage> points_message(std::string_view data) {
   if (!packed || packed->empty() || packed->size() % POINT_BYTES != 0) return {};
   found.points = *packed;
   return found;
+}
+
+// Nothing if the batch does anything else, or has not as many points as keys, or none.
+inline std::optional<PutsBatch> puts_batch(std::string_view batch) {
+  const auto puts = FieldReader(batch).take_last(PUTS);
+  if (!puts) return {};
+  FieldReader rows(*puts);
+  const auto keys = rows.take(KEYS);
+  const auto points = rows.take_last(POSITIONS);
+  if (!keys || !points) return {};
+  const auto packed = FieldReader(*points).take_last(PACKED);
+  if (!packed || packed->empty() || packed->size() % POINT_BYTES != 0) return {};
+  PutsBatch found = {};
+  found.points = *packed;
+  FieldReader names(*keys);
+  std::size_t count;
+  if (names.at(INTEGERS)) {
+    const auto integers = names.take_last(INTEGERS);
+    if (!integers || integers->size() % sizeof(std::uint64_t) != 0) return {};
+    found.integers = *integers;
+    count = integers->size() / sizeof(std::uint64_t);
+  } else {
+    const auto lengths = names.take(LENGTHS);
+    const auto text = names.take_last(TEXT);
+    if (!lengths || !text) return {};
+    found.lengths = *lengths;
+    found.text = *text;
+    count = lengths->size();
+  }
+  if (count != packed->size() / POINT_BYTES) return {};
+  return found;
+}
+
+// Nothing if the message has anything else, or its fields in another order.
+inline std::optional<PutsMessage> puts_message(std::string_view data) {
+  FieldReader message(data);
+  PutsMessage found = {};
+  if (message.at(NAME)) {
+    const auto name = message.take();
+    if (!name) return {};
+    found.name = *name;
+  }
+  if (message.at(BATCH)) {
+    const auto batch = message.take_last(BATCH);
+    const auto puts = batch ? puts_batch(*batch) : std::nullopt;
+    if (!puts) return {};
+    found.batches.push_back(*puts);
+    return found;
+  }
+  found.several = true;
+  while (!message.empty()) {
+    const auto numbered = message.take(BATCHES);
+    if (!numbered) return {};
+    FieldReader fields(*numbered);
+    const auto batch = fields.take(NUMBERED);
+    auto puts = batch ? puts_batch(*batch) : std::nullopt;
+    if (!puts) return {};
+    if (fields.at(NUMBER)) {
+      const auto sequence = fields.number(NUMBER_BYTES);
+      if (!sequence) return {};
+      puts->sequence = *sequence;
+    }
+    if (!fields.empty()) return {};
+    found.batches.push_back(*puts);
+  }
+  return found.batches.empty() ? std::nullopt : std::optional(std::move(found));
 }
 
 struct PlainResult {

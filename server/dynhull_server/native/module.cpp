@@ -376,6 +376,18 @@ nb::object points_of_message(const nb::bytes& data) {
                         found->points.data() - all.data());
 }
 
+nb::object puts_of_message(const nb::bytes& data) {
+  const auto found = puts_message({data.c_str(), data.size()});
+  if (!found) return nb::none();
+  const auto piece = [](std::string_view part) { return nb::bytes(part.data(), part.size()); };
+  nb::list batches;
+  for (const PutsBatch& each : found->batches) {
+    const nb::object integers = each.text.data() == nullptr ? nb::object(piece(each.integers)) : nb::none();
+    batches.append(nb::make_tuple(each.sequence, integers, piece(each.lengths), piece(each.text), piece(each.points)));
+  }
+  return nb::make_tuple(piece(found->name), found->several, batches);
+}
+
 nb::bytes acknowledged(std::uint64_t sequence, std::uint64_t revision, std::uint64_t inserted, std::uint64_t deleted,
                        std::uint64_t missing, bool hull_changed, std::uint64_t points) {
   const std::string data = acknowledgement(sequence, {revision, inserted, deleted, missing, hull_changed, points});
@@ -466,6 +478,12 @@ NB_MODULE(_native, module) {
              nb::sig("def points_message(data: bytes) -> tuple[bytes, bool, int] | None"),
              "The name in a StreamRequest, whether its points are inserts, and where they begin; None if it has "
              "anything else, or none.");
+  module.def("puts_message", &dynhull_server::puts_of_message, "data"_a,
+             nb::sig("def puts_message(data: bytes) -> tuple[bytes, bool, list[tuple[int, bytes | None, bytes, bytes, "
+                     "bytes]]] | None"),
+             "The name in a StreamRequest whose batches put keys, whether it may have several, and of each its number, "
+             "the keys as integers, or None and their lengths and text, and the points; None if it has anything else, "
+             "or none.");
   module.def("acknowledged", &dynhull_server::acknowledged, "sequence"_a, "revision"_a, "inserted"_a, "deleted"_a,
              "missing"_a, "hull_changed"_a, "points"_a, "The StreamResponse to a batch with this result.");
   using dynhull_server::LastPlaces;

@@ -47,7 +47,7 @@ from .places import Places
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .replays import Replays
-from .short_batches import PointsMessage, acknowledgement
+from .short_batches import PointsMessage, PutsMessage, acknowledgement
 from .short_locates import ShortLocates
 from .status import ANSWERED
 from .tracks import Tracks
@@ -668,7 +668,7 @@ class HullService:
             raise decode.InvalidFieldError(
                 "name", "", "the first message must name the hull, but the call has no message"
             )
-        if type(first) is PointsMessage:
+        if type(first) in (PointsMessage, PutsMessage):
             first = first.whole()
         name = self._written(call, first.name)
         if first.uid and self._hulls.has(name):

@@ -19,7 +19,7 @@ from . import decode
 from .calls import Call
 from .decode_batch import decode_batch
 from .metrics import Metrics
-from .short_batches import PointsMessage
+from .short_batches import PointsMessage, PutsMessage
 
 # While this many points are in flight, or this many batches not answered, no more are read, and the client waits.
 MOST_ROWS = 131_072
@@ -124,6 +124,10 @@ class StreamedBatches:
         self._uid: str = first.uid
         self._owner = call.owner
         self._decode_write = partial(decode_write, name, self._producer, self._owner, self._may_skip)
+        self._short: dict[type, Callable[[Any], bool]] = {
+            PointsMessage: self._take_points,
+            PutsMessage: self._take_puts,
+        }
         self._metrics = metrics
         self._news: asyncio.Future[None] | None = None  # set while the caller waits
         self._loop = asyncio.get_running_loop()
@@ -210,8 +214,9 @@ class StreamedBatches:
                     message = await self._call.read()
                     if message is None:
                         return
-                    if type(message) is PointsMessage:
-                        if self._take_points(message):
+                    take = self._short.get(type(message))
+                    if take is not None:
+                        if take(message):
                             continue
                         message = message.whole()
                     await self.take(message)
@@ -227,6 +232,18 @@ class StreamedBatches:
         if not self._batches.apply_points(batch):
             rows = self._call.message_bytes // decode.BYTES_PER_POINT
             self._batches.write_one(Write(self.name, batch, self._driver.time(), rows, "", 0, self._owner))
+        return True
+
+    def _take_puts(self, message: PutsMessage) -> bool:
+        """The same of a message with batches that put keys."""
+        batches, producer = message.batches, self._producer
+        if message.name not in self._own_names or (message.several and not self.several):
+            return False
+        if len(batches) > MOST_IN_A_MESSAGE or any((sequence > 0) is not (producer != "") for sequence, _ in batches):
+            return False
+        arrived, rows = self._driver.time(), self._call.message_bytes // decode.BYTES_PER_POINT // len(batches)
+        name, owner, may_skip = self.name, self._owner, self._may_skip
+        self._send([Write(name, batch, arrived, rows, producer, number, owner, may_skip) for number, batch in batches])
         return True
 
     def _require_batches_alone(self, message: Any, batches: int) -> None:

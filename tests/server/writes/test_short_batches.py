@@ -9,13 +9,15 @@ import pytest
 from google.protobuf.message import DecodeError
 
 from dynhull_client import HullClient
+from dynhull_proto.v1 import batch_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.compiled import native
 from dynhull_server.rpc.encode import encode_applied
-from dynhull_server.rpc.short_batches import PointsMessage, acknowledgement, received
+from dynhull_server.rpc.short_batches import PointsMessage, PutsMessage, acknowledgement, received
 from dynhull_server.state.batch import Applied
 
 STREAM = "/dynhull.v1.HullService/Stream"
+REFUSED = grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.FAILED_PRECONDITION
 NAN, INFINITY = float("nan"), float("inf")
 FIELDS = "inserts", "deletes"
 CORNERS = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]
@@ -32,21 +34,48 @@ def message(name: str, points: object, field: str = "inserts", **others: Any) ->
     return data
 
 
+def numbered(*batches: dict[str, Any], **others: Any) -> bytes:
+    """A message with batches that put `keys` at `points`."""
+    request = pb.StreamRequest(**others)
+    for each in batches:
+        packed = np.array(each["points"], "<f8").tobytes()
+        more = {name: value for name, value in each.items() if name not in ("keys", "points")}
+        puts = batch_pb2.Puts(keys=each["keys"], points={"packed": packed})
+        request.batches.add(batch=batch_pb2.Batch(puts=puts), **more)
+    data: bytes = request.SerializeToString()
+    return data
+
+
+def integers(*keys: int) -> points_pb2.Keys:
+    return points_pb2.Keys(packed_integers=np.array(keys, "<u8").tobytes())
+
+
+def strings(*keys: str | bytes) -> points_pb2.Keys:
+    encoded = [key.encode() if isinstance(key, str) else key for key in keys]
+    return points_pb2.Keys(lengths=bytes(map(len, encoded)), text=b"".join(encoded))
+
+
 def in_another_order(data: bytes) -> bytes:
     """The same message with its batch in two pieces, which no short way reads."""
     rest = pb.StreamRequest.FromString(data)
+    if rest.batches:
+        rest.batches[0].batch.missing_keys = batch_pb2.MISSING_KEY_POLICY_COUNT  # as by default
+    if not rest.HasField("batch"):
+        whole: bytes = rest.SerializeToString()
+        return whole
     policy = pb.StreamRequest(batch={"missing_points": rest.batch.missing_points})
     part: bytes = policy.SerializeToString()
     return data + (part or pb.StreamRequest(batch={}).SerializeToString())
 
 
 def stream(channel: grpc.Channel, messages: Sequence[bytes]) -> Answers:
-    """The responses, and all of a refusal that has ended them."""
+    """The responses, or the results of those that have several, and all of a refusal that has ended them."""
     call: Any = channel.stream_stream(STREAM)
     answers = []
     try:
         for each in call(iter(messages)):
-            answers.append(each)  # noqa: PERF402  # those before a refusal count
+            results = pb.StreamResponse.FromString(each).results  # as many together as were there at the moment
+            answers.extend([result.SerializeToString() for result in results] or [each])  # those before a refusal count
     except grpc.RpcError as error:
         return answers, (error.code(), error.details(), error.trailing_metadata())
     return answers, "OK"
@@ -112,6 +141,109 @@ def test_equal_refusals_of_what_is_beside(same: Callable[..., Answers], hull: st
 
 
 @needs_compiled
+@pytest.mark.parametrize(("kind", "keys"), [("int", integers), ("str", lambda *keys: strings(*map(chr, keys)))])
+def test_equal_results_of_keys(same: Callable[..., Answers], hull: str, kind: str, keys: Any) -> None:
+    random = np.random.default_rng(3)
+    messages = [pb.StreamRequest(name=hull, accept_results=True).SerializeToString()]
+    for size in (1, 2, 9, 200):
+        chosen = [random.choice(1000, size, replace=False) + 100 for _ in range(5)]
+        batches = [{"keys": keys(*each.tolist()), "points": random.normal(size=(size, 2))} for each in chosen]
+        messages += [numbered(*batches), numbered({"keys": keys(500), "points": [[-0.0, 7.0]]}, name=hull)]
+    answers, code = same(*messages, keyed=kind)
+    results = [pb.NumberedResult.FromString(each).result for each in answers[1:]]
+    assert (len(results), code) == (4 * 6, "OK")
+    assert sum(result.moved for result in results) > 50
+
+
+@needs_compiled
+def test_equal_results_of_numbered_keys(same: Callable[..., Answers], hull: str) -> None:
+    first = pb.StreamRequest(name=hull, accept_results=True, producer="p").SerializeToString()
+    batches = [{"keys": integers(key), "points": [[key, 1.0]], "sequence": key} for key in (1, 2, 2, 3)]
+    answers, code = same(first, numbered(*batches), numbered(batches[1]), keyed="int")
+    results = [pb.NumberedResult.FromString(each).result for each in answers[1:]]
+    assert ([result.duplicate for result in results], code) == ([False, False, True, False, True], "OK")
+    for wrong in (0, 9):  # no number, and a gap
+        last = {"keys": integers(7), "points": [[1.0, 1.0]], "sequence": wrong}
+        answers, error = same(first, numbered(*batches), numbered(last), keyed="int")
+        assert (len(answers), error[0] in REFUSED) == (1 + len(batches), True)
+    unnumbered = pb.StreamRequest(name=hull, accept_results=True).SerializeToString()
+    _, error = same(unnumbered, numbered({"keys": integers(7), "points": [[1.0, 1.0]], "sequence": 4}))
+    assert error[0] == grpc.StatusCode.INVALID_ARGUMENT
+
+
+@needs_compiled
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"keys": integers(1, 2), "points": [[0.0, 0.0], [NAN, 0.0]]},
+        {"keys": integers(1, 2), "points": [[0.0, 0.0]]},
+        {"keys": integers(3, 3), "points": [[0.0, 0.0], [1.0, 0.0]]},
+        {"keys": strings("a"), "points": [[0.0, 0.0]]},
+        {"keys": strings("a", ""), "points": [[0.0, 0.0], [1.0, 0.0]]},
+        {"keys": strings(b"\xff"), "points": [[0.0, 0.0]]},
+        {"keys": points_pb2.Keys(lengths=b"\2", text=b"a"), "points": [[0.0, 0.0]]},
+        {"keys": points_pb2.Keys(packed_integers=b"123"), "points": [[0.0, 0.0]]},
+        {"keys": integers(1), "points": [[0.0, 0.0]], "after_sequence": 3},
+    ],
+)
+def test_equal_refusals_of_keys(same: Callable[..., Answers], hull: str, wrong: dict[str, Any]) -> None:
+    first = pb.StreamRequest(name=hull, accept_results=True).SerializeToString()
+    good = {"keys": integers(1), "points": [[4.0, 4.0]]}
+    answers, error = same(first, numbered(good), numbered(good, wrong, good), keyed="int")
+    assert (len(answers), error[0] in REFUSED) == (1 + 2, True)  # those before it are applied
+
+
+@needs_compiled
+def test_equal_refusals_of_several(same: Callable[..., Answers], hull: str) -> None:
+    one = {"keys": integers(1), "points": [[4.0, 4.0]]}
+    _, error = same(pb.StreamRequest(name=hull).SerializeToString(), numbered(one), keyed="int")
+    assert error[0] == grpc.StatusCode.INVALID_ARGUMENT
+    several = pb.StreamRequest(name=hull, accept_results=True).SerializeToString()
+    _, error = same(several, numbered(*[one] * 257), keyed="int")
+    assert error[0] == grpc.StatusCode.INVALID_ARGUMENT
+    _, error = same(several, numbered(one, name=f"{hull}-2"), keyed="int")
+    assert error[0] == grpc.StatusCode.INVALID_ARGUMENT
+
+
+@needs_compiled
+def test_reads_only_keys_that_it_understands() -> None:
+    """Of any bytes, what is read short is all that the message has."""
+    assert native is not None
+    random = np.random.default_rng(6)
+    puts = [{"keys": keys, "points": [[1.0, 2.0]] * 2} for keys in (integers(1, 2), strings("a", "bc"))]
+    examples = [numbered({**each, "sequence": number}, each) for each in puts for number in (0, 300)]
+    examples += [numbered(each, name="abc") for each in puts]
+    for name in ("", "abc"):
+        batch = pb.StreamRequest.FromString(numbered(puts[0])).batches[0].batch
+        examples.append(pb.StreamRequest(name=name, batch=batch).SerializeToString())
+    assert all(native.puts_message(data) for data in examples)
+    short = 0
+    for turn in range(20_000):
+        data = bytearray(examples[turn % len(examples)])
+        for place in random.integers(len(data), size=random.integers(3)):
+            data[place] = random.integers(256)
+        changed = bytes(data[: len(data) - random.integers(2) * random.integers(20)])
+        found = native.puts_message(changed)
+        if found is None:
+            continue
+        name, several, batches = found
+        try:
+            meant = pb.StreamRequest.FromString(changed)
+        except DecodeError:  # of a name that is not UTF-8, which is none of a hull
+            with pytest.raises(UnicodeDecodeError):
+                name.decode()
+            continue
+        short += 1
+        read = pb.StreamRequest(name=name.decode())
+        for sequence, numbers, lengths, text, points in batches:
+            batch = read.batches.add(sequence=sequence).batch if several else read.batch
+            keys = {"lengths": lengths, "text": text} if numbers is None else {"packed_integers": numbers}
+            batch.puts.CopyFrom(batch_pb2.Puts(keys=keys, points={"packed": points}))
+        assert meant == read
+    assert short > 1000
+
+
+@needs_compiled
 def test_reads_only_what_it_understands() -> None:
     """Of any bytes, what is read short is all that the message has."""
     assert native is not None
@@ -145,8 +277,9 @@ def test_reads_only_what_it_understands() -> None:
 def test_which_way() -> None:
     read = received(lambda data: (pb.StreamRequest.FromString(data), len(data)))
     for name in ("", "a"):
-        data = message(name, CORNERS)
-        for way, kind in ((data, PointsMessage), (in_another_order(data), pb.StreamRequest)):
+        data, keys = message(name, CORNERS), numbered({"keys": integers(1), "points": [[1.0, 1.0]]}, name=name)
+        ways = (data, PointsMessage), (in_another_order(data), pb.StreamRequest)
+        for way, kind in (*ways, (keys, PutsMessage), (in_another_order(keys), pb.StreamRequest)):
             found = read(way)
             assert isinstance(found, tuple)
             assert (type(found[0]), found[1]) == (kind, len(way))
