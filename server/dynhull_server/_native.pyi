@@ -68,6 +68,11 @@ def puts_message(data: bytes) -> tuple[bytes, bool, list[tuple[int, bytes | None
 def acknowledged(sequence: int, revision: int, inserted: int, deleted: int, missing: int, hull_changed: bool, points: int) -> bytes:
     """The StreamResponse to a batch with this result."""
 
+def results(outcomes: list[tuple[int, tuple[Any, ...]]]) -> bytes | None:
+    """
+    The StreamResponse with these results: of each its number, and its counts in the order of the fields, its clock, and the rows that are held. None if one has a clock or such rows.
+    """
+
 class LastPlaces:
     """Of each key the last place that batches of the journal give it."""
 

@@ -133,6 +133,9 @@ class Native(Protocol):
     ) -> bytes:
         """A StreamResponse with a plain result: `acknowledgement` in rpc/short_batches.py."""
 
+    def results(self, outcomes: "list[tuple[int, tuple[Any, ...]]]") -> bytes | None:
+        """A StreamResponse with several results: `acknowledgements` in rpc/short_batches.py."""
+
     def key_codes(self, lengths: bytes, data: bytes) -> bytes:
         """`_codes` in storage/segments/gathered.py."""
 

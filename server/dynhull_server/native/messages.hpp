@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -192,6 +193,28 @@ inline std::optional<PutsMessage> puts_message(std::string_view data) {
 struct PlainResult {
   std::uint64_t revision, inserted, deleted, missing, hull_changed, points;
 };
+
+// The numbers of the fields of a BatchResult that are counts or flags.
+constexpr std::uint8_t COUNTS[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 17, 18};
+constexpr std::uint8_t RESULTS = 0x1a;
+
+// Adds a NumberedResult to the bytes of a StreamResponse; `values` are those of COUNTS.
+inline void add_result(Bytes& response, std::uint64_t sequence, const std::uint64_t (&values)[std::size(COUNTS)]) {
+  Bytes result, numbered;
+  for (std::size_t i = 0; i < std::size(COUNTS); ++i) {
+    if (values[i] == 0) continue;  // a field that has its default is left out
+    result.unsigned_integer(std::uint64_t{COUNTS[i]} << 3);
+    result.unsigned_integer(values[i]);
+  }
+  numbered.byte(RESULT);
+  numbered.text(result.data);
+  if (sequence != 0) {
+    numbered.byte(SEQUENCE);
+    numbered.unsigned_integer(sequence);
+  }
+  response.byte(RESULTS);
+  response.text(numbered.data);
+}
 
 inline std::string acknowledgement(std::uint64_t sequence, const PlainResult& result) {
   Bytes body, message;

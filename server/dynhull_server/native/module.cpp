@@ -394,6 +394,25 @@ nb::bytes acknowledged(std::uint64_t sequence, std::uint64_t revision, std::uint
   return nb::bytes(data.data(), data.size());
 }
 
+// Nothing where a batch has a clock, or rows that are held.
+nb::object results(const nb::list& outcomes) {
+  constexpr std::size_t CLOCK = std::size(COUNTS), HELD = CLOCK + 1;
+  Bytes response;
+  for (const nb::handle each : outcomes) {
+    const nb::tuple outcome = nb::cast<nb::tuple>(each);
+    const nb::tuple counts = nb::cast<nb::tuple>(outcome[1]);
+    if (counts.size() != HELD + 1) throw nb::value_error("a result has another number of values");
+    if (!counts[CLOCK].is_none() || nb::len(nb::object(counts[HELD])) != 0) return nb::none();
+    std::uint64_t values[CLOCK];
+    for (std::size_t i = 0; i < CLOCK; ++i) {
+      values[i] = PyLong_AsUnsignedLongLong(nb::object(counts[i]).ptr());
+      if (PyErr_Occurred()) throw nb::python_error();
+    }
+    add_result(response, nb::cast<std::uint64_t>(outcome[0]), values);
+  }
+  return nb::bytes(response.data.data(), response.data.size());
+}
+
 nb::bytes bytes(const std::string& text) { return nb::bytes(text.data(), text.size()); }
 
 LastPlaces* last_places(std::uint8_t kind) {
@@ -486,6 +505,11 @@ NB_MODULE(_native, module) {
              "or none.");
   module.def("acknowledged", &dynhull_server::acknowledged, "sequence"_a, "revision"_a, "inserted"_a, "deleted"_a,
              "missing"_a, "hull_changed"_a, "points"_a, "The StreamResponse to a batch with this result.");
+  module.def(
+      "results", &dynhull_server::results, "outcomes"_a,
+      nb::sig("def results(outcomes: list[tuple[int, tuple[typing.Any, ...]]]) -> bytes | None"),
+      "The StreamResponse with these results: of each its number, and its counts in the order of the fields, its "
+      "clock, and the rows that are held. None if one has a clock or such rows.");
   using dynhull_server::LastPlaces;
   nb::class_<LastPlaces>(module, "LastPlaces", "Of each key the last place that batches of the journal give it.")
       .def(nb::new_(&dynhull_server::last_places), "kind"_a)

@@ -47,7 +47,7 @@ from .places import Places
 from .query import METHODS, Answers
 from .readings import ENTRIES, RISKS
 from .replays import Replays
-from .short_batches import PointsMessage, PutsMessage, acknowledgement
+from .short_batches import PointsMessage, PutsMessage, acknowledgement, acknowledgements
 from .short_locates import ShortLocates
 from .status import ANSWERED
 from .tracks import Tracks
@@ -253,12 +253,9 @@ class HullService:
                 await call.write(pb.StreamResponse(max_batches=MOST_IN_A_MESSAGE, max_message_bytes=most_bytes))
             while await streamed.more():
                 if streamed.several:
-                    response = pb.StreamResponse()
-                    for sequence, applied in streamed.applied():
-                        call.batches += 1
-                        result = response.results.add(sequence=sequence)
-                        encode.encode_applied(applied, result.result)
-                    await call.write(response)
+                    outcomes = list(streamed.applied())
+                    call.batches += len(outcomes)
+                    await call.write(acknowledgements(outcomes, call.max_message_bytes))
                     continue
                 for sequence, applied in streamed.applied():
                     call.batches += 1

@@ -5,6 +5,7 @@ for a single point.
 """
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,26 @@ from .calls import Received
 from .decode_batch import NO_INTEGERS, NO_STRINGS, UNSIGNED
 from .encode import encode_applied
 
+# What the result of a batch has, in the order of the fields of a message; then what only few results have.
+VALUES = attrgetter(
+    "revision",
+    "inserted",
+    "deleted",
+    "missing",
+    "hull_changed",
+    "points",
+    "duplicate",
+    "moved",
+    "stale",
+    "late",
+    "skipped",
+    "clamped",
+    "evicted",
+    "released",
+    "dropped",
+    "clock",
+    "held",
+)
 # Larger messages are decoded in another thread.
 MOST_BYTES = 2**18
 
@@ -125,3 +146,15 @@ def acknowledgement(sequence: int, applied: Applied) -> bytes:
     encode_applied(applied, response.result)
     data: bytes = response.SerializeToString()
     return data
+
+
+def acknowledgements(outcomes: list[tuple[int, Applied]], most_bytes: int) -> pb.StreamResponse | bytes:
+    """The response to several batches, perhaps serialized: then it has at most so many bytes."""
+    if native is not None:
+        data = native.results([(sequence, VALUES(applied)) for sequence, applied in outcomes])
+        if data is not None and len(data) <= most_bytes:
+            return data
+    response = pb.StreamResponse()
+    for sequence, applied in outcomes:
+        encode_applied(applied, response.results.add(sequence=sequence).result)
+    return response

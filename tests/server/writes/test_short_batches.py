@@ -1,6 +1,7 @@
 """The short way of Stream beside the whole way: the same results, refusals and bytes."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from typing import Any
 
 import grpc
@@ -13,7 +14,7 @@ from dynhull_proto.v1 import batch_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_server.compiled import native
 from dynhull_server.rpc.encode import encode_applied
-from dynhull_server.rpc.short_batches import PointsMessage, PutsMessage, acknowledgement, received
+from dynhull_server.rpc.short_batches import PointsMessage, PutsMessage, acknowledgement, acknowledgements, received
 from dynhull_server.state.batch import Applied
 
 STREAM = "/dynhull.v1.HullService/Stream"
@@ -303,3 +304,24 @@ def test_equal_bytes_of_results() -> None:
         response = pb.StreamResponse(sequence=2)
         encode_applied(applied, response.result)
         assert acknowledgement(2, applied) == response.SerializeToString()
+
+
+@needs_compiled
+def test_equal_bytes_of_several_results() -> None:
+    random = np.random.default_rng(8)
+    names = [each.name for each in fields(Applied) if each.name not in ("hull_changed", "duplicate", "clock", "held")]
+    outcomes = []
+    for _ in range(500):
+        numbers = {name: int(random.integers(2**63 - 1)) >> int(random.integers(64)) for name in names}
+        flags = {name: bool(random.integers(2)) for name in ("hull_changed", "duplicate")}
+        outcomes.append((int(random.integers(2**63 - 1)) >> int(random.integers(64)), Applied(**numbers, **flags)))
+    of_few = Applied(5, 1, 0, 0, True, 9, clock=10**15), Applied(5, 1, 0, 0, True, 9, held=(1, 4))
+    for several in (outcomes, [], outcomes[:1], [*outcomes[:2], (3, of_few[0])], [(0, of_few[1]), *outcomes[:2]]):
+        response = pb.StreamResponse()
+        for sequence, applied in several:
+            encode_applied(applied, response.results.add(sequence=sequence).result)
+        data = response.SerializeToString()
+        for most in (len(data), len(data) - 1):
+            found = acknowledgements(several, most)
+            assert (found if isinstance(found, bytes) else found.SerializeToString()) == data
+            assert len(data) <= most or not isinstance(found, bytes)

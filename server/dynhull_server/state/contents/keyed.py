@@ -171,12 +171,12 @@ class Keyed:
             raise MisfitError(field, f"has keys, which are {KINDS[self._kind]}: a batch puts and removes them")
         else:  # empty
             batch = KeyedBatch(self._kind, no_keys(self._kind), NO_POINTS, no_keys(self._kind))
-        if batch.of_quarantine:
+        held, quarantine = batch.of_quarantine, self._gate.quarantine
+        if held:
             batch = self._gate.opened(batch, self.globe)
-        quarantine = self.quarantine
         columns = batch.keys, batch.points, batch.removes, batch.times, batch.deadlines, batch.condition
         rows = KeyRows(*columns, accuracies=batch.accuracies)
-        held, puts = batch.of_quarantine, len(batch.keys)
+        puts = len(batch.keys)
         admission = admit(self._settings, batch.times, puts, "puts.times", arrived, self.clock, held=held)
         rows.times = admission.times
         if rows.times is None and quarantine is not None and quarantine.rules.max_speed is not None:
@@ -223,7 +223,7 @@ class Keyed:
     def apply(self, admitted: AdmittedPuts, revision: int) -> Applied:
         """Apply the batch, or raise KeyRepeatedError or KeyMissingError."""
         rows, hull = admitted.rows, self.hull
-        judged = self.quarantine is not None or admitted.request is not None
+        judged = self._gate.quarantine is not None or admitted.request is not None
         if judged or (len(rows.removes) and (len(rows.keys) or admitted.refuse_missing)):
             self.check(admitted)
         changes = hull.changes
