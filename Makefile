@@ -69,10 +69,10 @@ properties: .venv/.test  ## other and many more random examples for the tests of
 	$(BIN)/pytest $(WORKERS) -m hypothesis --hypothesis-profile properties --timeout 0 tests
 
 slow: .venv/.test .venv/.peers  ## what `make test` leaves to this word: short runs of the tortures and the fuzzers, faults that must be found, notebooks, pages in a browser
-	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) SLOW_CASES=all BROWSER_CASES=all $(BIN)/pytest $(WORKERS) -m only_with tests
+	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) SLOW_CASES=all BROWSER_CASES=all $(BIN)/pytest $(WORKERS) -m only_with $(or $(T),tests)
 
 browser: .venv/.test .venv/.peers  ## the dashboard's pages in a real Chromium; `make test` opens one of each kind
-	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) BROWSER_CASES=all $(BIN)/pytest tests/dashboard -n 2 --dist loadfile
+	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) BROWSER_CASES=all $(BIN)/pytest tests/dashboard tests/gateway/test_past_holes.py -n 2 --dist loadfile
 
 long: .venv/.test  ## all cases of the tests of which `make test` runs every third to seventh
 	LONG_CASES=all $(BIN)/pytest $(WORKERS) -m "every or only_with" tests

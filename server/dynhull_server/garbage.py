@@ -35,9 +35,10 @@ def without_collections() -> Iterator[None]:
 def few_collections() -> Iterator[None]:
     """Collect what requests leave behind, and seldom look at all objects: among many hulls that takes 100 ms and more.
 
-    What has outlived a collection of the oldest generation is set aside, until the next one for which it is time.
+    What has outlived a collection of the oldest generation is set aside, until the next one for which it is time. What
+    was set aside before stays so, with what came to it: a collector has one place for both.
     """
-    before, collections = gc.get_threshold(), _Collections()
+    before, collections, aside = gc.get_threshold(), _Collections(), gc.get_freeze_count()
     gc.freeze()
     gc.set_threshold(YOUNG, *before[1:])
     gc.callbacks.append(collections.noticed)
@@ -46,7 +47,8 @@ def few_collections() -> Iterator[None]:
     finally:
         gc.callbacks.remove(collections.noticed)
         gc.set_threshold(*before)
-        gc.unfreeze()
+        if not aside:
+            gc.unfreeze()
 
 
 class _Collections:

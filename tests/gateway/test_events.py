@@ -7,6 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
+from cases import slow
 from chromium import chromium
 from gateway_process import Events, Gateway, gateway_process
 from patience import PATIENCE, wait_until
@@ -296,6 +297,7 @@ def rest_of(gateway: Gateway, path: str) -> dict[str, Any]:
         events.close()
 
 
+@slow
 def test_a_reader_that_does_not_read_gets_a_snapshot_later(address: str, name: str) -> None:
     """While it does not read, what waits for it stays small; then it gets the whole hull, and what follows."""
     with HullClient(address) as client, gateway_process(address, "--metrics-port", "0") as gateway:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import in_browser
 from chromium import chromium
 from gateway_process import gateway_process
 from patience import PATIENCE, wait_until
@@ -53,6 +54,7 @@ def filed(client: HullClient, folder: Path) -> list[Path]:
     return sorted(folder.rglob("*.batches.parquet"))
 
 
+@in_browser
 def test_an_event_source_ends_at_a_hole(browser: Browser, tmp_path: Path) -> None:
     options = "--data", str(tmp_path), "--snapshot-points", "200"
     with (

@@ -67,6 +67,7 @@ def blocks(kind: str) -> list[str]:
     return [block.partition("```")[0] for block in text.split(f"```{kind}\n")[1:]]
 
 
+@slow
 def test_its_own_tests(gateway: Gateway, server: MortalServer) -> None:
     said = node("--test", "--test-reporter=tap", DYNHULL_GATEWAY=gateway.url, DYNHULL_SERVER=f"grpc://{server.address}")
     assert "\n# fail 0\n" in said
@@ -184,14 +185,14 @@ def test_a_writer_and_a_watch_outlive_servers(way: str, server: MortalServer, ga
         assert hull.info.points == said["keys"]
 
 
-@pytest.mark.parametrize("way", ["gateway", "grpc"])
+@pytest.mark.parametrize("way", [pytest.param("gateway", marks=slow), "grpc"])
 def test_what_is_aborted_ends_with_the_reason(way: str, server: MortalServer, gateway: Gateway) -> None:
     """At whichever turn it is aborted; and no promise is left that rejects unseen."""
     url = gateway.url if way == "gateway" else f"grpc://{server.address}"
     assert node(str(HERE / "aborted.mjs"), url, f"typescript/aborted/{way}") == "[]\n"
 
 
-@pytest.mark.parametrize("way", ["gateway", "grpc"])
+@pytest.mark.parametrize("way", [pytest.param("gateway", marks=slow), "grpc"])
 def test_what_reads_a_damaged_past_ends_with_the_reason(way: str, tmp_path: Path) -> None:
     """Who began anew at each end would do so for ever."""
     complaints = "a part of the past cannot be read"
@@ -207,6 +208,7 @@ def test_what_reads_a_damaged_past_ends_with_the_reason(way: str, tmp_path: Path
             assert json.loads(node(str(HERE / "damaged.mjs"), url, "fleet")) == ["PAST_DAMAGED"] * 3
 
 
+@slow
 @pytest.mark.parametrize("way", ["gateway", "grpc"])
 def test_batches_under_way_outlive_servers_and_gateways(way: str, server: MortalServer) -> None:
     """Each is applied once, in its turn, whatever is killed while several of them are under way."""
@@ -310,6 +312,7 @@ def signalled(processes: list[int], what: signal.Signals) -> None:
             os.kill(each, what)
 
 
+@slow
 def test_a_page_that_slept_goes_on(browser: Browser, server: MortalServer, tmp_path: Path) -> None:
     """A page whose processes stood still, while both the server and the gateway were killed, shows what is now."""
     name, port = "typescript/index.html", free_port()
@@ -375,6 +378,7 @@ def by_night(seen: Page) -> None:
         seen.wait_for_function(f"({INKED})('{HULL_BY_NIGHT if dark else HULL}') > 200")
 
 
+@slow
 def test_a_map_of_a_hull_a_fence_and_an_alarm(
     browser: Browser, gateway: Gateway, server: MortalServer, tmp_path: Path
 ) -> None:

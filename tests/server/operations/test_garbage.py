@@ -75,6 +75,17 @@ def test_all_cycles_are_collected() -> None:
     """)
 
 
+def test_what_others_have_set_aside_stays_so() -> None:
+    """As in a process of tests: to look at all that it has imported takes a second."""
+    run("""
+    gc.freeze()
+    before = gc.get_freeze_count()
+    with garbage.few_collections():
+        pass
+    assert gc.get_freeze_count() >= before > 0
+    """)
+
+
 def test_what_is_made_at_the_start_is_not_looked_at() -> None:
     run("""
     with garbage.few_collections():
