@@ -28,6 +28,7 @@ from dynhull_server.state.limits import Limits
 from dynhull_server.state.records import CommitStamp
 from dynhull_server.storage.memory import MemoryStorage
 from dynhull_server.storage.port import NotCommittedError, Progress, StorageError, StoredContents, TakenOverError
+from dynhull_server.storage.segments.owner import Claimant
 
 from .clients import Client, probe, probe_fence
 from .cluster_past import Filer, SharedPast, SharedRows, read_past
@@ -81,15 +82,18 @@ class Site:
             self.model.clock = lambda: core.time()
             self.model.fences.new_life()
 
-    def copied(self, name: str) -> "Site":
-        """The same, as of the last commits: nothing tells the two apart but who is connected."""
+    def copied(self, name: str, *, shares: bool = False) -> "Site":
+        """The same, as of the last commits: nothing tells the two apart but who is connected.
+
+        If it `shares`, the past of both is in one store.
+        """
         memory, other = self.store._inner, MemoryStorage()
         state = {key: value for key, value in vars(memory).items() if key != "_turn"}
         vars(other).update(copy.deepcopy(state))
         model = copy.deepcopy(self.model)
         model.new_life()
         model.faulty = True
-        past = None if self.past is None else self.past.copied()
+        past = None if self.past is None else self.past.copied(shares=shares)
         return Site(name, self.database.copied(), _store(other, model), model, self.commits, past)
 
     def look(self) -> None:
@@ -123,6 +127,10 @@ class OwnedStorage:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._store, name)
+
+    def entitled(self) -> bool:
+        """Whether this server may answer reads."""
+        return self._process.ownership.holds()
 
     def open(self, progress: Progress) -> StoredContents:
         """Take up everything."""
@@ -201,8 +209,8 @@ class Process:
         self.reads: Any = self._threads.pool("reads", 2) if site.past is not None else None
         self.proof = proof_of(PARTITION, worker, SECRET)
         world.current = self
-        database: Any = SimpleNamespace(connect=self.connect, end_silent=lambda _: None)
-        self.ownership = Ownership(database, PARTITION, self._lost, worker)
+        self.database: Any = SimpleNamespace(connect=self.connect, end_silent=lambda _: None)
+        self.ownership = Ownership(self.database, PARTITION, self._lost, worker)
         self.spawn("server", self._serve)
         world.schedule.actor("reaper", lambda: self.alive and self._doomed, self.end)
 
@@ -218,6 +226,10 @@ class Process:
     @property
     def random(self) -> Any:
         return self.world.schedule.random
+
+    @property
+    def brisk(self) -> bool:
+        return self.world.schedule.brisk
 
     def note(self, what: object) -> None:
         self.world.schedule.note(what)
@@ -267,15 +279,9 @@ class Process:
                 break
             except StorageError:  # as long as another server renews its lease, too
                 self.wait(lambda: False, LOOK)
-        self.storage = storage = OwnedStorage(self)
-        clock = WorldClock(self.world, self.random.uniform(0, 10))
-        self.core = CoreServer(self.world.limits, storage, self.site.model, self, self._threads, clock)  # type: ignore[arg-type]
-        if self.world.alarmed:
-            self.core.look()
-            self.actor("clock", self.core.is_behind, self.core.look)
-        if self.site.past is not None:
-            self.spawn("history", Filer(self, storage).run)
-        self.port = self.world.listen(self)
+        self.storage = OwnedStorage(self)
+        self.core = self._served()
+        self._listen()
         while True:
             try:
                 self.ownership.announce(f"{HOST} 1 {self.port}")
@@ -285,6 +291,25 @@ class Process:
                 return
             except StorageError:
                 self.wait(lambda: False, LOOK)
+
+    def _served(self) -> CoreServer:
+        """What serves the hulls of the storage."""
+        clock = WorldClock(self.world, self.random.uniform(0, 10))
+        core = CoreServer(self.world.limits, self.storage, self.site.model, self, self._threads, clock)  # type: ignore[arg-type]
+        if self.world.alarmed:
+            core.look()
+            self.actor("clock", core.is_behind, core.look)
+        if self.site.past is not None:
+            self.spawn("history", Filer(self, self.storage).run)
+        return core
+
+    def _listen(self) -> None:
+        """Take calls."""
+        self.port = self.world.listen(self)
+
+    def claimant(self) -> Claimant | None:
+        """Whose past alone is in the store; None where that is nobody's concern."""
+        return None
 
     def leave(self) -> None:
         """End as planned: nothing begins any more, then the partition is free."""
@@ -415,11 +440,16 @@ class World:
     """One plan.
 
     Attributes:
+        process: what servers are.
+        most_turns: the most turns until everything is served again.
         now: the time in seconds, by all clocks.
         alarmed: whether there may be alarms.
         current: the process whose turn it is.
         listening: who listens, by port.
     """
+
+    process: type[Process] = Process
+    most_turns = MANY_TURNS
 
     def __init__(self, plan: Plan, model: Model, schedule: Schedule) -> None:
         self.limits, self.schedule = Limits(**plan["limits"]), schedule
@@ -437,7 +467,7 @@ class World:
         self.processes: list[Process] = []
         self.sites: list[Site] = []
         schedule.actor("time", self._hurries, self._pass)
-        schedule.actor("fates", lambda: self._fates and not self.calm, self._fate)
+        schedule.actor("fates", self._is_fated, self._fate)
         model.new_life()
         model.faulty = True
         past = SharedPast(plan["faults"], lambda: self.now) if "faults" in plan else None
@@ -481,6 +511,9 @@ class World:
         """Its port is free, for whoever comes next."""
         self.listening = {port: each for port, each in self.listening.items() if each is not process}
 
+    def _is_fated(self) -> object:
+        return self._fates and not self.calm
+
     def _fate(self) -> None:
         if self._rest:
             self._rest -= 1
@@ -488,7 +521,7 @@ class World:
         fate = self._fates.pop()
         self._rest = fate["after"]
         if fate["do"] == "copy":
-            self._add(self.sites[0].copied("south"), self._plan["copied"])
+            self._add(self.sites[0].copied("south", shares=fate.get("shares", False)), self._plan["copied"])
         elif fate["do"] == "start":
             self._start(fate["site"])
         elif alive := [each for each in self.processes if each.alive]:
@@ -507,6 +540,10 @@ class World:
                     process.dark = False
                 case "cut":
                     process.site.database.end_all_of(process)
+                case "away" if process.site.past is not None:
+                    process.site.past.away = fate["kind"]
+                case "back" if process.site.past is not None:
+                    process.site.past.away = None
                 case "leave" if process.runs:
                     process.leave()
 
@@ -519,7 +556,7 @@ class World:
         user, hides, reaped = draw.choice("ab"), draw.random() < 0.5, draw.random() < 0.8
         entry = Entry(place, number, self._begun, user, hides, reaped)
         place.processes[entry.number] = entry
-        self.processes.append(Process(self, site, f"{site.name}/{draw.randrange(2)}", entry))
+        self.processes.append(self.process(self, site, f"{site.name}/{draw.randrange(2)}", entry))
 
     # The end
 
@@ -614,7 +651,7 @@ class World:
             self._until(condition, "a probe")
 
     def _until(self, condition: Callable[[], object], who: str) -> None:
-        bound = self.schedule.turns + MANY_TURNS
+        bound = self.schedule.turns + self.most_turns
         while not condition():
             if not self._turn() or self.schedule.turns > bound:
                 raise self.sites[0].model.finds(f"{who} waits for ever")

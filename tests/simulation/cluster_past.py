@@ -5,8 +5,6 @@ store. The rows are in SQLite in memory, and are changed and read in one turn. A
 know yet, reads them, too, and calls the store.
 """
 
-import copy
-import shutil
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -25,14 +23,14 @@ from dynhull_server.storage.rows.examine import Findings, examine
 from dynhull_server.storage.rows.group import Group
 from dynhull_server.storage.rows.storage import RowStorage
 from dynhull_server.storage.rows.tables import FORMAT
-from dynhull_server.storage.segments.archive import Archive
+from dynhull_server.storage.segments.archive import Archive, Written
 from dynhull_server.storage.sqlite.readers import SQLiteReader
 from dynhull_server.storage.sqlite.schema import SCHEMAS, UPDATE_TOTALS, carry_out, renew_totals
 
 from .clients import content
 from .core_life import Answer, Wait
 from .globe import points
-from .past_archive import FaultyStore, Store
+from .past_archive import At, FaultyStore, Store
 from .past_model import plain
 from .store import ERRORS, FaultyStorage
 
@@ -134,6 +132,38 @@ class _Reader(SQLiteReader):
         """Do nothing."""
 
 
+class ClaimedStore(FaultyStore):
+    """The store of a database, which a copy of that may claim, too.
+
+    Args:
+        past: that of the database.
+        store: what is in it.
+        at, give_way: as of any such store.
+        model: hears of what must not be.
+    """
+
+    def __init__(self, past: "SharedPast", store: Store, at: At, give_way: Callable[[], None], model: "Model") -> None:
+        super().__init__(store, 0, at, give_way, past)
+        self._past, self._model = past, model
+
+    def write(self, file: str, content: bytes) -> Written:
+        """Write an object, unless another one has the place by now."""
+        called = self._kept.calls
+        found = super().write(file, content)
+        if self._kept.owner(called) not in (None, self._past):
+            raise self._model.finds(f"{file} is written into the place of another database, which may remove it")
+        return found
+
+    def remove(self, file: str) -> None:
+        """Remove the objects of a segment, unless another one has the place by now."""
+        owner = self._kept.owner(self._kept.calls)
+        needed = isinstance(owner, SharedPast) and owner is not self._past and owner.names(file)
+        super().remove(file)
+        if needed:
+            raise self._model.finds(f"{file} is removed, which the database needs that has the place")
+        self._past.removed(file)
+
+
 class SharedPast:
     """The rows and the store of a site.
 
@@ -145,10 +175,18 @@ class SharedPast:
     Attributes:
         faults: the same.
         calm: whether nothing fails any more.
+        away: how each call of the store fails at present; None while it answers.
+        others: those that have the same store.
+        has_shared: whether there was another one.
+        lost: the uids of the hulls of which another one has removed files.
     """
 
     def __init__(self, faults: Sequence[dict[str, Any]], elapsed: Callable[[], float]) -> None:
         self.faults, self.calm = faults, False
+        self.away: str | None = None
+        self.others: list[SharedPast] = []
+        self.has_shared = False
+        self.lost: set[str] = set()
         self._elapsed = elapsed
         self._home = TemporaryDirectory()
         self._store = Store(Path(self._home.name) / "store", elapsed)
@@ -163,7 +201,7 @@ class SharedPast:
 
         def at(place: str) -> str | None:
             process.give_way()
-            kind = None if self.calm else faulty._fault(place)
+            kind = None if self.calm else faulty._fault(place) or self.away
             if kind == "still":
                 process.stopped = True
                 process.give_way()
@@ -172,18 +210,55 @@ class SharedPast:
                 raise ERRORS[kind](f"the store fails at {place}, as planned")
             return kind
 
-        archive = FaultyStore(self._store, 0, at, process.give_way)
+        archive = ClaimedStore(self, self._store, at, process.give_way, model)
+        archive.owner = process.claimant()
         faulty = FaultyStorage(SharedRows(self._rows, archive, process), model, self.faults, immediate=False)
         return faulty
 
-    def copied(self) -> "SharedPast":
-        """The same as of the last commits, in a database and a store of its own."""
+    def claimed_by(self, process: "Process") -> Archive:
+        """What a server claims when it begins: whatever fails later does not fail then, but the store may be away."""
+
+        def at(_: str) -> None:
+            process.give_way()
+            if self.away is not None and not self.calm:
+                raise OSError("the store is away, as planned")
+
+        return ClaimedStore(self, self._store, at, process.give_way, process.site.model)
+
+    def copied(self, *, shares: bool) -> "SharedPast":
+        """The same as of the last commits, in a database of its own, and unless it `shares` that, in such a store."""
         other = SharedPast(self.faults, self._elapsed)
         self._rows.backup(other._rows)
-        if self._store.folder.is_dir():
-            shutil.copytree(self._store.folder, other._store.folder)
-        other._store.times, other._store.calls = copy.copy(self._store.times), self._store.calls
+        if shares:
+            other._store = self._store
+            self.others, other.others = [other], [self]
+            self.has_shared = other.has_shared = True
+        else:
+            other.move(self._store)
         return other
+
+    def move(self, store: Store) -> None:
+        """Have a store of its own, with the objects of another one, which has been shared so far."""
+        self._store = store.apart(Path(self._home.name) / "copied")
+        for other in self.others:
+            other.others = []
+        self.others = []
+
+    @property
+    def has_place(self) -> bool:
+        """Whether nobody else has claimed the store since."""
+        return not self.others or self._store.owner(self._store.calls) is self
+
+    def names(self, file: str) -> bool:
+        """Whether a file is one of a segment."""
+        sql = "SELECT 1 FROM segments JOIN hulls ON hulls.id = segments.hull WHERE file = ?"
+        return self._rows.execute(sql, [file]).fetchone() is not None
+
+    def removed(self, file: str) -> None:
+        """A file is gone: others that shared the store, and no longer had it, may have needed it."""
+        for other in self.others:
+            if other.names(file):
+                other.lost.add(file.partition("/")[0])
 
     def needs_all(self, rows: SharedRows) -> bool:
         """Whether each object of a hull is one of a segment, and nothing is to be filed or removed.
@@ -195,8 +270,13 @@ class SharedPast:
             return False
         archive, uids = rows._archive, {hull.row.uid for hull in hulls}
         assert isinstance(archive, FaultyStore)
+        files = {each.file for hull in hulls for each in hull.segments}
         there = {name for name in archive.names() if name.partition("/")[0] in uids}
-        return there == {each.file for hull in hulls for each in hull.segments}
+        if self.has_shared:  # what another one has written is its own, and it may have removed what was here
+            foreign = {name.partition(".")[0] for name, by in self._store.writers.items() if by is not self}
+            there = {name for name in there if name in files or name.partition("/")[2] not in foreign}
+            there |= {file for file in files if file.partition("/")[0] in self.lost}
+        return there == files
 
     def remove(self) -> None:
         """Nothing of it is needed any more."""
@@ -291,6 +371,11 @@ async def read_past(process: "Process", model: "Model", name: str) -> None:
     if not reading.done():
         return
     error = reading.exception()
+    past = process.site.past
+    if isinstance(error, DamagedError) and past is not None and truth.row.uid in past.lost:
+        if not any(hole.number == truth.row.number for hole in process.storage.holes()):
+            raise model.finds(f"the past of {name} cannot be read, and no hole is named: {error}") from error
+        return
     if isinstance(error, DamagedError) and process.ownership.holds() and not truth.deleted:
         raise model.finds(f"the past of {name} cannot be read: {error}") from error
     if isinstance(error, StorageError | OSError | KeyError):  # it is away, replaced, or the hull deleted

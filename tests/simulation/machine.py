@@ -41,8 +41,9 @@ class Loop(asyncio.AbstractEventLoop):
         tasks: all tasks.
     """
 
+    now = 0.0
+
     def __init__(self, model: Model, schedule: Schedule) -> None:
-        self.now = 0.0
         self.dead = False
         self.tasks: list[asyncio.Task[Any]] = []
         self._model = model
@@ -51,7 +52,7 @@ class Loop(asyncio.AbstractEventLoop):
         self._timers: list[tuple[float, int, asyncio.TimerHandle]] = []
         self._timer_count = 0
         self._executor: Callable[[Callable[[], Any]], Future[Any]] | None = None
-        schedule.actor("loop", lambda: self._ready, self._run)
+        schedule.actor("loop", self._is_ready, self._run)
         schedule.actor("time", self._may_pass, self._pass)
 
     def _run(self) -> None:
@@ -72,6 +73,10 @@ class Loop(asyncio.AbstractEventLoop):
         """What nobody reads any more ends, as in asyncio; nothing of a killed process does."""
         if not self.dead:
             self.create_task(generator.aclose())
+
+    def _is_ready(self) -> object:
+        """Whether anything can be carried out now."""
+        return self._ready
 
     def _may_pass(self) -> object:
         """Whether time may pass to the next timer."""
@@ -153,7 +158,7 @@ class Thread:
 
     def __init__(self, hub: greenlet, run: Callable[[], None]) -> None:
         self._hub = hub
-        self._greenlet = greenlet(run)
+        self._greenlet = greenlet(run, hub)  # also where another thread starts it: its end goes on there
         self._condition: Callable[[], object] | None = None
 
     @property

@@ -22,13 +22,21 @@ TO_WORKER, TO_GATEWAY = 0, 1
 
 
 class Wire(asyncio.Transport):
-    """One end of a connection, and the bytes on their way from it to the other end."""
+    """One end of a connection, and the bytes on their way from it to the other end.
 
-    def __init__(self, network: "Network", direction: int, protocol: Any) -> None:
+    Args:
+        network: the network.
+        loop: the event loop of whoever has this end.
+        direction: where to its bytes go.
+    """
+
+    protocol: Any
+    other: "Wire"
+
+    def __init__(self, network: "Network", loop: Loop, direction: int) -> None:
         super().__init__()
-        self.other: Wire
+        self.loop = loop
         self.direction = direction
-        self.protocol = protocol
         self.unsent = bytearray()
         self.lost = False  # whether what is written never arrives
         self.open, self.closing, self.reading, self._waits = True, False, True, False
@@ -45,7 +53,7 @@ class Wire(asyncio.Transport):
             self.unsent += data
             if len(self.unsent) > HIGH and not self._waits:
                 self._waits = True
-                self._network.loop.call_soon(self.protocol.pause_writing)
+                self.call("pause_writing")
 
     def close(self) -> None:
         self.closing = True
@@ -72,20 +80,24 @@ class Wire(asyncio.Transport):
         data = bytes(self.unsent[:most])
         del self.unsent[:most]
         if data and self.other.open:
-            self._network.loop.call_soon(self.other.protocol.data_received, data)
+            self.other.call("data_received", data)
         if self._waits and len(self.unsent) < LOW:
             self._waits = False
-            self._network.loop.call_soon(self.protocol.resume_writing)
+            self.call("resume_writing")
         if self.closing and not self.unsent:
             self._end()
 
+    def call(self, name: str, *arguments: Any) -> None:
+        """Have the protocol of this end called soon; by then it is there."""
+        self.loop.call_soon(lambda: getattr(self.protocol, name)(*arguments))
+
     def _end(self) -> None:
         self.open = False
-        self._network.loop.call_soon(self.protocol.connection_lost, None)
+        self.call("connection_lost", None)
         if self.other.open and not self.lost and not self._network.dark[self.direction]:
             self.other.unsent.clear()
             self.other.open = False
-            self._network.loop.call_soon(self.other.protocol.connection_lost, None)
+            self.other.call("connection_lost", None)
 
 
 class Network:
@@ -96,13 +108,12 @@ class Network:
         hasty: whether time may pass while anything moves.
     """
 
-    def __init__(self, loop: "NetworkLoop", schedule: Schedule) -> None:
-        self.loop = loop
+    def __init__(self, schedule: Schedule) -> None:
         self.dark = [False, False]
         self.hasty = False
         self._schedule = schedule
         self._wires: list[Wire] = []
-        self._listening: Callable[[], Any] | None = None
+        self._listening: dict[int, tuple[Loop, Callable[[Wire], None]]] = {}
         schedule.actor("network", lambda: self.moves, self._move)
 
     @property
@@ -110,19 +121,33 @@ class Network:
         """Whether anything is on its way."""
         return any(wire.moves for wire in self._wires)
 
-    def listen(self, make: Callable[[], Any]) -> None:
-        self._listening = make
+    def listen(self, loop: Loop, accept: Callable[[Wire], None], port: int = 0) -> None:
+        """Have connections to a port accepted: the protocol of the wire is made, and hears that it is connected."""
+        self._listening[port] = loop, accept
 
-    async def connect(self, make: Callable[[], Any]) -> tuple[Wire, Any]:
+    def stop_listening(self, loop: Loop) -> None:
+        """The process with a loop takes no more connections."""
+        self._listening = {port: each for port, each in self._listening.items() if each[0] is not loop}
+
+    def leave(self, loop: Loop) -> None:
+        """It has ended: others hear of it, if they can."""
+        self.stop_listening(loop)
+        for wire in self._wires:
+            if wire.loop is loop:
+                wire.abort()
+
+    async def connect(self, loop: Loop, make: Callable[[], Any], port: int = 0) -> tuple[Wire, Any]:
         """A connection, once the network is not dark."""
         while any(self.dark):
             await asyncio.sleep(AGAIN)
-        if self._listening is None:
+        if port not in self._listening:
             raise ConnectionRefusedError("nobody listens")
-        own, other = Wire(self, TO_WORKER, make()), Wire(self, TO_GATEWAY, self._listening())
+        theirs, accept = self._listening[port]
+        own, other = Wire(self, loop, TO_WORKER), Wire(self, theirs, TO_GATEWAY)
         own.other, other.other = other, own
+        own.protocol = make()
         self._wires = [wire for wire in self._wires if wire.open] + [own, other]
-        other.protocol.connection_made(other)
+        accept(other)
         own.protocol.connection_made(own)
         return own, own.protocol
 
@@ -147,7 +172,7 @@ class NetworkLoop(Loop):
     def __init__(self, model: Model, schedule: Schedule) -> None:
         super().__init__(model, schedule)
         self._schedule = schedule
-        self.network = Network(self, schedule)
+        self.network = Network(schedule)
 
     def _may_pass(self) -> object:
         """Hardly ever while anything moves: else nothing would arrive within a second."""
@@ -155,7 +180,13 @@ class NetworkLoop(Loop):
         return self._timers and (not busy or (self.network.hasty and self._schedule.random.random() < HASTE))
 
     async def create_connection(self, make: Any, *_: Any, **__: Any) -> Any:  # type: ignore[override]
-        return await self.network.connect(make)
+        return await self.network.connect(self, make)
 
     async def create_server(self, make: Any, *_: Any, **__: Any) -> Any:  # type: ignore[override]
-        self.network.listen(make)
+        self.network.listen(self, lambda wire: greeted(wire, make()))
+
+
+def greeted(wire: Wire, protocol: Any) -> None:
+    """Whoever listens has the other end of a connection."""
+    wire.protocol = protocol
+    protocol.connection_made(wire)

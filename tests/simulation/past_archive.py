@@ -2,6 +2,7 @@
 server may be killed."""
 
 import errno
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ from dynhull_server.storage.rows import filed
 from dynhull_server.storage.rows import storage as rows_storage
 from dynhull_server.storage.segments import archive, objects
 from dynhull_server.storage.segments.archive import BATCHES, STATE, Archive, Written
+from dynhull_server.storage.segments.owner import CLAIMS
 
 from .machine import SimulatedThreads, reading_ahead
 
@@ -122,6 +124,8 @@ class Store:
         folder: has the objects as files.
         elapsed: the seconds that have passed. Nobody sets the clock of a store together with that of a server.
         times: the number of calls that had come when each of them was written; a second is a call here.
+        writers: who has written each of them: the past of a database, or None.
+        claims: who claimed the store, and after how many calls, one after the other.
         late: calls that are carried out later: when, and what they do.
         calls: how many there were.
     """
@@ -129,6 +133,8 @@ class Store:
     folder: Path
     elapsed: Callable[[], float]
     times: dict[str, int] = field(default_factory=dict)
+    writers: dict[str, object] = field(default_factory=dict)
+    claims: list[tuple[int, object]] = field(default_factory=list)
     late: list[tuple[float, Callable[[], Any]]] = field(default_factory=list)
     calls: int = 0
 
@@ -141,6 +147,22 @@ class Store:
         for call in due:
             call()
 
+    def wrote(self, path: Path, writer: object) -> None:
+        """An object is there."""
+        self.times[path.name], self.writers[path.name] = self.calls, writer
+        if path.parent.name == CLAIMS:
+            self.claims.append((self.calls, writer))
+
+    def owner(self, calls: int) -> object:
+        """Who had claimed the store last, after so many calls."""
+        return next((owner for number, owner in reversed(self.claims) if number <= calls), None)
+
+    def apart(self, folder: Path) -> "Store":
+        """Its objects in another store, without the claims."""
+        if self.folder.is_dir():
+            shutil.copytree(self.folder, folder, ignore=shutil.ignore_patterns(CLAIMS))
+        return Store(folder, self.elapsed, self.times.copy(), self.writers.copy(), calls=self.calls)
+
 
 class FaultyStore(objects.ObjectArchive):
     """A store of segments: the calls of the real archive come to it one after the other.
@@ -150,19 +172,21 @@ class FaultyStore(objects.ObjectArchive):
         most_bytes: how many bytes are kept at most; 0 for any number.
         at: called at each of `STORE_PLACES`; returns what becomes of the call.
         give_way: lets others go on.
+        writer: whose past it is.
     """
 
-    def __init__(self, store: Store, most_bytes: int, at: At, give_way: Callable[[], None]) -> None:
+    def __init__(
+        self, store: Store, most_bytes: int, at: At, give_way: Callable[[], None], writer: object = None
+    ) -> None:
         super().__init__("s3://bucket", most_bytes)
         self._kept, self._at, self._give_way = store, at, give_way
         self._sends = False
-        self._made: Any = _FileSystem(store, self.path)
+        self._made: Any = _FileSystem(store, self.path, writer)
         self._damaged = 0
 
-    def write(self, file: str, content: bytes) -> Written:
-        """Write an object."""
+    def _put(self, file: str, content: bytes) -> None:
         self._sends = True
-        return super().write(file, content)
+        super()._put(file, content)
 
     def _ask(self, what: str, function: Callable[[], Any], seconds: float, size: int = 0) -> Any:
         del seconds, size
@@ -193,8 +217,8 @@ class FaultyStore(objects.ObjectArchive):
 class _FileSystem:
     """What an `ObjectArchive` needs of pyarrow's file systems; `torn` is whether it keeps half of what it is sent."""
 
-    def __init__(self, store: Store, root: Path) -> None:
-        self._store, self._root = store, root
+    def __init__(self, store: Store, root: Path, writer: object) -> None:
+        self._store, self._root, self._writer = store, root, writer
         self.torn = False
 
     def _file(self, key: str) -> Path:
@@ -208,7 +232,7 @@ class _FileSystem:
         path.parent.mkdir(parents=True, exist_ok=True)
         sent = content.getvalue()
         path.write_bytes(sent[: len(sent) // 2] if self.torn else sent)
-        self._store.times[path.name] = self._store.calls
+        self._store.wrote(path, self._writer)
 
     def open_input_file(self, key: str) -> BytesIO:
         return BytesIO(self._file(key).read_bytes())

@@ -17,6 +17,7 @@ from .cluster_plan import Plan
 from .core_life import CoreServer
 from .limit import SECONDS, EndlessError, bounded
 from .link_life import LinkedServer
+from .link_owners import LinkWorld
 from .model import Finding, Model
 from .past_plan import small_segments
 from .schedule import Schedule
@@ -59,8 +60,8 @@ def play(plan: Plan, seconds: float = SECONDS) -> Outcome:
 
 
 def _play(plan: Plan, seconds: float) -> Outcome:
-    if plan["layer"] == "cluster":
-        return _play_cluster(plan, seconds)
+    if "fates" in plan:
+        return _play_world(plan, seconds)
     with small_segments(plan.get("segment_rows")):
         return _play_lives(plan, seconds)
 
@@ -91,12 +92,13 @@ def _play_lives(plan: Plan, seconds: float) -> Outcome:
     return Outcome(lives, schedule.trace, model.finding, where)
 
 
-def _play_cluster(plan: Plan, seconds: float) -> Outcome:
+def _play_world(plan: Plan, seconds: float) -> Outcome:
+    world = LinkWorld if plan["layer"] == "links" else World
     model, schedule = Model(Limits(**plan["limits"])), Schedule(plan["seed"])
     where = ""
     try:
         with bounded(seconds):
-            World(plan, model, schedule).play()
+            world(plan, model, schedule).play()
     except Finding as finding:
         model.finds(str(finding))
         where = traceback.format_exc()

@@ -1,11 +1,13 @@
 """A simulated PostgreSQL: the table of owners, sessions, their locks and transactions, and copies made while it serves.
 
-It understands the statements of `dynhull_cluster.postgres.ownership`, and says what the board of a cluster reads.
+It understands the statements of `dynhull_cluster.postgres.ownership` and `marks`, and says what the board of a cluster
+reads.
 Sessions give way before and after each statement, and wait for rows that others have locked.
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, field, fields
 from operator import eq, ge
@@ -45,6 +47,9 @@ class Result:
     def fetchone(self) -> tuple[Any, ...] | None:
         return self.rows[0] if self.rows else None
 
+    def fetchall(self) -> Sequence[tuple[Any, ...]]:
+        return self.rows
+
 
 @dataclass(eq=False)
 class Session:
@@ -77,18 +82,37 @@ class Session:
         """End it, and its transaction."""
         self.database.end(self)
 
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """A transaction that is committed at the end of the block."""
+        self.execute("BEGIN")
+        try:
+            yield
+        except BaseException:
+            self.execute("ROLLBACK")
+            raise
+        self.execute("COMMIT")
+
 
 class Postgres:
     """A database, as sessions see it.
 
     Attributes:
         owners: the rows, by partition.
+        marks: what the database has put into its claim on the place of its past.
         sessions: the sessions that are open.
         reachable: whether anybody can connect.
     """
 
     def __init__(self) -> None:
         self.owners: dict[int, Row] = {}
+        self.marks: set[str] = set()
         self.sessions: list[Session] = []
         self.reachable = True
         self._renewals = 0
@@ -101,6 +125,7 @@ class Postgres:
         other = Postgres()
         begun = {partition: row for each in self.sessions for partition, row in each.before.items()}
         other.owners = {partition: copy(begun.get(partition, row)) for partition, row in self.owners.items()}
+        other.marks = self.marks.copy()
         other._renewals = self._renewals
         return other
 
@@ -135,7 +160,12 @@ class Postgres:
     # Statements
 
     def carry_out(self, session: Session, sql: str, values: list[Any]) -> Result:
-        if sql.startswith(("NOTIFY", "SET LOCAL")):
+        if sql.startswith(("NOTIFY", "SET LOCAL", "CREATE TABLE")):
+            return Result()
+        if sql.startswith("SELECT mark "):
+            return Result([(mark,) for mark in sorted(self.marks)])
+        if sql.startswith("INSERT INTO marks"):  # nothing comes between it and its COMMIT but the end of the session
+            self.marks.add(values[0])
             return Result()
         match sql.split()[0]:
             case "BEGIN":

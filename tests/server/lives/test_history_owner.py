@@ -97,10 +97,14 @@ def require_noticed(past, first, copied):
     one.remove("uid/nothing")
     other.claim()
     other.remove("uid/nothing")
-    for attempt in (lambda: one.remove("uid/name"), lambda: archive(past, first).claim()):
+    for attempt in (
+        lambda: one.remove("uid/name"),
+        lambda: one.write("uid/later.batches.parquet", b"what the other one would take for nobody's"),
+        lambda: archive(past, first).claim(),
+    ):
         with pytest.raises(OccupiedError, match=f"the past of a copy of this database.* remove {CLAIMS}/same"):
             attempt()
-    assert (past / "uid" / "name.batches.parquet").exists()
+    assert [each.name for each in (past / "uid").iterdir()] == ["name.batches.parquet"]
     (past / CLAIMS / "same").unlink()
     one.remove("uid/name")
     assert not (past / "uid").exists()

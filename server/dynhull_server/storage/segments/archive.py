@@ -106,6 +106,7 @@ class Archive:
         self.most_bytes = most_bytes
         self.most_age = most_age
         self._claimed: Claimant | None = None
+        self._own_claim = ""  # the claim that was last found to be the owner's
         self._known_mark = ""  # the next one, until it is in the claim: while a store is away there are no more
 
     def claim(self) -> None:
@@ -138,6 +139,8 @@ class Archive:
         if owner.marks is None:
             return
         content = self.content(f"{CLAIMS}/{owner.id}").decode(errors="replace")
+        if content == self._own_claim:  # each file asks, and marks stay known
+            return
         # Earlier versions had no mark. A claim with one of ours is ours, also where the store has added to it.
         if "\n" in content.strip() and not any(mark in content for mark in owner.marks.known()):
             raise OccupiedError(
@@ -146,6 +149,7 @@ class Archive:
                 "its own, with a copy of the files; or, if the other is never served again, remove "
                 f"{CLAIMS}/{owner.id} there"
             )
+        self._own_claim = content
 
     def require_free(self) -> None:
         """Raise OccupiedError if any database has its past here."""
@@ -169,8 +173,8 @@ class Archive:
         self._put(f"{CLAIMS}/{owner.id}", f"{owner.about}\n{self._known_mark}".encode())
         self._known_mark = ""
 
-    def _may_remove(self) -> None:
-        """Have this place for the owner alone still. Raises the errors of `claim`."""
+    def _require_own(self) -> None:
+        """Have this place for the owner alone still: a copy may have it by now. Raises the errors of `claim`."""
         self.claim()
         if self.owner is not None and self.owner.marks is not None:
             self._require_alone(self.owner)
@@ -184,9 +188,9 @@ class Archive:
 
         Raises:
             OSError: the disk is full, or fails.
-            OccupiedError: the past of another database is here.
+            OccupiedError: the past of another database is here, which would remove it.
         """
-        self.claim()
+        self._require_own()
         self._put(file, content)
         return written(content)
 
@@ -277,7 +281,7 @@ class Archive:
             OSError: one cannot be removed.
             OccupiedError: the past of another database is here.
         """
-        self._may_remove()
+        self._require_own()
         path = self.path / file
         for end in (BATCHES, STATE):
             for name in (path.name + end, path.name + end + TEMPORARY):

@@ -140,7 +140,7 @@ class ObjectArchive(Archive):
         Raises:
             OSError: one cannot be removed.
         """
-        self._may_remove()
+        self._require_own()
         for end in (BATCHES, STATE):
             self._drop(file + end)
 

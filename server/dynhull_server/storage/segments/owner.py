@@ -5,7 +5,8 @@ where there is none: of two that claim at the same moment, at least one sees the
 
 A copy of a disk, or of the files of PostgreSQL, has the same name. So each process that claims the place notes a random
 mark in its database, and then puts it into the claim. The marks of a database and of its copy differ from then on: who
-finds one in the claim that its database does not have is no longer alone, and removes nothing.
+finds one in the claim that its database does not have is no longer alone, and writes and removes nothing: what it has
+stays in its journal, where the other one would take a file that it does not know for nobody's, and remove it.
 """
 
 from dataclasses import dataclass, field
