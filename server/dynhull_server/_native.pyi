@@ -65,13 +65,13 @@ def puts_message(data: bytes) -> tuple[bytes, bool, list[tuple[int, bytes | None
     The name in a StreamRequest whose batches put keys, whether it may have several, and of each its number, the keys as integers, or None and their lengths and text, and the points; None if it has anything else, or none.
     """
 
-def acknowledged(sequence: int, revision: int, inserted: int, deleted: int, missing: int, hull_changed: bool, points: int) -> bytes:
-    """The StreamResponse to a batch with this result."""
+def acknowledged(sequence: int, fields: tuple[Any, ...]) -> bytes | None:
+    """
+    The StreamResponse with a result: its counts in the order of the fields, its clock, and the rows that are held. None if it has a clock or such rows.
+    """
 
 def results(outcomes: list[tuple[int, tuple[Any, ...]]]) -> bytes | None:
-    """
-    The StreamResponse with these results: of each its number, and its counts in the order of the fields, its clock, and the rows that are held. None if one has a clock or such rows.
-    """
+    """The same with several results and their numbers."""
 
 class LastPlaces:
     """Of each key the last place that batches of the journal give it."""

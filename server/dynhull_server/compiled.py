@@ -121,17 +121,8 @@ class Native(Protocol):
     ) -> "tuple[bytes, bool, list[tuple[int, bytes | None, bytes, bytes, bytes]]] | None":
         """The same of a message with batches that put keys."""
 
-    def acknowledged(
-        self,
-        sequence: int,
-        revision: int,
-        inserted: int,
-        deleted: int,
-        missing: int,
-        hull_changed: bool,
-        points: int,
-    ) -> bytes:
-        """A StreamResponse with a plain result: `acknowledgement` in rpc/short_batches.py."""
+    def acknowledged(self, sequence: int, fields: "tuple[Any, ...]") -> bytes | None:
+        """A StreamResponse with a result: `acknowledgement` in rpc/short_batches.py."""
 
     def results(self, outcomes: "list[tuple[int, tuple[Any, ...]]]") -> bytes | None:
         """A StreamResponse with several results: `acknowledgements` in rpc/short_batches.py."""

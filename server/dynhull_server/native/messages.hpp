@@ -27,15 +27,6 @@ enum PutsTag : std::uint8_t {
   INTEGERS = 0x22,
   POSITIONS = 0x12
 };
-enum NumberTag : std::uint8_t {
-  REVISION = 0x08,
-  INSERTED = 0x10,
-  DELETED = 0x18,
-  MISSING = 0x20,
-  HULL_CHANGED = 0x28,
-  POINTS = 0x30,
-  SEQUENCE = 0x10
-};
 constexpr std::size_t POINT_BYTES = 16;
 constexpr int LENGTH_BYTES = 5;  // of a length, at most
 constexpr int NUMBER_BYTES = 9;  // of a number that is read, at most: those of ten bytes are left to Python
@@ -190,16 +181,12 @@ inline std::optional<PutsMessage> puts_message(std::string_view data) {
   return found.batches.empty() ? std::nullopt : std::optional(std::move(found));
 }
 
-struct PlainResult {
-  std::uint64_t revision, inserted, deleted, missing, hull_changed, points;
-};
-
 // The numbers of the fields of a BatchResult that are counts or flags.
 constexpr std::uint8_t COUNTS[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 17, 18};
-constexpr std::uint8_t RESULTS = 0x1a;
+constexpr std::uint8_t RESULTS = 0x1a, SEQUENCE = 0x10;
 
-// Adds a NumberedResult to the bytes of a StreamResponse; `values` are those of COUNTS.
-inline void add_result(Bytes& response, std::uint64_t sequence, const std::uint64_t (&values)[std::size(COUNTS)]) {
+// A result and its number, as a StreamResponse and a NumberedResult have them; `values` are those of COUNTS.
+inline std::string numbered_result(std::uint64_t sequence, const std::uint64_t (&values)[std::size(COUNTS)]) {
   Bytes result, numbered;
   for (std::size_t i = 0; i < std::size(COUNTS); ++i) {
     if (values[i] == 0) continue;  // a field that has its default is left out
@@ -212,27 +199,7 @@ inline void add_result(Bytes& response, std::uint64_t sequence, const std::uint6
     numbered.byte(SEQUENCE);
     numbered.unsigned_integer(sequence);
   }
-  response.byte(RESULTS);
-  response.text(numbered.data);
-}
-
-inline std::string acknowledgement(std::uint64_t sequence, const PlainResult& result) {
-  Bytes body, message;
-  const auto put = [](Bytes& out, NumberTag tag, std::uint64_t number) {
-    if (number == 0) return;  // a field that has its default is left out
-    out.byte(tag);
-    out.unsigned_integer(number);
-  };
-  put(body, REVISION, result.revision);
-  put(body, INSERTED, result.inserted);
-  put(body, DELETED, result.deleted);
-  put(body, MISSING, result.missing);
-  put(body, HULL_CHANGED, result.hull_changed);
-  put(body, POINTS, result.points);
-  message.byte(RESULT);
-  message.text(body.data);
-  put(message, SEQUENCE, sequence);
-  return message.data;
+  return numbered.data;
 }
 
 }  // namespace dynhull_server

@@ -388,27 +388,30 @@ nb::object puts_of_message(const nb::bytes& data) {
   return nb::make_tuple(piece(found->name), found->several, batches);
 }
 
-nb::bytes acknowledged(std::uint64_t sequence, std::uint64_t revision, std::uint64_t inserted, std::uint64_t deleted,
-                       std::uint64_t missing, bool hull_changed, std::uint64_t points) {
-  const std::string data = acknowledgement(sequence, {revision, inserted, deleted, missing, hull_changed, points});
-  return nb::bytes(data.data(), data.size());
+// What a StreamResponse and a NumberedResult have of a result: its number, and the values of its fields. Nothing where
+// it has a clock, or rows that are held.
+std::optional<std::string> result_of(std::uint64_t sequence, const nb::tuple& fields) {
+  constexpr std::size_t CLOCK = std::size(COUNTS), HELD = CLOCK + 1;
+  if (fields.size() != HELD + 1) throw nb::value_error("a result has another number of values");
+  if (!fields[CLOCK].is_none() || nb::len(nb::object(fields[HELD])) != 0) return {};
+  std::uint64_t values[CLOCK];
+  for (std::size_t i = 0; i < CLOCK; ++i) values[i] = nb::cast<std::uint64_t>(fields[i]);
+  return numbered_result(sequence, values);
 }
 
-// Nothing where a batch has a clock, or rows that are held.
+nb::object acknowledged(std::uint64_t sequence, const nb::tuple& fields) {
+  const auto found = result_of(sequence, fields);
+  return found ? nb::object(nb::bytes(found->data(), found->size())) : nb::none();
+}
+
 nb::object results(const nb::list& outcomes) {
-  constexpr std::size_t CLOCK = std::size(COUNTS), HELD = CLOCK + 1;
   Bytes response;
   for (const nb::handle each : outcomes) {
     const nb::tuple outcome = nb::cast<nb::tuple>(each);
-    const nb::tuple counts = nb::cast<nb::tuple>(outcome[1]);
-    if (counts.size() != HELD + 1) throw nb::value_error("a result has another number of values");
-    if (!counts[CLOCK].is_none() || nb::len(nb::object(counts[HELD])) != 0) return nb::none();
-    std::uint64_t values[CLOCK];
-    for (std::size_t i = 0; i < CLOCK; ++i) {
-      values[i] = PyLong_AsUnsignedLongLong(nb::object(counts[i]).ptr());
-      if (PyErr_Occurred()) throw nb::python_error();
-    }
-    add_result(response, nb::cast<std::uint64_t>(outcome[0]), values);
+    const auto found = result_of(nb::cast<std::uint64_t>(outcome[0]), nb::cast<nb::tuple>(outcome[1]));
+    if (!found) return nb::none();
+    response.byte(RESULTS);
+    response.text(*found);
   }
   return nb::bytes(response.data.data(), response.data.size());
 }
@@ -503,13 +506,14 @@ NB_MODULE(_native, module) {
              "The name in a StreamRequest whose batches put keys, whether it may have several, and of each its number, "
              "the keys as integers, or None and their lengths and text, and the points; None if it has anything else, "
              "or none.");
-  module.def("acknowledged", &dynhull_server::acknowledged, "sequence"_a, "revision"_a, "inserted"_a, "deleted"_a,
-             "missing"_a, "hull_changed"_a, "points"_a, "The StreamResponse to a batch with this result.");
   module.def(
-      "results", &dynhull_server::results, "outcomes"_a,
-      nb::sig("def results(outcomes: list[tuple[int, tuple[typing.Any, ...]]]) -> bytes | None"),
-      "The StreamResponse with these results: of each its number, and its counts in the order of the fields, its "
-      "clock, and the rows that are held. None if one has a clock or such rows.");
+      "acknowledged", &dynhull_server::acknowledged, "sequence"_a, "fields"_a,
+      nb::sig("def acknowledged(sequence: int, fields: tuple[typing.Any, ...]) -> bytes | None"),
+      "The StreamResponse with a result: its counts in the order of the fields, its clock, and the rows that are "
+      "held. None if it has a clock or such rows.");
+  module.def("results", &dynhull_server::results, "outcomes"_a,
+             nb::sig("def results(outcomes: list[tuple[int, tuple[typing.Any, ...]]]) -> bytes | None"),
+             "The same with several results and their numbers.");
   using dynhull_server::LastPlaces;
   nb::class_<LastPlaces>(module, "LastPlaces", "Of each key the last place that batches of the journal give it.")
       .def(nb::new_(&dynhull_server::last_places), "kind"_a)

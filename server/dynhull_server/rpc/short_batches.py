@@ -5,6 +5,7 @@ for a single point.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
@@ -21,7 +22,7 @@ from .decode_batch import NO_INTEGERS, NO_STRINGS, UNSIGNED
 from .encode import encode_applied
 
 # What the result of a batch has, in the order of the fields of a message; then what only few results have.
-VALUES = attrgetter(
+FIELDS = attrgetter(
     "revision",
     "inserted",
     "deleted",
@@ -44,24 +45,21 @@ VALUES = attrgetter(
 MOST_BYTES = 2**18
 
 
-class PointsMessage:
-    """A message with points to insert or to delete.
+@dataclass(slots=True)
+class PointsMessage(Batch):
+    """A message with points to insert or to delete, which is the batch itself: for speed.
 
     Attributes:
         name: the name that it has of the hull; empty if it has none.
-        batch: the batch.
+        data: its bytes.
     """
 
-    __slots__ = ("_data", "batch", "name")
-
-    def __init__(self, data: bytes, name: bytes, batch: Batch) -> None:
-        self._data = data
-        self.name = name
-        self.batch = batch
+    name: bytes = b""
+    data: bytes = b""
 
     def whole(self) -> Any:
         """The message."""
-        return pb.StreamRequest.FromString(self._data)
+        return pb.StreamRequest.FromString(self.data)
 
 
 class PutsMessage:
@@ -99,11 +97,11 @@ def received(whole: Callable[[bytes], Received]) -> Callable[[bytes], Received]:
                 name, inserts, start = found
                 xy: Points | None = packed_points(data[start:])
                 if xy is not None:  # all coordinates are finite
-                    batch = Batch(xy, NO_POINTS, 0, False) if inserts else Batch(NO_POINTS, xy, 0, False)
-                    return PointsMessage(data, name, batch), len(data)
+                    rows = (xy, NO_POINTS) if inserts else (NO_POINTS, xy)
+                    return PointsMessage(*rows, 0, False, None, name, data), len(data)
             elif (puts := puts_message(data)) is not None:
-                name, several, rows = puts
-                batches = _keyed(rows)
+                name, several, columns = puts
+                batches = _keyed(columns)
                 if batches is not None:
                     return PutsMessage(data, name, several, batches), len(data)
         return whole(data)
@@ -132,26 +130,18 @@ def _keyed(rows: list[tuple[int, bytes | None, bytes, bytes, bytes]]) -> list[tu
 
 def acknowledgement(sequence: int, applied: Applied) -> bytes:
     """The response to a batch, serialized."""
-    if native is not None and applied.plain and not applied.duplicate:
-        return native.acknowledged(
-            sequence,
-            applied.revision,
-            applied.inserted,
-            applied.deleted,
-            applied.missing,
-            applied.hull_changed,
-            applied.points,
-        )
-    response = pb.StreamResponse(sequence=sequence)
-    encode_applied(applied, response.result)
-    data: bytes = response.SerializeToString()
+    data = None if native is None else native.acknowledged(sequence, FIELDS(applied))
+    if data is None:
+        response = pb.StreamResponse(sequence=sequence)
+        encode_applied(applied, response.result)
+        data = response.SerializeToString()
     return data
 
 
 def acknowledgements(outcomes: list[tuple[int, Applied]], most_bytes: int) -> pb.StreamResponse | bytes:
     """The response to several batches, perhaps serialized: then it has at most so many bytes."""
     if native is not None:
-        data = native.results([(sequence, VALUES(applied)) for sequence, applied in outcomes])
+        data = native.results([(sequence, FIELDS(applied)) for sequence, applied in outcomes])
         if data is not None and len(data) <= most_bytes:
             return data
     response = pb.StreamResponse()

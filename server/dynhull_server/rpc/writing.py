@@ -227,11 +227,10 @@ class StreamedBatches:
         """Send the batch of a message with points and nothing else; False if it has to be taken as a whole."""
         if self._producer or message.name not in self._own_names:
             return False
-        batch = message.batch
         self._arrivals.append(time.perf_counter())
-        if not self._batches.apply_points(batch):
+        if not self._batches.apply_points(message):
             rows = self._call.message_bytes // decode.BYTES_PER_POINT
-            self._batches.write_one(Write(self.name, batch, self._driver.time(), rows, "", 0, self._owner))
+            self._batches.write_one(Write(self.name, message, self._driver.time(), rows, "", 0, self._owner))
         return True
 
     def _take_puts(self, message: PutsMessage) -> bool:

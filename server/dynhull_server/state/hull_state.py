@@ -204,12 +204,13 @@ class HullState:
     def apply_points(self, batch: Batch) -> Applied | None:
         """Apply a batch to a hull whose points have neither keys nor times nor a globe, and record nothing.
 
-        None for another hull. Raises as `apply` does; then nothing has changed.
+        None for another hull, or one without room. Raises as `apply` does; then nothing has changed.
         """
         contents = self.contents
         if type(contents) is not Multiset or contents.globe is not None:
             return None
-        contents.admit(batch, 0)
+        if contents.points + len(batch.inserts) > contents.most_points:  # perhaps it is refused
+            return None
         applied = self._tear(batch)
         revision = applied.revision
         outlined = self._changed(revision) if applied.hull_changed else self.counts.outlined

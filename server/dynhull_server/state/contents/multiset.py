@@ -24,6 +24,10 @@ class Multiset:
         stored: the points.
         most_points: the limit on their number.
         globe: the frame of a geographic hull; None for a plane.
+
+    Attributes:
+        points: the number of points.
+        most_points: the limit on it.
     """
 
     clock: int | None = None
@@ -33,8 +37,8 @@ class Multiset:
     def __init__(self, stored: Contents, most_points: int, globe: Globe | None) -> None:
         self.hull = DynamicHull(stored.points) if globe is None else GeoHull(stored.points, globe.center)
         self.globe = globe
-        self._most_points = most_points
-        self._points, self._changes = len(self.hull), self.hull.changes
+        self.most_points = most_points
+        self.points, self._changes = len(self.hull), self.hull.changes
 
     def admit(self, batch: Batch | KeyedBatch, _: int) -> Batch:
         """The batch, or raise MisfitError or LimitExceededError."""
@@ -42,9 +46,8 @@ class Multiset:
             raise MisfitError(batch.field, NO_KEYS)
         if batch.times is not None:
             raise MisfitError("insert_times", "has no window, so its points have no times")
-        most = self._most_points
-        if self._points + len(batch.inserts) > most and self._points + batch.growth > most:
-            raise LimitExceededError("max_points", most)
+        if self.points + batch.growth > self.most_points:
+            raise LimitExceededError("max_points", self.most_points)
         if self.globe is not None:
             require_batch(self.globe, batch)
         return batch
@@ -69,9 +72,9 @@ class Multiset:
             deleted = apply_points(hull, batch)
         else:
             hull.insert_many(batch.inserts)
-        self._points += inserted - deleted
+        self.points += inserted - deleted
         self._changes = hull.changes
-        return Applied(revision, inserted, deleted, to_delete - deleted, self._changes != before, self._points)
+        return Applied(revision, inserted, deleted, to_delete - deleted, self._changes != before, self.points)
 
     def rows(self, batch: Batch, applied: Applied) -> PointRows:
         """The points of an applied batch."""
@@ -104,7 +107,7 @@ class Multiset:
             ops = np.repeat(np.array([1, -1], np.int8), [len(inserts), len(deletes)])
             missing: Literal["raise", "ignore"] = "ignore" if group[0].lenient else "raise"
             self.hull.apply(ops, np.concatenate([inserts, deletes]), missing)
-        self._points, self._changes = len(self.hull), self.hull.changes
+        self.points, self._changes = len(self.hull), self.hull.changes
 
     def stored(self) -> Contents:
         """The points. O(n)."""
