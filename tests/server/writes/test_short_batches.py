@@ -214,9 +214,9 @@ def test_reads_only_keys_that_it_understands() -> None:
     puts = [{"keys": keys, "points": [[1.0, 2.0]] * 2} for keys in (integers(1, 2), strings("a", "bc"))]
     examples = [numbered({**each, "sequence": number}, each) for each in puts for number in (0, 300)]
     examples += [numbered(each, name="abc") for each in puts]
-    for name in ("", "abc"):
+    for called in ("", "abc"):
         batch = pb.StreamRequest.FromString(numbered(puts[0])).batches[0].batch
-        examples.append(pb.StreamRequest(name=name, batch=batch).SerializeToString())
+        examples.append(pb.StreamRequest(name=called, batch=batch).SerializeToString())
     assert all(native.puts_message(data) for data in examples)
     short = 0
     for turn in range(20_000):
@@ -237,9 +237,9 @@ def test_reads_only_keys_that_it_understands() -> None:
         short += 1
         read = pb.StreamRequest(name=name.decode())
         for sequence, numbers, lengths, text, points in batches:
-            batch = read.batches.add(sequence=sequence).batch if several else read.batch
+            found_batch = read.batches.add(sequence=sequence).batch if several else read.batch
             keys = {"lengths": lengths, "text": text} if numbers is None else {"packed_integers": numbers}
-            batch.puts.CopyFrom(batch_pb2.Puts(keys=keys, points={"packed": points}))
+            found_batch.puts.CopyFrom(batch_pb2.Puts(keys=keys, points={"packed": points}))
         assert meant == read
     assert short > 1000
 
@@ -312,9 +312,9 @@ def test_equal_bytes_of_several_results() -> None:
     names = [each.name for each in fields(Applied) if each.name not in ("hull_changed", "duplicate", "clock", "held")]
     outcomes = []
     for _ in range(500):
-        numbers = {name: int(random.integers(2**63 - 1)) >> int(random.integers(64)) for name in names}
-        flags = {name: bool(random.integers(2)) for name in ("hull_changed", "duplicate")}
-        outcomes.append((int(random.integers(2**63 - 1)) >> int(random.integers(64)), Applied(**numbers, **flags)))
+        values: dict[str, Any] = {name: int(random.integers(2**63 - 1)) >> int(random.integers(64)) for name in names}
+        values |= {name: bool(random.integers(2)) for name in ("hull_changed", "duplicate")}
+        outcomes.append((int(random.integers(2**63 - 1)) >> int(random.integers(64)), Applied(**values)))
     of_few = Applied(5, 1, 0, 0, True, 9, clock=10**15), Applied(5, 1, 0, 0, True, 9, held=(1, 4))
     for several in (outcomes, [], outcomes[:1], [*outcomes[:2], (3, of_few[0])], [(0, of_few[1]), *outcomes[:2]]):
         response = pb.StreamResponse()
