@@ -177,7 +177,7 @@ def test_numbers_that_a_writer_refuses(address: str, connect: type[HullClient], 
 def test_many_batches_of_one_point_over_a_killed_server(tmp_path, connect: type[HullClient]) -> None:
     """Messages of many batches, and the server killed while some are under way: each batch once."""
     data = ("--data", str(tmp_path))
-    points = np.array([[i, i * i] for i in range(6000)], float)
+    points = np.array([[i, i * i] for i in range(2000)], float)
     with server_process(*data, killed=True) as first, connect(first.address, retries=0) as client:
         client.create_hull("a")
         writer = client.writer("a", producer="p", batch_points=1, in_flight=500, patience=0)

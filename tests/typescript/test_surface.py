@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from cases import slow
 from peers import program, typescript
 from run_in import run
 
@@ -149,6 +150,7 @@ def test_writers() -> None:
     assert ADDED_TO_WRITERS.keys() <= methods("writer.js")
 
 
+@slow
 def test_methods_have_the_parameters_of_the_python_sdk() -> None:
     said = run(
         program("node"),

@@ -114,7 +114,6 @@ def wrong_places(page: Page) -> tuple[int, int]:
     return int(np.sum((pixels[:, 0] > pixels[:, 2]) != red)), len(red)
 
 
-@pytest.mark.smoke
 def test_a_map_is_where_it_belongs(browser: Browser, address: str, name: str) -> None:
     with HullClient(address) as client, serving(TileServer()) as tiles:
         client.create_hull(name, geographic=True, center=(170, 60))
