@@ -32,7 +32,7 @@ help:  ## list these words
 demo: .venv/.demo  ## replay a real day of flights through a real server and verify every minute
 	$(BIN)/dynhull demo --day $(DAY)
 
-test: .venv/.test .venv/.peers  ## run the tests: all of them on two cores, or those of T, a path: make test T=tests/core
+test: .venv/.test .venv/.peers  ## run the tests, but for those of `make slow`, on two cores, or those of T, a path: make test T=tests/core
 	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) COVERAGE_CORE=$(COVERAGE_CORE) $(BIN)/pytest $(or $(T),$(WORKERS) $(COVERAGE))
 
 FUZZ_THREADS := $(CXX) -std=c++20 -O1 -g -ffp-contract=off -pthread -DDYNHULL_FAIL_ALLOCATIONS
@@ -71,7 +71,7 @@ properties: .venv/.test  ## other and many more random examples for the tests of
 slow: .venv/.test .venv/.peers  ## what `make test` leaves to this word: short runs of the tortures and the fuzzers, faults that must be found, notebooks, pages in a browser
 	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) SLOW_CASES=all BROWSER_CASES=all $(BIN)/pytest $(WORKERS) -m only_with $(or $(T),tests)
 
-browser: .venv/.test .venv/.peers  ## the dashboard's pages in a real Chromium; `make test` opens one of each kind
+browser: .venv/.test .venv/.peers  ## the dashboard's pages in a real Chromium, some of which `make test` opens
 	TMPDIR=$(or $(TMPDIR),$(MEMORY),/tmp) BROWSER_CASES=all $(BIN)/pytest tests/dashboard tests/gateway/test_past_holes.py -n 2 --dist loadfile
 
 long: .venv/.test  ## all cases of the tests of which `make test` runs every third to seventh

@@ -7,7 +7,7 @@ from hypothesis import settings
 
 ALL_CASES = os.environ.get("CLUSTER_CASES") == "all"
 with_all_cases = pytest.mark.only_with("CLUSTER_CASES")  # many servers start, or again and again
-in_browser = pytest.mark.only_with("BROWSER_CASES")  # pages in a real Chromium, beyond one of each kind
+in_browser = pytest.mark.only_with("BROWSER_CASES")  # pages in a real Chromium, but for some
 slow = pytest.mark.only_with("SLOW_CASES")  # tortures, fuzzers and the like, in short runs
 
 

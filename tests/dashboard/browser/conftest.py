@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Pages in a browser take a fifth of the processor time of all tests: `make test` opens one of each kind."""
+    """Pages in a browser take a fifth of the processor time of all tests: `make test` opens some."""
     for item in items:
         in_page = "browser" in getattr(item, "fixturenames", ()) and item.path.parent == HERE
         if in_page and item.get_closest_marker("smoke") is None:
