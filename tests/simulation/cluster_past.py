@@ -234,12 +234,16 @@ class SharedPast:
             self.others, other.others = [other], [self]
             self.has_shared = other.has_shared = True
         else:
-            other.move(self._store)
+            other._store = self._store.apart(Path(other._home.name) / "copied")
         return other
 
-    def move(self, store: Store) -> None:
-        """Have a store of its own, with the objects of another one, which has been shared so far."""
-        self._store = store.apart(Path(self._home.name) / "copied")
+    def move(self) -> None:
+        """Have a store of its own, with the objects of the one that has been shared so far.
+
+        What was late there never comes: the claim of who has gone would stand against the one who has stayed.
+        """
+        self._store.late.clear()
+        self._store = self._store.apart(Path(self._home.name) / "copied")
         for other in self.others:
             other.others = []
         self.others = []

@@ -362,7 +362,7 @@ class LinkWorld(World):
                 for process in self.processes:
                     if process.site is site:
                         process.end()
-                past.move(past._store)
+                past.move()
         super()._look()
 
     def _probe(self, site: Site, name: str) -> None:

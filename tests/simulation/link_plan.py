@@ -62,7 +62,7 @@ def _owners_plan(draw: random.Random, seed: int) -> Plan:
     fates = [_fate(draw) for _ in range(draw.randint(4, 14))]
     if draw.random() < WITH_COPY:
         shares = draw.random() < SHARED
-        place = draw.randint(1, 3) if shares else draw.randint(1, len(fates))
+        place = draw.randint(1, min(5, len(fates)) if shares else len(fates))
         begins: Operation = {"do": "start", "who": 0, "site": 1}
         after = [draw.choice((0, 1)), draw.choice((2, 6) if shares else (0, 2))]  # both are written to for a while
         fates[place:place] = [
@@ -72,10 +72,13 @@ def _owners_plan(draw: random.Random, seed: int) -> Plan:
     creates = [{"do": "create", "name": name, "rows": 1, "history": FOREVER, "history_bytes": 0} for name in NAMES]
     clients = [[_of_owners(draw) for _ in range(draw.randint(4, 14))] for _ in range(draw.randint(1, 3))]
     copied = [[_of_owners(draw) for _ in range(draw.randint(2, 8))] for _ in range(draw.choice((1, 2)))]
-    clients.append(_written_until_filed(draw, draw.choice(NAMES)))
+    name = draw.choice(NAMES)
+    clients.append(_written_until_filed(draw, name))
     for client in clients[:-1]:
         client[:0] = draw.sample(creates, draw.choice((0, 0, 1)))
     clients[-1][:0] = creates
+    if draw.random() < 0.4:  # what was filed goes
+        clients[-1].append(_asked(draw, "delete", name))
     # What a gateway sends again may come to another hull of that name: so a plan has either numbers or deletions.
     numbered = draw.random() < 0.5
     for client in (*clients, *copied):

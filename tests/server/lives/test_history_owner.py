@@ -118,6 +118,21 @@ def test_a_copy_of_a_disk_which_has_the_same_name_is_noticed_before_anything_is_
     require_noticed(tmp_path / "past", FolderMarks(first), lambda: FolderMarks(shutil.copytree(first, next(copies))))
 
 
+def test_a_claim_of_which_a_store_keeps_a_part_is_that_of_its_owner(tmp_path):
+    data, past = tmp_path / "data", tmp_path / "past"
+    data.mkdir()
+    archive(past, FolderMarks(data)).claim()
+    copy = FolderMarks(shutil.copytree(data, tmp_path / "copy"))
+    for size in range(len((past / CLAIMS / "same").read_bytes())):
+        archive(past, FolderMarks(data)).claim()
+        claim = past / CLAIMS / "same"
+        claim.write_bytes(claim.read_bytes()[:size])
+        archive(past, FolderMarks(data)).claim()
+    claim.write_bytes(claim.read_bytes()[:-1])
+    with pytest.raises(OccupiedError, match="the past of a copy of this database"):
+        archive(past, copy).claim()
+
+
 def test_a_place_that_cannot_be_written_adds_no_marks(tmp_path):
     (tmp_path / "data").mkdir()
     past, marks = tmp_path / "past", FolderMarks(tmp_path / "data")

@@ -141,8 +141,10 @@ class Archive:
         content = self.content(f"{CLAIMS}/{owner.id}").decode(errors="replace")
         if content == self._own_claim:  # each file asks, and marks stay known
             return
-        # Earlier versions had no mark. A claim with one of ours is ours, also where the store has added to it.
-        if "\n" in content.strip() and not any(mark in content for mark in owner.marks.known()):
+        # Earlier versions had no mark. A claim with one of ours is ours, also where the store has added to it, or has
+        # kept a part of it.
+        about, _, last = content.strip().rpartition("\n")
+        if about and not any(mark in content or mark.startswith(last) for mark in owner.marks.known()):
             raise OccupiedError(
                 f"{self.path} has the past of a copy of this database, or of what this is a copy of, which was served "
                 "since: each of the two would remove what the other one needs. Give one of them a --history-dir of "
