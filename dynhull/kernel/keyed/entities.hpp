@@ -255,7 +255,7 @@ class Entities {
 
  private:
   static constexpr std::size_t TOGETHER = 16;   // keys whose cache misses overlap
-  static constexpr std::size_t LOOKAHEAD = 16;  // rows whose slot is being prefetched
+  static constexpr std::size_t LOOKAHEAD = 16;  // rows whose slot, or entry, is being prefetched
   static constexpr std::size_t MOST = 3;        // of so many slots one moves from which on the tree is built anew
 
   // A NaN that is the time of no entity.
@@ -321,6 +321,7 @@ class Entities {
       if (entities_.slots_.reserve(absent_, bytes_)) entities_.ages_.reset();
       entities_.table_.reserve(absent_);
       for (std::size_t i = 0; i < keys.size(); ++i) {
+        if (i + LOOKAHEAD < keys.size()) entities_.table_.fetch(rows_[i + LOOKAHEAD].tag);
         if (rows_[i].slot != NONE) continue;
         const auto same = [&](std::uint32_t slot) {
           return keys.same(entities_.slots_.arena(), i, entities_.slots_[slot].key);

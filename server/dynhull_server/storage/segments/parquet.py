@@ -10,6 +10,7 @@ from __future__ import annotations
 from base64 import b64encode
 from bisect import bisect_left
 from functools import cache, partial
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -508,7 +509,7 @@ def _by_key(file: pq.ParquetFile) -> RowsByKey:
     known = {*of_rows, *same, *apart, "revision", "row"}
     columns = [name for name in file.schema_arrow.names if name not in known]
     detail: dict[int, str] = {}
-    codes, words, at = np.full(count, NONE, np.int32), _Words(identity, distinct=distinct), 0
+    codes, words, at = np.full(count, NONE, np.int32), _Words(identity, _size(file, "key"), distinct=distinct), 0
     for group in range(file.num_row_groups):
         table = file.read_row_group(group, columns=columns, use_threads=False)
         rows = slice(at, at + len(table))
@@ -532,6 +533,13 @@ def _by_key(file: pq.ParquetFile) -> RowsByKey:
     return RowsByKey(identity, *placed, of_revisions, of_rows, codes, words.keys, detail)
 
 
+def _size(file: pq.ParquetFile, name: str) -> int:
+    """The bytes of a column, not compressed: not fewer than the words in it have, each once in a group."""
+    place = file.schema_arrow.names.index(name)
+    groups = range(file.num_row_groups)
+    return sum(int(file.metadata.row_group(group).column(place).total_uncompressed_size) for group in groups)
+
+
 def _add_arrays(of_rows: dict[str, npt.NDArray[Any]], table: pa.Table, rows: slice, count: int) -> None:
     """Write the columns of words, positions and numbers of a group to where its rows are among all."""
     for name, values in _arrays(table).items():
@@ -545,13 +553,18 @@ def _add_arrays(of_rows: dict[str, npt.NDArray[Any]], table: pa.Table, rows: sli
 
 
 class _Words:
-    """The keys of groups of rows, which lie by key, and a number for each of them."""
+    """The keys of groups of rows, which lie by key, and a number for each of them.
 
-    def __init__(self, identity: Identity, *, distinct: bool) -> None:
+    Their bytes lie one after the other, in a block with room for `most` bytes: to grow would take new memory.
+    """
+
+    def __init__(self, identity: Identity, most: int, *, distinct: bool) -> None:
         self._identity = identity
         self._distinct = distinct  # as in a state, where every row has another one
-        self._parts: list[pa.Array] = []
+        self._lengths, self._text = BytesIO(), BytesIO(bytes(most))  # integers have no lengths
         self._count = 0
+        self._last: str | int | None = None
+        self._array: pa.Array | None = None
 
     def numbers(self, column: pa.ChunkedArray) -> npt.NDArray[np.int32]:
         """The numbers of the keys of the next group, NONE for no key. The first may be the last one before it."""
@@ -565,42 +578,47 @@ class _Words:
             codes[codes != NONE] = np.cumsum(begins, dtype=np.int32) - 1
             words = words.filter(pa.array(begins))
         first = self._count
-        if first and len(words) and words[0] == self._parts[-1][-1]:
+        if first and len(words) and words[0].as_py() == self._last:
             first -= 1
             words = words[1:]
         if len(words):
-            self._parts.append(words.cast(pa.uint64() if self._identity == "int" else pa.string()))
-            self._count += len(words)
+            self._add(words)
         if first:
             codes = np.where(codes == NONE, np.int32(NONE), codes + np.int32(first))
         return codes
 
+    def _add(self, words: pa.Array) -> None:
+        import pyarrow as pa
+
+        self._last = words[-1].as_py()
+        self._count += len(words)
+        if self._identity == "int":
+            self._text.write(words.cast(pa.uint64()).to_numpy(zero_copy_only=False))
+            return
+        lengths, text = _text(words.cast(pa.string()))
+        self._lengths.write(lengths.tobytes())
+        self._text.write(text)
+
     def keys(self, codes: npt.NDArray[np.int32]) -> Keys:
-        """The keys with some numbers. Strings in order are copied once, from their parts: new memory takes its time."""
+        """The keys with some numbers; all strings in order are those that are there, and not copied."""
+        ascending = bool((codes[1:] > codes[:-1]).all())
+        self._text.truncate()
+        if self._identity == "str" and len(codes) == self._count and ascending:
+            return PackedKeys(self._lengths.getvalue(), self._text.getvalue())
+        if self._array is None:
+            self._array = self._all()
+        return _packed(self._array, codes, self._identity)
+
+    def _all(self) -> pa.Array:
+        """All keys as an array over their bytes."""
         import pyarrow as pa
 
-        if self._identity == "int" or not bool((codes[1:] > codes[:-1]).all()):
-            return _packed(self._together(), codes, self._identity)
-        parts, first, texts = self._parts, 0, []
-        bounds = np.searchsorted(codes, np.cumsum([0, *map(len, parts)])).tolist()
-        for part, start, end in zip(parts, bounds, bounds[1:], strict=False):
-            texts.append(_text(part if end - start == len(part) else part.take(pa.array(codes[start:end] - first))))
-            first += len(part)
-        keys = PackedKeys(*(b"".join(each) for each in zip(*texts, strict=True)) if texts else (b"", b""))
-        if len(keys) == self._count:  # all of them: the parts are not needed any more
-            ends = np.zeros(len(keys) + 1, np.int32)
-            np.cumsum(np.frombuffer(keys.lengths, np.uint8), out=ends[1:])
-            self._parts = [pa.StringArray.from_buffers(len(keys), pa.py_buffer(ends), pa.py_buffer(keys.data))]
-        return keys
-
-    def _together(self) -> pa.Array:
-        """All keys as one array."""
-        import pyarrow as pa
-
-        if len(self._parts) != 1:
-            kind = pa.uint64() if self._identity == "int" else pa.string()
-            self._parts = [pa.concat_arrays([pa.array([], kind), *self._parts])]
-        return self._parts[0]
+        text = self._text.getvalue()
+        if self._identity == "int":
+            return pa.array(np.frombuffer(text, np.uint64))
+        ends = np.zeros(self._count + 1, np.int32)
+        np.cumsum(np.frombuffer(self._lengths.getvalue(), np.uint8), out=ends[1:])
+        return pa.StringArray.from_buffers(self._count, pa.py_buffer(ends), pa.py_buffer(text))
 
 
 def _of_revisions(file: pq.ParquetFile, names: list[str], placed: _Placed) -> dict[str, Integers]:
@@ -658,7 +676,9 @@ def _placed(file: pq.ParquetFile) -> _Placed:
     if places.max() >= count:
         raise ValueError("a row is missing")
     rows = np.full(count, NONE, np.int32)
-    rows[places] = np.arange(count, dtype=np.int32)
+    for at in range(0, count, GROUP_ROWS):  # a part at a time: numpy makes other numbers of those that it is given
+        some = places[at : at + GROUP_ROWS]
+        rows[some] = np.arange(at, at + len(some), dtype=np.int32)
     if rows.min() == NONE:
         raise ValueError("a row is missing")
     return _Placed(first, starts, places, rows)
