@@ -10,7 +10,7 @@ from ._fence_index import FenceIndex
 from ._geo import GeoHull, GeoKeyedHull, GeoWindowHull
 from ._hull import DynamicHull, MissingPointError
 from ._implementation import KERNEL, set_threads
-from ._keyed import KeyedHull, KeyedLoader, Put
+from ._keyed import KeyedHull, KeyedLoader, PackedHull, Put
 from ._predicates import orient2d
 from ._window import WindowHull
 from .static import convex_hull
@@ -28,6 +28,7 @@ __all__ = [
     "KeyedLoader",
     "MissingKeyError",
     "MissingPointError",
+    "PackedHull",
     "Put",
     "WindowHull",
     "__version__",

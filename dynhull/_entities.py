@@ -161,6 +161,12 @@ class Entities(HullTree):
             self._whole = True
             self._apply_net(Counter(p for p, _ in self._held.values()))
 
+    def packed(self, most: int) -> PackedEntities | None:
+        """What was loaded, in place of `end_load`; None if it is more than so many entities. O(n log n)."""
+        if self._whole:
+            raise ValueError("only what is being loaded is packed so")
+        return PackedEntities(self) if len(self._held) <= most else None
+
     def put(self, key: Any, x: float, y: float, time: float | None, only: Only | None) -> bool:
         """Insert or move one entity. True if the hull changed. O(log² n)."""
         checked = as_key(key, self.key_type)
@@ -389,3 +395,19 @@ def distinct(keys: Keys) -> list[Any]:
             if first != row:
                 raise DuplicateKeyError(key, (first, row))
     return listed
+
+
+class PackedEntities:
+    """Entities that nobody has used since they were loaded; in the kernel they take less memory so."""
+
+    def __init__(self, entities: Entities) -> None:
+        entities.end_load()
+        self._entities = entities
+        self._size, self.distinct, self.vertex_count = len(entities), entities.distinct, len(entities.vertices())
+
+    def __len__(self) -> int:
+        return self._size
+
+    def entities(self) -> Entities:
+        """The entities, each time others."""
+        return self._entities.copy()

@@ -142,6 +142,22 @@ class HullTree:
         Insert the rows with +1 and delete those with -1, as a set. Returns the number of rows applied. A row that deletes a missing point raises KeyError(x, y, row), unless `ignore_missing`. `together` forces divide and conquer (True) or one change after the other (False); by default the batch decides.
         """
 
+class PackedEntities:
+    """Entities that nobody has used since they were loaded."""
+
+    def __len__(self) -> int: ...
+
+    @property
+    def distinct(self) -> int:
+        """The number of distinct places."""
+
+    @property
+    def vertex_count(self) -> int:
+        """The number of vertices."""
+
+    def entities(self) -> Entities:
+        """The entities, which are put together when they are used."""
+
 class Entities:
     """Entities and their convex hull: see dynhull's class in Python."""
 
@@ -257,6 +273,11 @@ class Entities:
 
     def end_load(self) -> None:
         """Build the tree. O(n log n)."""
+
+    def packed(self, most: int) -> PackedEntities | None:
+        """
+        What was loaded, in place of `end_load`; None if it is more than so many entities. O(n log n).
+        """
 
     def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool:
         """Insert or move one entity. True if the hull changed. O(log² n)."""

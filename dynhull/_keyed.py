@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -296,6 +296,13 @@ class KeyedHull(Keyed, Hull):
         """
         return KeyedLoader(cls(key_type, ordered=ordered), room)
 
+    @classmethod
+    def unpacked(cls, packed: PackedHull) -> KeyedHull:
+        """A hull of what `KeyedLoader.packed` has returned. O(n), and O(n log n) when it is used."""
+        hull = cls.__new__(cls)
+        hull._tree, hull._measured = packed.entities(), UNMEASURED
+        return hull
+
     # As a value
 
     def __getstate__(self) -> tuple[KeyType, bool, tuple[Keys, Points, npt.NDArray[np.float64]], int]:
@@ -307,6 +314,24 @@ class KeyedHull(Keyed, Hull):
         self._tree.load(*entities)
         self._tree.changes = changes
         self._measured = (changes, {})
+
+
+class PackedHull(Protocol):
+    """The entities of a hull that is made when it is needed: see `KeyedLoader.packed`."""
+
+    @property
+    def distinct(self) -> int:
+        """The number of distinct places."""
+
+    @property
+    def vertex_count(self) -> int:
+        """The number of vertices."""
+
+    def __len__(self) -> int:
+        """The number of entities."""
+
+    def entities(self) -> Entities | _kernel.Entities:
+        """For `KeyedHull.unpacked`."""
 
 
 class KeyedLoader:
@@ -342,6 +367,26 @@ class KeyedLoader:
         hull._tree.end_load()
         self._hull = None
         return hull
+
+    def packed(self, most: int) -> PackedHull | None:
+        """The entities in the least memory, in place of their hull, which `KeyedHull.unpacked` makes when it is needed.
+
+        None if they are more than `most`: then they stay. What is returned knows their number as its `len`, the number
+        of their places as `distinct`, and that of the vertices as `vertex_count`. O(n log n).
+
+        >>> from dynhull import KeyedHull
+        >>> loader = KeyedHull.loader()
+        >>> loader.update(["LH400", "UA17"], [(0, 0), (4, 0)])
+        >>> packed = loader.packed(1000)
+        >>> len(packed), packed.vertex_count
+        (2, 2)
+        >>> KeyedHull.unpacked(packed).keys()
+        ['LH400', 'UA17']
+        """
+        packed = self._loading()._tree.packed(most)
+        if packed is not None:
+            self._hull = None
+        return packed
 
     def _loading(self) -> KeyedHull:
         if self._hull is None:

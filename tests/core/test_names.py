@@ -16,7 +16,16 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "library"
 PACKAGES = {
     "dynhull": {
         *("KERNEL", "DynamicHull", "MissingPointError", "WindowHull", "convex_hull", "orient2d", "set_threads"),
-        *("KeyedHull", "KeyedLoader", "Put", "DuplicateKeyError", "MissingKeyError", "FenceIndex", "Crossings"),
+        *(
+            "KeyedHull",
+            "KeyedLoader",
+            "PackedHull",
+            "Put",
+            "DuplicateKeyError",
+            "MissingKeyError",
+            "FenceIndex",
+            "Crossings",
+        ),
         *("GeoHull", "GeoKeyedHull", "GeoWindowHull"),
         *("arrays", "keys", "measure", "robust", "static"),  # imported with it
     },

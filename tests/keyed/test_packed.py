@@ -86,6 +86,7 @@ def test_every_call_is_tried():
         "pack": None,
         "begin_load": None,  # nobody has the hull before it is loaded
         "end_load": None,
+        "packed": None,
         "load": "update",
         "apply_all": "update",
         "apply_each": "update",
@@ -169,7 +170,7 @@ def test_not_while_an_index_compares_them():
 
 
 def test_memory():
-    """A third of it, and what the columns take, of each key what the one before has not."""
+    """Less than a third of it: what differs in each column, and of each key what the one before has not."""
     hull = filled()
     _, before = hull._tree.memory
     assert hull.pack()
@@ -177,13 +178,18 @@ def test_memory():
     in_common = sum(
         len(list(takewhile(lambda pair: pair[0] == pair[1], zip(*two, strict=False)))) for two in pairwise(NAMES)
     )
-    assert used == packed == 100 * (16 + 2) + sum(map(len, NAMES)) - in_common
-    assert packed < before / 2.5
+    # Places between 0 and 1 have their first byte in common, and no key has a time; names have different lengths.
+    assert used == packed == 4 * 8 + 100 * 2 * 7 + 8 + 100 * 2 + sum(map(len, NAMES)) - in_common
+    assert packed < before / 3
     hull.locate(ANY)
     assert hull._tree.memory[1] <= before
     times = filled(times=np.arange(100.0), key_type="int")
     assert times.pack()
-    assert times._tree.memory[1] == 100 * (16 + 8 + 8)
+    assert times._tree.memory[1] == 4 * 8 + 100 * (2 * 7 + 1 + 8) + 8
+    alike = KeyedHull()
+    alike.put_many([f"key-{number:03}" for number in range(100)], PLACES)
+    assert alike.pack()
+    assert alike._tree.memory[1] == 4 * 8 + 100 * 2 * 7 + 8 + 100 + len("key-") + 3 + 9 * 2 + 90
 
 
 def test_threads_that_use_it_meanwhile():
@@ -220,3 +226,83 @@ def test_threads_that_use_it_meanwhile():
             end.set()
         assert packing.result() > 0
     hull.check()
+
+
+COLUMNS = {
+    "alike": np.array([[13.37 + i / 1e4, 52.51 - i / 1e4] for i in range(100)]),
+    "one place": np.full((100, 2), 0.1),
+    "far apart": np.array([[(-1) ** i * 10.0 ** (i - 50), i * 5e-324] for i in range(100)]),
+    "one axis": np.array([[i, 7.0] for i in range(100)]),
+    "zeros": np.array([[0.0, -0.0]] * 100),
+}
+KEYS = {
+    "in a row": list(range(10**6, 10**6 + 100)),
+    "far apart": [(2**64 - 1) // 99 * i for i in range(100)],
+    "one length": [f"key-{i:03}" for i in range(100)],
+    "all lengths": ["é" * (i + 1) + "x" for i in range(100)],
+}
+
+
+@pytest.mark.parametrize("columns", COLUMNS)
+@pytest.mark.parametrize("of", KEYS)
+def test_every_bit_of_the_columns_comes_back(columns, of):
+    keys, places = KEYS[of], COLUMNS[columns]
+    hull = KeyedHull("str" if isinstance(keys[0], str) else "int")
+    hull.update(keys, places, places[:, 0])
+    vertices = hull.vertices()
+    assert hull.pack()
+    assert hull.vertices().tobytes() == vertices.tobytes()
+    assert hull.positions(keys).tobytes() == (places + 0.0).tobytes()
+    assert hull.times(keys).tobytes() == (places[:, 0]).tobytes()
+    hull.check()
+
+
+def test_the_vertices_leave_it_packed_once():
+    hull, twin = filled(), filled()
+    assert hull.pack()
+    _, packed = hull._tree.memory
+    for taken_out in (False, True):
+        assert hull.vertices().tolist() == twin.vertices().tolist()
+        assert (hull._tree.memory[1] > packed) is taken_out
+    hull.put("new", 9, 9)
+    twin.put("new", 9, 9)
+    assert hull.pack()
+    assert hull.vertices().tolist() == twin.vertices().tolist()
+    assert hull == twin
+
+
+@pytest.mark.parametrize("key_type", ["str", "int"])
+@pytest.mark.parametrize("ordered", [False, True])
+def test_a_loader_packs_what_it_has(key_type, ordered):
+    loader, twin = (KeyedHull.loader(key_type, ordered=ordered) for _ in range(2))
+    keys, times = NAMES if key_type == "str" else list(range(100)), np.arange(100.0)
+    for each in (loader, twin):
+        each.update(keys, PLACES, times)
+        each.update(keys[:50], PLACES[50:], times[:50] - 25)
+        each.remove_many(keys[90:])
+    assert loader.packed(89) is None, "it goes on"
+    packed, expected = loader.packed(90), twin.hull()
+    assert (len(packed), packed.distinct, packed.vertex_count) == (
+        *(len(expected), expected.distinct),
+        len(expected.vertices()),
+    )
+    first, second = (KeyedHull.unpacked(packed) for _ in range(2))
+    assert first.ordered is ordered
+    assert first == expected
+    first.check()
+    first.clear()
+    assert second == expected, "one is not the other"
+    for call in (loader.hull, lambda: loader.packed(100), lambda: loader.update(keys, PLACES, times)):
+        with pytest.raises(ValueError, match="the loader has given its hull away"):
+            call()
+
+
+def test_a_loader_that_has_nothing():
+    packed = KeyedHull.loader().packed(0)
+    assert (len(packed), packed.distinct, packed.vertex_count) == (0, 0, 0)
+    hull = KeyedHull.unpacked(packed)
+    assert hull.vertices().tolist() == []
+    hull.put("a", 1, 2)
+    assert hull.keys() == ["a"]
+    with pytest.raises(ValueError, match="only what is being loaded is packed so"):
+        hull._tree.packed(1)

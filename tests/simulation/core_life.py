@@ -18,6 +18,7 @@ from dynhull_server.engine.group_commit import GroupCommit
 from dynhull_server.engine.server_time import ServerTime
 from dynhull_server.engine.threads import Clock, Threads
 from dynhull_server.engine.watch_fence import Sent, following
+from dynhull_server.state import dormant
 from dynhull_server.state.admission import TICK
 from dynhull_server.state.alarms.status import AlarmStatus
 from dynhull_server.state.alarms.watched import WatchedHulls
@@ -184,7 +185,7 @@ class CoreServer:
         self.core = Core(limits, contents.next_number, immediate=storage.immediate)
         numbers = [row.number for row in contents.hulls]
         for row, kept in zip(contents.hulls, storage.read_each(numbers), strict=True):
-            self.core.restore(row, HullState(limits, row.settings, kept, now=0.0), len(kept.records))
+            self.core.restore(row, dormant.loaded(limits, row.settings, kept, now=0.0), len(kept.records))
         fences = storage.read_fences([row.number for row in contents.fences])
         self.core.restore_fences([each for each in fences if each is not None])
         turns: Any = NoThreads()

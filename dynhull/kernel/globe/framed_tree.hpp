@@ -133,6 +133,13 @@ class FramedTree {
     plane_.take_back(std::move(same.plane_));
   }
 
+  // The vertices of points that `take_back` would bring.
+  std::vector<Point> vertices_aside(const Point* points, std::size_t count) const {
+    FramedTree same{Frame(frame_)};
+    same.take_back(points, count);
+    return same.vertices();
+  }
+
   // Visits every distinct point in order, with its number of copies.
   template <class Visit>
   void for_each(Visit visit) const {

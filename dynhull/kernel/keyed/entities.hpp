@@ -80,6 +80,7 @@ class Entities {
     rebuild(tree);
     whole_ = true;
   }
+  bool is_put_off() const { return !whole_; }
 
   // Throws DuplicateKey; then, and after every other exception, nothing has changed.
   template <class Keys>
@@ -203,6 +204,15 @@ class Entities {
     std::swap(slots_, slots);
     table_.swap(table);
     packed_ = Packed();
+  }
+  // What `pack` would hold, and for a new one to hold it: `unpack` comes next.
+  Packed packed() const { return Packed(slots_); }
+  void hold(Packed packed) { packed_ = std::move(packed); }
+  // The vertices while it is packed, which it stays.
+  std::vector<Point> packed_vertices(const FramedTree& tree) const {
+    const Scratch<Point> places(packed_.size());
+    packed_.places(places.data());
+    return tree.vertices_aside(places.data(), packed_.size());
   }
 
   // Whether the names of all these places that are vertices are known. If not, `name` makes them known.

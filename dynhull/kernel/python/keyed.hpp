@@ -15,6 +15,32 @@ using Doubles = nb::ndarray<const double, nb::shape<-1>, nb::c_contig, nb::devic
 
 inline nb::object entities_module(const char* name) { return nb::module_::import_("dynhull._entities").attr(name); }
 
+// The entities of a hull that nobody has used since they were loaded, and what is known of it.
+class PackedEntities {
+ public:
+  PackedEntities(bool strings, bool ordered, Packed packed)
+      : packed_(std::move(packed)), strings_(strings), ordered_(ordered) {
+    const Scratch<Point> places(packed_.size());
+    packed_.places(places.data());
+    const HullTree tree(places.data(), packed_.size());
+    distinct_ = static_cast<std::uint32_t>(tree.distinct());
+    vertices_ = static_cast<std::uint32_t>(vertices_of(tree).size());
+  }
+
+  bool strings() const { return strings_; }
+  bool ordered() const { return ordered_; }
+  std::size_t size() const { return packed_.size(); }
+  std::size_t distinct() const { return distinct_; }
+  std::size_t vertex_count() const { return vertices_; }
+
+  const Packed& packed() const { return packed_; }
+
+ private:
+  Packed packed_;
+  std::uint32_t distinct_, vertices_;
+  bool strings_, ordered_;
+};
+
 class KeyedHull : public Hull {
   // Calls `work` with one key, as given and as a Python object, both checked.
   template <class Work>
@@ -42,6 +68,12 @@ class KeyedHull : public Hull {
   KeyedHull(std::string_view key_type, bool ordered, Frame frame)
       : Hull(std::move(frame)), entities_(key_type == "str", ordered) {}
 
+  // Puts itself together when it is used.
+  explicit KeyedHull(const PackedEntities& packed) : entities_(packed.strings(), packed.ordered()) {
+    entities_.hold(Packed(packed.packed()));
+    put_away();
+  }
+
   const char* key_type() const { return strings() ? "str" : "int"; }
   bool ordered() const { return entities_.ordered; }
 
@@ -63,6 +95,13 @@ class KeyedHull : public Hull {
   void end_load() {
     const WriteLock lock(lock_);
     entities_.build(tree_);
+  }
+  // What was loaded, in place of `end_load`; nothing if it is more than so many.
+  std::optional<PackedEntities> packed(std::size_t most) {
+    const WriteLock lock(lock_);
+    if (!entities_.is_put_off()) throw nb::value_error("only what is being loaded is packed so");
+    if (entities_.size() > most) return {};
+    return PackedEntities(strings(), ordered(), entities_.packed());
   }
 
   bool put(const nb::object& key, nb::handle x, nb::handle y, const nb::object& time, const nb::object& only) {
@@ -216,6 +255,12 @@ class KeyedHull : public Hull {
     return slots;
   }
 
+  // The vertices; the first time of a hull that is put away without taking it out, as who asks once may ask all hulls.
+  PointArray vertices() {
+    if (!lock_.put_away() || std::exchange(peeked_, true)) return Hull::vertices();
+    return array_of(entities_.packed_vertices(tree_));
+  }
+
   // Puts the hull away until it is used, `idle` unless it has been used since the last such call. Whether it is.
   bool pack(bool idle) {
     if (lock_.put_away()) return true;
@@ -226,10 +271,7 @@ class KeyedHull : public Hull {
       return false;
     }
     forget_index();
-    lock_.put_away(this, [](void* hull) {
-      auto* const self = static_cast<KeyedHull*>(hull);
-      self->entities_.unpack(self->tree_);
-    });
+    put_away();
     return true;
   }
 
@@ -298,6 +340,14 @@ class KeyedHull : public Hull {
     }
   }
 
+  void put_away() {
+    peeked_ = false;
+    lock_.put_away(this, [](void* hull) {
+      auto* const self = static_cast<KeyedHull*>(hull);
+      self->entities_.unpack(self->tree_);
+    });
+  }
+
   std::uint32_t slot_of(const GivenKeys& given) {
     settled();
     std::uint32_t found = NONE;
@@ -359,6 +409,7 @@ class KeyedHull : public Hull {
   }
 
   Entities entities_;
+  bool peeked_ = false;  // at the vertices, since it was put away
 };
 
 }  // namespace dynhull

@@ -159,6 +159,7 @@ void add_hull_tree(nb::module_& module) {
 }
 
 void add_entities(nb::module_& module) {
+  nb::class_<PackedEntities> packed(module, "PackedEntities", "Entities that nobody has used since they were loaded.");
   nb::class_<KeyedHull> type(module, "Entities", "Entities and their convex hull: see dynhull's class in Python.");
   add_reads(type)
       .def(nb::init<std::string_view, bool>(),
@@ -175,6 +176,8 @@ void add_entities(nb::module_& module) {
       .def("begin_load", &KeyedHull::begin_load, "room"_a = 0,
            "Put off the tree, for some calls of `load` and `remove_many`; with room for that many entities.")
       .def("end_load", &KeyedHull::end_load, "Build the tree. O(n log n).")
+      .def("packed", &KeyedHull::packed, "most"_a,
+           "What was loaded, in place of `end_load`; None if it is more than so many entities. O(n log n).")
       .def("put", &KeyedHull::put,
            nb::sig("def put(self, key: object, x: float, y: float, time: float | None, only: str | None) -> bool"),
            "key"_a.none(), "x"_a.none(), "y"_a.none(), "time"_a.none(), "only"_a.none(),
@@ -201,6 +204,12 @@ void add_entities(nb::module_& module) {
            "The least key at each place, None where there is none.")
       .def("vertex_keys", &KeyedHull::vertex_keys, nb::sig("def vertex_keys(self) -> list[typing.Any]"),
            "The least key at each vertex, in the order of `vertices`.");
+  packed.def("__len__", &PackedEntities::size)
+      .def_prop_ro("distinct", &PackedEntities::distinct, "The number of distinct places.")
+      .def_prop_ro("vertex_count", &PackedEntities::vertex_count, "The number of vertices.")
+      .def(
+          "entities", [](const PackedEntities& packed) { return new KeyedHull(packed); },
+          "The entities, which are put together when they are used.");
 }
 
 void add_fences(nb::module_& module) {

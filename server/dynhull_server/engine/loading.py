@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from ..state.core import Core
+from ..state.dormant import Dormant, loaded
 from ..state.hull_state import HullState
 from ..state.records import HullRow, Kept
-from ..state.root_state import state_of
 from ..state.trip import unsaved_of
 from ..storage.port import FollowedStorage, Progress, Storage, StoredContents
 from .driver import Driver
@@ -23,7 +23,7 @@ class _Loaded:
     """A hull that is loaded, and not yet in the core; `unsaved` is the number of points since its last snapshot."""
 
     row: HullRow
-    state: HullState
+    state: HullState | Dormant
     unsaved: int
 
 
@@ -62,8 +62,8 @@ class Loader:
 
     def restore(self, core: Core) -> None:
         """Move the hulls into a core."""
-        for loaded in self._loaded.values():
-            core.restore(loaded.row, loaded.state, loaded.unsaved)
+        for each in self._loaded.values():
+            core.restore(each.row, each.state, each.unsaved)
         self._loaded.clear()
 
     def _catch_up(self) -> None:
@@ -74,6 +74,8 @@ class Loader:
             {number: each.state.counts.revision for number, each in self._loaded.items()}
         ):
             hull = self._loaded[number]
+            if isinstance(hull.state, Dormant):
+                hull.state = hull.state.wake(hull.row.settings)
             hull.state.catch_up(records, now)
             hull.unsaved += sum(map(unsaved_of, records))
 
@@ -89,11 +91,11 @@ class Loader:
         """
         clock = self._driver.machine.clock
         until = clock.monotonic() + LOAD
-        loaded = []
+        found = []
         for row, kept in stored:
-            state = state_of(self._driver.limits, row.settings, kept, now=clock.monotonic())
-            state.put_away(idle=False)
-            loaded.append(_Loaded(row, state, sum(map(unsaved_of, kept.records))))
-            if clock.monotonic() > until:
+            now = clock.monotonic()
+            state = loaded(self._driver.limits, row.settings, kept, now)
+            found.append(_Loaded(row, state, sum(map(unsaved_of, kept.records))))
+            if now > until:
                 break
-        return loaded
+        return found

@@ -22,5 +22,5 @@ class Resting:
         """Put away the points of small hulls that nobody has used since the last round."""
         slices = Slices()
         for hull in list(self._hulls()):
-            hull.state.put_away(idle=True)
+            hull.put_away()
             await slices.others()

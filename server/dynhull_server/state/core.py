@@ -15,6 +15,7 @@ occupies all of these queues. The hulls that a fence depends on share one queue:
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
+from .dormant import Dormant
 from .errors import (
     DiskFullError,
     HullNotFoundError,
@@ -224,7 +225,7 @@ class Core:
                 return True
         return False
 
-    def restore(self, row: HullRow, state: HullState, unsaved: int) -> None:
+    def restore(self, row: HullRow, state: HullState | Dormant, unsaved: int) -> None:
         """Add a hull that the storage has kept. Call this before the first step."""
         hull = self._registry.hulls[row.name] = Hull(row, state, unsaved)
         self._queues.add(hull)
@@ -602,7 +603,7 @@ class Core:
         else:
             for leg, state in found:
                 if leg.before is not None and state is not None:
-                    leg.before.state = state
+                    leg.before.replace(state)
             if trip.quiet is not None:
                 trip.quiet.look_again(trip.legs)
             if trip.fences is not None:

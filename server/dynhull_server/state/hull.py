@@ -1,7 +1,12 @@
 """A hull as clients see it: its committed state."""
 
+from threading import Lock
+
+from .dormant import Dormant
 from .hull_state import Counts, HullState
 from .records import CommitStamp, HullRow
+
+WAKING = Lock()
 
 
 class Hull:
@@ -9,7 +14,7 @@ class Hull:
 
     Attributes:
         row: its identity and settings, as stored.
-        state: its points; read and change them only in a trip of its queue.
+        state: its points; read and change them only in a trip of its queue. They are made when they are needed.
         counts: the counts at the latest committed revision.
         committed: the commit of its latest revision, or of its creation, or a later one before anything else was
             published; None for one of formats that did not store it.
@@ -21,11 +26,18 @@ class Hull:
         ended: whether it has been deleted.
     """
 
-    __slots__ = ("between", "committed", "counts", "divided", "due", "ended", "row", "state", "timed", "unsaved")
+    __slots__ = (
+        *("_dormant", "between", "committed", "counts", "divided", "due", "ended", "row", "state", "timed", "unsaved"),
+    )
 
-    def __init__(self, row: HullRow, state: HullState, unsaved: int = 0) -> None:
+    def __init__(self, row: HullRow, state: HullState | Dormant, unsaved: int = 0) -> None:
         self.row = row
-        self.state = state
+        self._dormant: Dormant | None = None
+        self.state: HullState
+        if isinstance(state, Dormant):
+            self._dormant = state
+        else:
+            self.state = state
         self.counts: Counts = state.counts
         self.committed: CommitStamp | None = state.committed
         self.unsaved = unsaved
@@ -34,6 +46,30 @@ class Hull:
         self.timed = row.settings.identity != "multiset" or row.settings.window is not None
         self.divided = row.settings.divided
         self.due: int | None = None
+
+    def __getattr__(self, name: str) -> HullState:
+        """The state, where it has not been made: otherwise it is found before this is asked."""
+        if name != "state":
+            raise AttributeError(f"a hull has no {name!r}")
+        with WAKING:  # a thread may need it that reads, and the event loop
+            if self._dormant is not None:
+                self.state, self._dormant = self._dormant.wake(self.row.settings), None
+        return self.state
+
+    def replace(self, state: HullState) -> None:
+        """Have this state, which the storage has."""
+        with WAKING:
+            self.state, self._dormant = state, None
+
+    def put_away(self) -> None:
+        """Hold the keys of a small hull in less memory, if nobody has used them since the last call."""
+        if self._dormant is None:
+            self.state.put_away(idle=True)
+
+    @property
+    def next_due(self) -> int | None:
+        """The time by the server's clock before which no point leaves; None if that clock makes none leave."""
+        return None if self._dormant is not None else self.state.next_due
 
     @property
     def name(self) -> str:
@@ -48,4 +84,5 @@ class Hull:
     @property
     def vertex_count(self) -> int:
         """The number of vertices when they were last read."""
-        return self.state.vertex_count
+        dormant = self._dormant
+        return self.state.vertex_count if dormant is None else dormant.vertex_count

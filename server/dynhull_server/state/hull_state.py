@@ -77,7 +77,8 @@ class HullState:
         settings: the settings of the hull.
         kept: the hull as stored.
         now: the time by the server's monotonic clock.
-        contents: what `begun` has made of the points of `kept`, which then belongs to this; None to begin here.
+        contents: what `replayed` has made of `kept`, which then belongs to this; None to do that here.
+        counts: the counts after it, so that the contents need not be asked; None to do so.
     """
 
     __slots__ = (
@@ -99,23 +100,31 @@ class HullState:
     )
 
     def __init__(
-        self, limits: Limits, settings: HullSettings, kept: Kept, now: float, contents: LiveContents | None = None
+        self,
+        limits: Limits,
+        settings: HullSettings,
+        kept: Kept,
+        now: float,
+        contents: LiveContents | None = None,
+        counts: Counts | None = None,
     ) -> None:
         self.torn = False
-        self.contents = contents = replayed(kept, settings, limits.points_of(settings), contents)
+        if contents is None:
+            contents = replayed(kept, settings, limits.points_of(settings))
+        self.contents = contents
         self.hull: AnyHull = contents.hull
         self._limits = limits
         self._producers: Producers | None = None  # most of ten thousand hulls have none
-        if sequences := _last_sequences(kept):
-            self._producers = self._new_producers(sequences, _skipping(kept), now)
-        self._stand_at(kept)
+        if sequences := last_sequences(kept):
+            self._producers = self._new_producers(sequences, skipping_of(kept), now)
+        self._stand_at(kept, counts)
 
-    def _stand_at(self, kept: Kept) -> None:
+    def _stand_at(self, kept: Kept, counts: Counts | None = None) -> None:
         """Derive what follows from the points, as of the last revision: what was before it is not known."""
         last = kept.last_revision
         self.committed = kept.records[-1].committed if kept.records else kept.committed
         self._follow_center()
-        self.counts = self._counted(last, len(self.hull), _last_cause(kept), self.center, last)
+        self.counts = counts or self._counted(last, len(self.hull), last_cause(kept), self.center, last)
         self._vertices = self.hull.vertices().copy()  # a copy of a few vertices takes a third of the memory
         self._vertices.setflags(write=False)
         self._vertices_as_of = self.hull.changes
@@ -478,7 +487,8 @@ def key_array(hull: AnyKeyedHull, keys: Sequence[str | int | None]) -> VertexKey
     return np.array(keys, object if hull.key_type == "str" else np.uint64)
 
 
-def _last_cause(kept: Kept) -> Cause | None:
+def last_cause(kept: Kept) -> Cause | None:
+    """What made the last revision; None where that is not known."""
     return _cause_of(kept.records[-1]) if kept.records else None
 
 
@@ -493,7 +503,8 @@ def _cause_of(record: Record) -> Cause:
     return "expiry" if isinstance(record.rows, Expiry) else "batch"
 
 
-def _last_sequences(kept: Kept) -> dict[str, int]:
+def last_sequences(kept: Kept) -> dict[str, int]:
+    """The last number of each producer."""
     last = dict(kept.producers)
     for record in kept.records:
         if record.producer:
@@ -501,5 +512,6 @@ def _last_sequences(kept: Kept) -> dict[str, int]:
     return last
 
 
-def _skipping(kept: Kept) -> frozenset[str]:
+def skipping_of(kept: Kept) -> frozenset[str]:
+    """The producers that may skip numbers."""
     return kept.skipping | {record.producer for record in kept.records if record.may_skip}

@@ -62,7 +62,8 @@ class Registry:
     @property
     def latest_time(self) -> int | None:
         """The latest time of the server's clock that a hull or fence has recorded, None for none. O(both)."""
-        clocks = [hull.counts.clock for hull in self.hulls.values() if hull.state.follows_server]
+        dated = [hull for hull in self.hulls.values() if hull.counts.clock is not None]
+        clocks = [hull.counts.clock for hull in dated if hull.state.follows_server]
         clocks += [fence.time for fence in self.fences.values() if fence.time != NO_TIME]
         return max((clock for clock in clocks if clock is not None), default=None)
 

@@ -5,6 +5,7 @@ It follows what its shards have done, and decides nothing.
 
 from collections.abc import Sequence
 
+from .contents import replayed
 from .contents.live import LiveContents
 from .hull_state import Counts, HullState
 from .limits import Limits
@@ -118,4 +119,5 @@ def state_of(
     """A hull with these settings as stored; its contents may have begun before, unless it is divided."""
     if settings.divided:
         return RootState(limits, settings, kept, now)
+    contents = replayed(kept, settings, limits.points_of(settings), contents)
     return HullState(limits, settings, kept, now, contents)

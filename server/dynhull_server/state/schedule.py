@@ -30,7 +30,7 @@ class Schedule:
 
     def plan(self, hull: Hull) -> None:
         """Plan when points of a hull leave next. No trip of the hull is in progress."""
-        due = hull.state.next_due
+        due = hull.next_due
         if due is not None and (hull.due is None or due < hull.due):
             hull.due = due
             heappush(self._hulls, (due, hull.row.number, hull.name))

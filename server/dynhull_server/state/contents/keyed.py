@@ -7,7 +7,7 @@ from itertools import compress
 import numpy as np
 import numpy.typing as npt
 
-from dynhull import DuplicateKeyError, GeoKeyedHull, KeyedHull, KeyedLoader, Put
+from dynhull import DuplicateKeyError, GeoKeyedHull, KeyedHull, KeyedLoader, PackedHull, Put
 from dynhull.arrays import Points
 from dynhull.keys import key_list
 
@@ -132,7 +132,7 @@ class Keyed:
         self.hull: AnyKeyedHull
         self._loader: KeyedLoader | None = None
         if globe is None:
-            self.hull = KeyedHull(self._kind, ordered=settings.by_event_time)
+            self._loader = KeyedHull.loader(self._kind, ordered=settings.by_event_time)
         else:
             self.hull = GeoKeyedHull(self._kind, ordered=settings.by_event_time, center=globe.center)
         self.follows_server = settings.window is None or settings.window.clock == "server"
@@ -369,14 +369,10 @@ class Keyed:
         times = None if stored.times is None else library_times(stored.times)
         if self._loader is not None:
             self._loader.update(keys, stored.points, times)
-        elif self.globe is not None:
+        else:
+            center = None if self.globe is None else self.globe.center
             self.hull = GeoKeyedHull.from_entities(
-                keys,
-                stored.points,
-                times,
-                self._kind,
-                ordered=self._settings.by_event_time,
-                center=self.globe.center,
+                keys, stored.points, times, self._kind, ordered=self._settings.by_event_time, center=center
             )
         if stored.times is not None:
             self._note_times(stored.times)
@@ -389,6 +385,17 @@ class Keyed:
         """Build the hull of what was stored, and of the changes after it that have been replayed. O(n log n)."""
         if self._loader is not None:
             self.hull, self._loader = self._loader.hull(), None
+
+    def packed(self, most: int) -> PackedHull | None:
+        """The keys and their places, in place of `build`; None if they have anything else, or are more than `most`."""
+        more = self.timed or self.clock is not None or self.quarantine is not None
+        if self._loader is None or more or len(self._deadlines) or len(self._accuracies):
+            return None
+        return self._loader.packed(most)
+
+    def hold(self, hull: KeyedHull) -> None:
+        """Have the hull of what `packed` has returned, in place of `build`."""
+        self.hull, self._loader = hull, None
 
     def _load_after(self, rows: KeyRows) -> None:
         """Have a change as if it had been stored, where it only puts and removes keys: the hull is built once."""
