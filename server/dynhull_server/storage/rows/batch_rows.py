@@ -2,15 +2,11 @@
 
 import struct
 from collections.abc import Iterator
-from functools import lru_cache
 from typing import Any
 
 from ...state.records import CommitStamp, Record
 from .encoding import checksum, decode
 from .tables import COMMITS_SINCE
-
-# Rows of one commit share its stamp: those of thousands of hulls, as a fleet has written them.
-STAMPS_KEPT = 1024
 
 
 def commit_columns(version: int) -> str:
@@ -35,12 +31,7 @@ def is_whole(stored: Any, payload: Any, *values: Any) -> bool:
 
 def batch_records(payload: bytes, first: int, number: int | None, time: int | None) -> Iterator[Record]:
     """The records of a row with this commit. ValueError if the payload has none."""
-    commit = None if number is None or time is None else _stamp(number, time)
+    commit = None if number is None or time is None else CommitStamp(number, time)
     for record in decode(payload, first):
         record.committed = commit
         yield record
-
-
-@lru_cache(STAMPS_KEPT)
-def _stamp(number: int, time: int) -> CommitStamp:
-    return CommitStamp(number, time)
