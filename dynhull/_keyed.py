@@ -87,7 +87,7 @@ class Keyed(Live):
         Raises:
             DuplicateKeyError: a key comes twice.
         """
-        return Put._make(self._tree.update(keys, xy, times, _known(only)))
+        return Put._make(self._tree.update(keys, xy, times, only if only is None else _known(only)))
 
     def remove(self, key: str | int) -> bool:
         """Remove an entity. Returns whether the hull changed. O(log² n).

@@ -63,7 +63,7 @@ class BatchStream:
         birth = self._birth()
         requests = [WriteBatch(self, write, birth, self._stream) for write in writes]
         self.batches += len(requests)
-        self.rows += sum(write.rows for write in writes)
+        self.rows += sum([write.rows for write in writes])
         if requests:
             self._driver.dispatch(Arrived(requests))
 

@@ -238,7 +238,8 @@ class StreamedBatches:
         batches, producer = message.batches, self._producer
         if message.name not in self._own_names or (message.several and not self.several):
             return False
-        if len(batches) > MOST_IN_A_MESSAGE or any((sequence > 0) is not (producer != "") for sequence, _ in batches):
+        numbered = [number > 0 for number, _ in batches]
+        if len(batches) > MOST_IN_A_MESSAGE or numbered.count(producer != "") < len(batches):
             return False
         arrived, rows = self._driver.time(), self._call.message_bytes // decode.BYTES_PER_POINT // len(batches)
         name, owner, may_skip = self.name, self._owner, self._may_skip

@@ -417,7 +417,7 @@ class Core:
         trip = self._new_trip(queues, requests)
         if trip.fences is not None:
             rows = max(rows, trip.fences.weight)
-        if rows > SMALL_TRIP or (rows > SMALL and any(request.rows > SMALL for request in requests)):
+        if rows > SMALL_TRIP or (rows > SMALL and max([request.rows for request in requests]) > SMALL):
             effects.append(Compute(trip))
             return trip
         trip.run()

@@ -258,8 +258,11 @@ class HullState:
 
     def decoded(self, write: Write) -> Any:
         """The batch, admitted; raises the error that refuses it, unless that depends on the points of the hull."""
+        content = write.content
+        if isinstance(content, Exception):
+            raise content
         try:
-            return self.contents.admit(write.batch, write.arrived)
+            return self.contents.admit(content, write.arrived)
         except MisfitError as misfit:
             raise HullUnsuitableError(write.name, str(misfit), field=f"batch.{misfit.field}") from None
 

@@ -231,7 +231,7 @@ class Trip:
             self.fences.hull_deleted(leg.name, request.time)
 
     def _write(self, request: WriteBatch) -> None:
-        leg = self.legs[request.name]
+        leg = self.legs[request.write.name]
         stream, hull = request.stream, leg.after
         if stream is not None and stream.stopped:
             request.abandoned = True

@@ -427,8 +427,9 @@ class Keyed:
             self.mirror.change(rows)
         removed = hull.remove_many(rows.removes, missing="ignore") if len(rows.removes) else 0
         written = None
-        has_deadlines = rows.deadlines is not None or len(self._deadlines) > 0
-        has_accuracies = rows.accuracies is not None or len(self._accuracies) > 0
+        deadlines, accuracies = self._deadlines, self._accuracies
+        has_deadlines = rows.deadlines is not None or (deadlines is not NO_DEADLINES and len(deadlines) > 0)
+        has_accuracies = rows.accuracies is not None or (accuracies is not NO_ACCURACIES and len(accuracies) > 0)
         if has_deadlines or has_accuracies:
             written = self._written(rows)
         put = NOTHING_PUT
