@@ -68,17 +68,28 @@ class Building {
 
   static std::size_t middle(std::size_t first, std::size_t last) { return first + (last - first) / 2; }
 
-  // The tree over the leaves first..last.
+  // The tree over the leaves first..last. Some leaves at a time are filled before they are joined: between joins, which
+  // look here and there, the processor does not foresee which points and which leaf come next.
   Ref subtree(std::size_t first, std::size_t last) const {
-    if (last - first > 1) {
+    constexpr std::size_t FILLED_AT_ONCE = 128;
+    if (last - first > FILLED_AT_ONCE) {
       const std::size_t cut = middle(first, last);
       return joined(cut, subtree(first, cut), subtree(cut, last));
     }
-    const std::size_t from = start(first), to = start(last);
-    Leaf& leaf = nodes_.leaf(site_.leaves[first]);
+    for (std::size_t leaf = first; leaf < last; ++leaf) fill(leaf);
+    return filled(first, last);
+  }
+  // The same over leaves that have their points.
+  Ref filled(std::size_t first, std::size_t last) const {
+    if (last - first == 1) return site_.leaves[first];
+    const std::size_t cut = middle(first, last);
+    return joined(cut, filled(first, cut), filled(cut, last));
+  }
+  void fill(std::size_t number) const {
+    const std::size_t from = start(number), to = start(number + 1);
+    Leaf& leaf = nodes_.leaf(site_.leaves[number]);
     leaf.assign(points_ + from, static_cast<unsigned>(to - from));
-    for (Side side : SIDES) site_.seams[side][first] = {leaf.chain[side], NONE, NONE};
-    return site_.leaves[first];
+    for (Side side : SIDES) site_.seams[side][number] = {leaf.chain[side], NONE, NONE};
   }
   // The same, once the subtrees `levels` below it are there.
   Ref top(std::size_t first, std::size_t last, unsigned levels) const {
