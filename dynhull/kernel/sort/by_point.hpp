@@ -107,13 +107,10 @@ template <class R>
 void sort_by_point(R* rows, R* scratch, std::size_t count) {
   constexpr std::size_t SMALL = 24;
   if (count < SMALL) return insertion_sort(rows, rows + count);
-  Range range;
-  bool sorted = true;
-  for (std::size_t i = 0; i < count; ++i) {
-    range.add(point(rows[i]).x);
-    sorted &= i == 0 || point(rows[i - 1]) <= point(rows[i]);
-  }
-  if (sorted) return;
+  std::size_t in_order = 1;
+  while (in_order < count && point(rows[in_order - 1]) <= point(rows[in_order])) ++in_order;
+  if (in_order == count) return;
+  const Range range = Range::of<&Point::x>(rows, count);
   const bool done = range.least < range.greatest
                         ? sort_along<&Point::x>(rows, scratch, count, range)
                         : sort_along<&Point::y>(rows, scratch, count, Range::of<&Point::y>(rows, count));
