@@ -29,3 +29,18 @@ def test_many_points(kind, scale):
         np.testing.assert_array_equal(convex_hull(rows), expected)
     if scale == 1.0:  # in Python alone; `test_large` of tests/static has numbers of all sizes
         np.testing.assert_array_equal(convex_hull(xy), monotone_chain(xy))
+
+
+def test_a_large_hull_keeps_its_memory():
+    """The array of a large hull is the block that it was made in, and such blocks are used again."""
+    random = np.random.default_rng(4)
+    circles = [cloud("circle", 300_000, random) for _ in range(2)]
+    hulls = [convex_hull(rows) for rows in circles]
+    copies = [hull.copy() for hull in hulls]
+    assert 2 * len(hulls[0]) > 300_000
+    del hulls[0]
+    again = convex_hull(circles[0])
+    trees = [_kernel.HullTree(rows).vertices() for rows in circles]
+    for hull, copy, tree in zip([again, hulls[0]], copies, trees, strict=True):
+        np.testing.assert_array_equal(hull, copy)
+        np.testing.assert_array_equal(hull, tree)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <utility>
 
 #include "pages.hpp"
@@ -13,15 +14,46 @@ struct Block {
   std::size_t bytes;
 };
 
+// One large block that the process keeps for its next build: to clear fresh pages is up to a quarter of what a build
+// costs. Threads do not wait for each other here, nor does a child for a thread that it has not got: who finds another
+// one here does without.
+class LargeBlock {
+ public:
+  static Block take(std::size_t bytes) {
+    if (allocation_fails()) throw std::bad_alloc();
+    Block block = {};
+    if (!busy_.test_and_set(std::memory_order_acquire)) {
+      if (kept_.bytes >= bytes) block = std::exchange(kept_, {});
+      busy_.clear(std::memory_order_release);
+    }
+    return block.bytes > 0 ? block : Block{memory::resize(nullptr, 0, bytes), bytes};
+  }
+  static void give_back(Block block) {
+    if (block.bytes <= MOST && !busy_.test_and_set(std::memory_order_acquire)) {
+      if (kept_.bytes < block.bytes) std::swap(kept_, block);
+      busy_.clear(std::memory_order_release);
+    }
+    memory::release(block.data, block.bytes);
+  }
+
+ private:
+  static constexpr std::size_t MOST = std::size_t{1} << 25;  // the C library keeps freed blocks of up to 32 MB, too
+
+  static inline std::atomic_flag busy_;
+  static inline Block kept_ = {};
+};
+
 // Blocks that a thread keeps for its next batch. The C library would return free memory of this size to the system,
 // which hands it out again page by page, zeroed: a tenth of the cost of a large batch.
 class BlockCache {
  public:
   static Block take(std::size_t bytes) {
+    if (bytes >= memory::LARGE) return LargeBlock::take(bytes);
     if (!worth_keeping(bytes)) return {bytes > 0 ? memory::resize(nullptr, 0, bytes) : nullptr, bytes};
     return of_this_thread().smallest_with(bytes);
   }
   static void give_back(Block block) {
+    if (block.bytes >= memory::LARGE) return LargeBlock::give_back(block);
     if (worth_keeping(block.bytes)) block = of_this_thread().replace_smallest(block);
     memory::release(block.data, block.bytes);
   }
