@@ -310,10 +310,4 @@ void for_ranges(std::size_t count, std::size_t a_thread, Work work) {
   threads.run(ranges, [&](std::size_t i) { work(count * i / ranges, count * (i + 1) / ranges); });
 }
 
-// Runs both, at the same time if `threads` and if a thread helps.
-template <class First, class Second>
-void both(bool threads, First first, Second second) {
-  Threads(threads ? 2 : 1).run(2, [&](std::size_t task) { task == 0 ? first() : second(); });
-}
-
 }  // namespace dynhull

@@ -5,7 +5,6 @@
 // (Andrew 1979) with exact orientations. Two threads share each pass over the points, and then build one chain each.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -22,14 +21,13 @@ class StaticHull {
  public:
   using Part = std::span<const Point>;
 
-  StaticHull(Part first, Part second, bool threads) : threads_(threads), parts_{first, second} {
+  // Uses two of the threads, if there are two.
+  StaticHull(Part first, Part second, Threads& threads) : threads_(threads), parts_{first, second} {
     find_ends();
     if (!finite_ || size() == 0) return;
     place();
     Point *lower_end, *upper_end;
-    both(
-        threads_, [&] { lower_end = chain(0, least_, greatest_); },
-        [&] { upper_end = chain(width_, greatest_, least_); });
+    both([&] { lower_end = chain(0, least_, greatest_); }, [&] { upper_end = chain(width_, greatest_, least_); });
     // Both chains include both ends.
     Point* const memory = memory_->data();
     if (lower_end > memory + 1) lower_end = std::copy(memory + starts_[width_], upper_end - 1, lower_end);
@@ -45,23 +43,30 @@ class StaticHull {
  private:
   std::size_t size() const { return parts_[0].size() + parts_[1].size(); }
 
+  template <class First, class Second>
+  void both(First first, Second second) {
+    threads_.run(2, [&](std::size_t task) { task == 0 ? first() : second(); });
+  }
+
   void find_ends() {
     Point least[2] = {}, greatest[2] = {};
     bool finite[2] = {true, true};
     const auto find = [&](int part) {
       if (parts_[part].empty()) return;
       Point low = parts_[part].front(), high = low;
-      bool all_finite = true;
-      for (Point p : parts_[part]) {
-        all_finite &= (p.x - p.x == 0) & (p.y - p.y == 0);
-        if (p.x <= low.x && p < low) low = p;
-        if (p.x >= high.x && p > high) high = p;
+      Plain plain;
+      for (Point given : parts_[part]) {
+        const Point p = plain(given);
+        if ((p.x <= low.x) | (p.x >= high.x)) [[unlikely]] {
+          low = std::min(low, p);
+          high = std::max(high, p);
+        }
       }
       least[part] = low;
       greatest[part] = high;
-      finite[part] = all_finite;
+      finite[part] = plain.finite();
     };
-    both(threads_, [&] { find(0); }, [&] { find(1); });
+    both([&] { find(0); }, [&] { find(1); });
     finite_ = finite[0] && finite[1];
     const int some = parts_[0].empty() ? 1 : 0, other = parts_[1].empty() ? 0 : 1;
     least_ = positive_zeros(std::min(least[some], least[other]));
@@ -89,7 +94,7 @@ class StaticHull {
         *key++ = static_cast<std::uint16_t>(column);
       }
     };
-    both(threads_, [&] { count(0); }, [&] { count(1); });
+    both([&] { count(0); }, [&] { count(1); });
 
     starts_.resize(none + 1);
     std::size_t total = 0;
@@ -107,7 +112,7 @@ class StaticHull {
         if (column != none) memory[place[column]++] = positive_zeros(p);
       }
     };
-    both(threads_, [&] { put(0); }, [&] { put(1); });
+    both([&] { put(0); }, [&] { put(1); });
   }
 
   // Sorts and chains the columns of one side, from its first column. The chain overwrites points already read, from the
@@ -133,7 +138,8 @@ class StaticHull {
 
   static Point positive_zeros(Point p) { return {p.x + 0.0, p.y + 0.0}; }
 
-  bool threads_, finite_ = true;
+  Threads& threads_;
+  bool finite_ = true;
   Part parts_[2];
   Point least_, greatest_;
   unsigned width_ = 0;
@@ -155,7 +161,8 @@ inline std::optional<InnerBoxes> inner_boxes_of(const Point* points, std::size_t
   const std::size_t stride = count / std::max<std::size_t>(sample.size(), 1);
   for (std::size_t i = 0; i < sample.size(); ++i)
     sample[i] = points[i * stride + i * 2654435761u % stride];  // scattered, against patterns in the input
-  const StaticHull hull(sample, {}, false);
+  Threads alone(1);
+  const StaticHull hull(sample, {}, alone);
   if (!hull.finite()) return {};
   if (2 * hull.vertices().size() > sample.size() && !always) return {};
   const InnerBoxes inner_boxes(hull.vertices());
@@ -164,21 +171,43 @@ inline std::optional<InnerBoxes> inner_boxes_of(const Point* points, std::size_t
   return inner_boxes;
 }
 
+// Moves what no box holds to `kept`, which has room for all, and returns it. In shares: a thread that comes late takes
+// fewer of them.
+inline StaticHull::Part discard(const InnerBoxes& inner_boxes, StaticHull::Part points, Point* kept, Threads& threads) {
+  constexpr std::size_t MOST = 16;
+  const std::size_t shares = threads.count() > 1 ? MOST : 1, count = points.size();
+  std::array<std::size_t, MOST> left;
+  const auto start = [&](std::size_t share) { return count * share / shares; };
+  threads.run(shares, [&](std::size_t i) {
+    left[i] = inner_boxes.discard(points.subspan(start(i), start(i + 1) - start(i)), kept + start(i));
+  });
+  Point* end = kept;
+  for (std::size_t i = 0; i < shares; ++i) end = std::copy_n(kept + start(i), left[i], end);
+  return {kept, end};
+}
+
 // O(n log n), and O(n) if few points are near the hull.
 inline StaticHull static_hull(const Point* points, std::size_t count, StaticOptions options = {}) {
   constexpr std::size_t DISCARDED_FOR_ONE_PLACED = 16;  // at the same cost
-  const auto threads = [&](std::size_t placed) { return options.threads.value_or(threads_for(placed) > 1); };
-  const std::size_t half = count / 2;
-  const StaticHull::Part first(points, half), second(points + half, count - half);
+  const auto threads_to_place = [&](std::size_t placed) {
+    return options.threads.value_or(threads_for(placed) > 1) ? 2u : 1u;
+  };
+  const auto in_parts = [](StaticHull::Part all, Threads& threads) {
+    return StaticHull(all.first(all.size() / 2), all.subspan(all.size() / 2), threads);
+  };
+  const StaticHull::Part all(points, count);
+  // Before they are needed: to wake a thread takes as long as the hull of a sample.
+  std::optional<Threads> threads(std::in_place, threads_to_place(count / DISCARDED_FOR_ONE_PLACED));
   const bool may_discard = options.discard.value_or(true);
   const auto inner_boxes = may_discard ? inner_boxes_of(points, count, options.discard.has_value()) : std::nullopt;
-  if (!inner_boxes) return StaticHull(first, second, threads(count));
-  const auto kept = std::make_unique_for_overwrite<Point[]>(count);
-  std::size_t kept_first, kept_second;
-  both(
-      threads(count / DISCARDED_FOR_ONE_PLACED), [&] { kept_first = inner_boxes->discard(first, kept.get()); },
-      [&] { kept_second = inner_boxes->discard(second, kept.get() + half); });
-  return StaticHull({kept.get(), kept_first}, {kept.get() + half, kept_second}, threads(kept_first + kept_second));
+  if (!inner_boxes) {
+    if (threads->count() < 2) threads.emplace(threads_to_place(count));
+    return in_parts(all, *threads);
+  }
+  const Scratch<Point> kept(count);
+  const StaticHull::Part left = discard(*inner_boxes, all, kept.data(), *threads);
+  if (threads_to_place(left.size()) < 2) threads.emplace(1);
+  return in_parts(left, *threads);
 }
 
 }  // namespace dynhull

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "../memory/prefetch.hpp"
 #include "../predicates/signs.hpp"
 
 #ifndef DYNHULL_LEAF
@@ -28,16 +29,6 @@ inline Mask below(unsigned i) { return bit(i) - 1; }
 inline unsigned lowest(Mask mask) { return static_cast<unsigned>(std::countr_zero(mask)); }
 inline bool several(Mask mask) { return (mask & (mask - 1)) != 0; }
 inline unsigned highest(Mask mask) { return 63 - static_cast<unsigned>(std::countl_zero(mask)); }
-
-inline void prefetch(const void* address) {
-#if defined(__GNUC__)
-  __builtin_prefetch(address);
-#else
-  (void)address;
-#endif
-}
-
-constexpr unsigned LINE = 64;  // bytes of a cache line
 
 struct Leaf {
   std::uint32_t parent;
