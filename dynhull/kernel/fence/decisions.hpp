@@ -25,8 +25,9 @@ class Decisions {
     return changed.fresh && (!changed.carried || fence.own) ? Reports::NOWHERE : changed.before;
   }
 
-  // Finds the fences that a subject in this zone enters or leaves. Changes nothing else than its own `decided`.
-  void decide(std::uint32_t slot, const Zone& zone, FoundList& found) {
+  // Finds the fences that a subject in this zone, with this box, enters or leaves. Changes nothing else than its own
+  // `decided`.
+  void decide(std::uint32_t slot, const Zone& zone, const SafeBox& box, FoundList& found) {
     const Point p = (*zoning_.slots)[slot].place;
     Reports::Change* const change = reports_.change_of(slot);
     // The state before is that of areas which are still there, and the way from there is within the zone.
@@ -34,7 +35,8 @@ class Decisions {
                        !change->decided && zone.holds(change->before);
     if (change) change->decided = true;
     if (!known) decide_covering(slot, zone, found);
-    for (std::size_t i = 0; i < zone.pieces.size();) {
+    const bool stays = known && box.holds(change->before);  // no boundary is between
+    for (std::size_t i = 0; i < zone.pieces.size() && !stays;) {
       const std::span<const Piece> run = zone.run(i);
       i += run.size();
       const bool from_before = known && !run[0].wide;

@@ -169,16 +169,18 @@ class Fences {
       if (zoning_.fences[handle] && *zoning_.fences[handle]->area == *zoning_.fences[handle]->decided)
         zoning_.fences[handle]->decided = zoning_.fences[handle]->area;
     if (zoning_.everyone) {
-      reports_.settle_strayed([](std::uint32_t, const Zone&, std::size_t) {}, [](std::size_t) {});
+      reports_.settle_strayed([](const Zoning::Stray&, const Zone&, std::size_t) {}, [](std::size_t) {});
       zoning_.slots->for_each([&](std::uint32_t slot) {
         if (zoning_.subjects[slot].zone == NONE) return;  // there are no zones
-        decisions_.decide(slot, zoning_.zones[zoning_.subjects[slot].zone], decisions_.found[0]);
+        decisions_.decide(slot, zoning_.zones[zoning_.subjects[slot].zone], SafeBox::nowhere(), decisions_.found[0]);
         decisions_.cross_found(decisions_.found[0]);
       });
     } else {
-      reports_.settle_strayed([&](std::uint32_t slot, const Zone& zone,
-                                  std::size_t part) { decisions_.decide(slot, zone, decisions_.found[part]); },
-                              [&](std::size_t part) { decisions_.cross_found(decisions_.found[part]); });
+      reports_.settle_strayed(
+          [&](const Zoning::Stray& stray, const Zone& zone, std::size_t part) {
+            decisions_.decide(stray.slot, zone, stray.box, decisions_.found[part]);
+          },
+          [&](std::size_t part) { decisions_.cross_found(decisions_.found[part]); });
     }
     zoning_.divide_crowded();
     decisions_.decide_waiting();

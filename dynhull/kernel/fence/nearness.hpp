@@ -94,7 +94,17 @@ struct AboutDistance {
 template <class ForEach>
 double distance_to_nearest(Point p, ForEach for_each) {
   double most = INFINITE, nearest = INFINITE;
-  for_each(most, [&](Edge edge) { most = std::min(most, AboutDistance(p, edge).most); });
+  double least = INFINITE, others = INFINITE;  // of the segment with the least `most`, and of all others
+  Edge first{};
+  for_each(most, [&](Edge edge) {
+    const AboutDistance about(p, edge);
+    others = std::min(others, about.most < most ? least : about.least);
+    if (!(about.most < most)) return;
+    first = edge;
+    least = about.least;
+    most = about.most;
+  });
+  if (most < others) return distance_to_segment(p, first);
   for_each(most, [&](Edge edge) {
     if (AboutDistance(p, edge).least <= most) nearest = std::min(nearest, distance_to_segment(p, edge));
   });

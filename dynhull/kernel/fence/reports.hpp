@@ -148,7 +148,7 @@ class Reports {
   // Lists every subject in the zone where it is. Makes the zones if there are none, or if the index is torn.
   void ready() {
     prepare(false);
-    settle_strayed([](std::uint32_t, const Zone&, std::size_t) {}, [](std::size_t) {});
+    settle_strayed([](const Zoning::Stray&, const Zone&, std::size_t) {}, [](std::size_t) {});
     zoning_.divide_crowded();
   }
   void prepare(bool only_strayed) {
@@ -175,7 +175,7 @@ class Reports {
       threads.run(parts, [&](std::size_t part) {
         for (std::size_t i = start(part); i < start(part + 1); i += Zoning::LOOKAHEAD)
           look_at(i, std::min(i + Zoning::LOOKAHEAD, start(part + 1)),
-                  [&](std::uint32_t slot, const Zone& zone) { look(slot, zone, part); });
+                  [&](const Zoning::Stray& stray, const Zone& zone) { look(stray, zone, part); });
       });
       for (std::size_t part = 0; part < parts; ++part) {
         for (std::size_t i = start(part); i < start(part + 1); ++i) zoning_.relist(strays_[i]);
@@ -347,7 +347,7 @@ class Reports {
     for (std::size_t i = from; i < to; ++i) {
       const Zone& zone = zoning_.zones[strays_[i].zone];
       strays_[i].box = zoning_.box_in(zone, (*zoning_.slots)[strays_[i].slot].place);
-      look(strays_[i].slot, zone);
+      look(strays_[i], zone);
     }
   }
 
