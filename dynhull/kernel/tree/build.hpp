@@ -1,8 +1,6 @@
 // Bulk construction from sorted points.
 #pragma once
 
-#include <optional>
-
 #include "../memory/scratch.hpp"
 #include "../threads.hpp"
 #include "balance.hpp"
@@ -108,46 +106,52 @@ class Building {
     return v;
   }
 
-  // A vertex of a chain.
+  // A vertex of a chain, and what is beyond it on the chain of its leaf.
   struct Vertex {
     std::uint32_t leaf;
     unsigned entry;
+    Mask rest;
     Point p;
   };
-  Vertex vertex(std::uint32_t leaf, unsigned entry) const {
-    return {leaf, entry, nodes_.leaf(site_.leaves[leaf])[entry]};
+  Vertex vertex(std::uint32_t leaf, unsigned entry, Mask rest) const {
+    return {leaf, entry, rest, nodes_.leaf(site_.leaves[leaf])[entry]};
   }
-  std::optional<Vertex> before(const Vertex& v, Side side) const {
-    const BuildingSite::Seam* const seams = site_.seams[side].data();
-    if (const Mask rest = seams[v.leaf].chain & below(v.entry)) return vertex(v.leaf, highest(rest));
-    const std::uint32_t leaf = seams[v.leaf].before;
-    return leaf == NONE ? std::nullopt : std::optional(vertex(leaf, highest(seams[leaf].chain)));
+  // The next vertex to the left, or to the right; without one, its leaf is NONE.
+  Vertex before(const Vertex& v, const BuildingSite::Seam* seams) const {
+    const std::uint32_t leaf = v.rest ? v.leaf : seams[v.leaf].before;
+    if (leaf == NONE) return {NONE, 0, 0, {}};
+    const Mask rest = v.rest ? v.rest : seams[leaf].chain;
+    const unsigned entry = highest(rest);
+    return vertex(leaf, entry, rest & ~bit(entry));
   }
-  std::optional<Vertex> after(const Vertex& v, Side side) const {
-    const BuildingSite::Seam* const seams = site_.seams[side].data();
-    if (const Mask rest = seams[v.leaf].chain & ~below(v.entry + 1)) return vertex(v.leaf, lowest(rest));
-    const std::uint32_t leaf = seams[v.leaf].after;
-    return leaf == NONE ? std::nullopt : std::optional(vertex(leaf, lowest(seams[leaf].chain)));
+  Vertex after(const Vertex& v, const BuildingSite::Seam* seams) const {
+    const std::uint32_t leaf = v.rest ? v.leaf : seams[v.leaf].after;
+    if (leaf == NONE) return {NONE, 0, 0, {}};
+    const Mask rest = v.rest ? v.rest : seams[leaf].chain;
+    return vertex(leaf, lowest(rest), rest & (rest - 1));
   }
 
   // Joins the chains on both sides of a cut, and returns the edge that does. Starts from the points beside the cut and
   // moves outwards: what it passes is on no larger chain, so that a build passes each vertex once.
   Edge sewn(std::size_t cut, Side side) const {
     const auto right_leaf = static_cast<std::uint32_t>(cut), left_leaf = right_leaf - 1;
-    Vertex a = vertex(left_leaf, nodes_.leaf(site_.leaves[left_leaf]).size - 1), b = vertex(right_leaf, 0);
-    std::optional<Vertex> beside_a = before(a, side), beside_b = after(b, side);
+    BuildingSite::Seam* const seams = site_.seams[side].data();
+    const unsigned last = nodes_.leaf(site_.leaves[left_leaf]).size - 1;
+    Vertex a = vertex(left_leaf, last, seams[left_leaf].chain & below(last));
+    Vertex b = vertex(right_leaf, 0, seams[right_leaf].chain & ~bit(0));
+    Vertex beside_a = before(a, seams), beside_b = after(b, seams);
     while (true) {
-      if (beside_a && turned(side, orientation(beside_a->p, a.p, b.p)) >= 0) {
-        a = *beside_a;
-        beside_a = before(a, side);
-      } else if (beside_b && turned(side, orientation(a.p, b.p, beside_b->p)) >= 0) {
-        b = *beside_b;
-        beside_b = after(b, side);
+      if (beside_a.leaf != NONE && turned(side, orientation(beside_a.p, a.p, b.p)) >= 0) {
+        a = beside_a;
+        beside_a = before(a, seams);
+      } else if (beside_b.leaf != NONE && turned(side, orientation(a.p, b.p, beside_b.p)) >= 0) {
+        b = beside_b;
+        beside_b = after(b, seams);
       } else {
         break;
       }
     }
-    BuildingSite::Seam &left = site_.seams[side][a.leaf], &right = site_.seams[side][b.leaf];
+    BuildingSite::Seam &left = seams[a.leaf], &right = seams[b.leaf];
     left.chain &= below(a.entry + 1);
     left.after = b.leaf;
     right.chain &= ~below(b.entry);
