@@ -185,14 +185,16 @@ def test_a_writer_and_a_watch_outlive_servers(way: str, server: MortalServer, ga
         assert hull.info.points == said["keys"]
 
 
-@pytest.mark.parametrize("way", [pytest.param("gateway", marks=slow), "grpc"])
+@slow
+@pytest.mark.parametrize("way", ["gateway", "grpc"])
 def test_what_is_aborted_ends_with_the_reason(way: str, server: MortalServer, gateway: Gateway) -> None:
     """At whichever turn it is aborted; and no promise is left that rejects unseen."""
     url = gateway.url if way == "gateway" else f"grpc://{server.address}"
     assert node(str(HERE / "aborted.mjs"), url, f"typescript/aborted/{way}") == "[]\n"
 
 
-@pytest.mark.parametrize("way", [pytest.param("gateway", marks=slow), "grpc"])
+@slow
+@pytest.mark.parametrize("way", ["gateway", "grpc"])
 def test_what_reads_a_damaged_past_ends_with_the_reason(way: str, tmp_path: Path) -> None:
     """Who began anew at each end would do so for ever."""
     complaints = "a part of the past cannot be read"
