@@ -247,3 +247,65 @@ def test_an_erasure_is_forgotten_with_what_it_was_about(fleet):
     fleet.storage.close()
     fleet.storage = fleet.make()
     assert fleet.storage.open(no_progress).notes == []
+
+
+def test_erasures_one_after_the_other_leave_few_files_and_no_state_for_each(tmp_path):
+    """Each ends a segment after a batch or two. A kill at any point of the last leaves all that was there."""
+    names = [f"unit {each}" for each in range(400)]
+    gone = PackedKeys.pack(names[:20])
+    fleet = Fleet(tmp_path)
+
+    def commit(record):
+        fleet.time += SECOND
+        stamp = fleet.storage.commit([Append(1, [record])], fleet.time)
+        fleet.records.append(replace(record, committed=stamp))
+
+    def snapshots():
+        contents = replayed(Kept(records=fleet.records), fleet.settings).stored()
+        for _ in range(2):
+            fleet.carry_out(fleet.storage.snapshot(1, Kept(len(fleet.records), contents)))
+
+    commit(Record(1, KeyRows(PackedKeys.pack(names), np.arange(800.0).reshape(-1, 2), NONE), cause="batch"))
+    for place in range(len(gone)):
+        point = np.full((1, 2), float(place))
+        key = take_keys(gone, np.array([place]))
+        commit(Record(len(fleet.records) + 1, KeyRows(PackedKeys.pack(names[-1:]), point, key), cause="batch"))
+        snapshots()
+        steps = fleet.storage.erase(1, key, len(fleet.records), fleet.time)
+        for number, step in enumerate(steps):
+            if place == len(gone) - 1:
+                for part in ("data", "history"):
+                    shutil.copytree(tmp_path / part, tmp_path / f"copy {number}" / part)
+            fleet.storage.commit([step], fleet.time)
+
+    def expected(left_out):
+        for record in fleet.records:
+            stay = np.flatnonzero([key not in left_out for key in record.rows.keys])
+            removed = [key for key in record.rows.removes if key not in left_out]
+            keys = take_keys(record.rows.keys, stay)
+            yield replace(record, rows=KeyRows(keys, record.rows.points[stay], PackedKeys.pack(removed)))
+
+    def require(storage, left_out):
+        wanted = list(expected(left_out))
+        same(read_back(storage, len(wanted)), wanted)
+        for revision in (1, 2, 11, len(wanted)):
+            kept = storage.state(1, revision)
+            if kept.revision:
+                same(kept.contents, replayed(Kept(records=wanted[: kept.revision]), fleet.settings).stored())
+
+    segments = fleet.storage._ledger.hulls[1].segments
+    assert len(segments) <= 6
+    assert sum(each.facts.state_bytes > 0 for each in segments) <= 1
+    require(fleet.storage, set(names[:20]))
+    assert len(fleet.storage.erasures(1)) == 20
+    fleet.storage.close()
+    assert copies.check(tmp_path / "data", no_progress, fleet.archive.path).notes == []
+    copied = sorted(tmp_path.glob("copy *"))
+    assert len(copied) > 5
+    for copy in copied:
+        storage = SQLiteStorage(copy / "data", archive=Archive(copy / "history"))
+        storage.open(no_progress)
+        require(storage, set(names[: len(storage.erasures(1))]))
+        assert 19 <= len(storage.erasures(1)) <= 20
+        storage.close()
+        assert copies.check(copy / "data", no_progress, copy / "history").notes == []

@@ -1,21 +1,52 @@
-"""Erasing keys from segments: the same segments without them, in other files."""
+"""Erasing keys from segments: the same batches without them, in other files."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from dynhull.keys import key_list, take_keys
 
-from ...state.records import Contents, HeldRows, KeyRows, Keys, Record
+from ...state.records import Contents, HeldRows, Kept, KeyRows, Keys, Record
 from ..past import Erasure
 from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.columns import columns_of
 from .filed import named, read_batches, read_state
-from .filing import Due
+from .filing import MOST_ROWS, Due
 from .ledger import HullRows
 from .segment_rows import StoredSegment
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Consecutive segments without some keys.
+
+    Attributes:
+        segments: the segments.
+        before: the state that lies beside the first, if one does.
+        records: the batches.
+        had: whether the segments had any of the keys.
+    """
+
+    segments: tuple[StoredSegment, ...]
+    before: Kept | None
+    records: list[Record]
+    had: bool
+
+    def takes(self, other: "_Run") -> bool:
+        """Whether one segment is to have both."""
+        moves, more = self._moves, other._moves
+        follows = self.segments[-1].last + 1 == other.segments[0].first
+        return follows and other.before is None and moves <= 2 * more and moves + more <= MOST_ROWS
+
+    def with_next(self, other: "_Run") -> "_Run":
+        """Both."""
+        return _Run(self.segments + other.segments, self.before, self.records + other.records, self.had or other.had)
+
+    @property
+    def _moves(self) -> int:
+        return sum(each.facts.moves for each in self.segments)
 
 
 class Erasing:
@@ -39,29 +70,47 @@ class Erasing:
         self._first = until
         self._moves = 0
 
-    def segments(self) -> Iterator[tuple[StoredSegment, Due]]:
-        """The segments that have one of the keys, and of what to make those that have none.
+    def segments(self) -> Iterator[tuple[tuple[StoredSegment, ...], Due]]:
+        """Segments that have one of the keys, and of what to make the one that has none and takes their place.
+
+        It takes the place of several where each but the first is without a state of its own and not much smaller than
+        those before it together: so erasures, of which each ends a segment, leave few.
 
         Raises:
             DamagedError: a file is not as it was written.
             StorageError: it cannot be read at present.
         """
+        run: _Run | None = None
         for segment in self.hull.segments:
             if segment.first - 1 > self._until:
-                return
-            with named(segment, STATE):
-                before = read_state(self.archive, segment) if segment.facts.state_bytes else None
-            found = [] if before is None else [before.contents.keys, held_keys(before.contents)]
-            in_state = any(self._among(keys).any() for keys in found if keys is not None)
-            if before is not None and in_state:
-                before = replace(before, contents=self._without(before.contents))
-                self._first = min(self._first, segment.first - 1)
-            moves = self._moves
-            with named(segment, BATCHES):
-                batches = read_batches(self.archive, segment).between(segment.first - 1, segment.last)
-            records = [self._record(each) if each.revision <= self._until else each for each in batches]
-            if in_state or self._moves > moves:
-                yield segment, Due(self.hull.row, columns_of(records, self.hull.row.settings.identity), before)
+                break
+            read = self._read(segment)
+            if run is not None and run.takes(read):
+                run = run.with_next(read)
+                continue
+            yield from self._due(run)
+            run = read
+        yield from self._due(run)
+
+    def _read(self, segment: StoredSegment) -> "_Run":
+        """A segment without the keys."""
+        with named(segment, STATE):
+            before = read_state(self.archive, segment) if segment.facts.state_bytes else None
+        found = [] if before is None else [before.contents.keys, held_keys(before.contents)]
+        in_state = any(self._among(keys).any() for keys in found if keys is not None)
+        if before is not None and in_state:
+            before = replace(before, contents=self._without(before.contents))
+            self._first = min(self._first, segment.first - 1)
+        moves = self._moves
+        with named(segment, BATCHES):
+            batches = read_batches(self.archive, segment).between(segment.first - 1, segment.last)
+        records = [self._record(each) if each.revision <= self._until else each for each in batches]
+        return _Run((segment,), before, records, in_state or self._moves > moves)
+
+    def _due(self, run: "_Run | None") -> Iterator[tuple[tuple[StoredSegment, ...], Due]]:
+        if run is not None and run.had:
+            row = self.hull.row
+            yield run.segments, Due(row, columns_of(run.records, row.settings.identity), run.before)
 
     def done(self, now: int) -> Erasure:
         """What has been erased, at a time."""

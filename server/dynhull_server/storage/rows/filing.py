@@ -81,7 +81,24 @@ def read_due(reader: Reader, hull: HullRows) -> Due:
     kept = None
     if any(each.revision == after for each in hull.snapshots):
         kept = newest_snapshot(reader, hull, after)
-    return Due(hull.row, columns, kept if kept is not None and kept.revision == after else None)
+    begins = kept is not None and kept.revision == after and _needs_state(hull, len(kept.contents.points))
+    return Due(hull.row, columns, kept if begins else None)
+
+
+def _needs_state(hull: HullRows, points: int) -> bool:
+    """Whether the next segment is to begin with the state before it, which has so many points.
+
+    Snapshots are far enough apart for that. An erasure makes one after whatever has come since: a state beside each
+    of the segments that these leave would be the hull again for each key that is erased.
+    """
+    if not hull.segments or hull.segments[-1].last != hull.filed:
+        return True
+    moves = 0
+    for segment in reversed(hull.segments):
+        moves += segment.facts.moves
+        if segment.begins:
+            break
+    return 2 * moves >= points
 
 
 def state_file(row: HullRow, kept: Kept) -> bytes:

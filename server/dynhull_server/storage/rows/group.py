@@ -114,10 +114,10 @@ class MendSegment:
 
 @dataclass(frozen=True, slots=True)
 class EraseKeys:
-    """Step: segments without some keys take the place of those that had them."""
+    """Step: segments without some keys take the place of those that had them, each of one or of consecutive ones."""
 
     number: int
-    replaced: tuple[tuple[StoredSegment, StoredSegment], ...]
+    replaced: tuple[tuple[tuple[StoredSegment, ...], StoredSegment], ...]
     stored: StoredErasure
 
 
@@ -399,8 +399,9 @@ class Group:
         if now is None:  # deleted meanwhile
             self._effects.append(lambda: self._ledger.dead["segments"].extend(new.id for _, new in step.replaced))
             return
-        for old, new in step.replaced:
-            self._retire_segment(RetireSegment(step.number, old))
+        for olds, new in step.replaced:
+            for old in olds:
+                self._retire_segment(RetireSegment(step.number, old))
             self._add_segment(now, new)
         values = erasure_values(step.stored, step.number)
         self.statements.append(Insert("segments", values))

@@ -514,15 +514,15 @@ class RowStorage(ABC):
     def _erase(self, erasing: Erasing, now: int) -> Iterator[StorageStep]:
         """Write what takes the place of segments with the keys, then replace them all at once."""
         number, uid = erasing.hull.row.number, erasing.hull.row.uid
-        replaced: list[tuple[StoredSegment, StoredSegment]] = []
+        replaced: list[tuple[tuple[StoredSegment, ...], StoredSegment]] = []
         places: set[int] = set()
         try:
-            for segment, due in erasing.segments():
+            for segments, due in erasing.segments():
                 place, file = next(self._ledger.segment_ids), erasing.archive.name(uid, due.first, due.last, self.epoch)
                 places.add(place)
                 self._filing.add(place)
                 yield NameFile(place, file)
-                replaced.append((segment, due.write(erasing.archive, place, file)))
+                replaced.append((segments, due.write(erasing.archive, place, file)))
             if replaced:
                 stored = StoredErasure(next(self._ledger.segment_ids), erasing.done(now))
                 yield EraseKeys(number, tuple(replaced), stored)
