@@ -167,3 +167,19 @@ def test_a_move_that_is_refused_for_the_past_leaves_nothing(url, postgres, tmp_p
     min(history.rglob("*.batches.parquet")).unlink()
     refused(url, back, "of its past cannot be read", code=1, history=history)
     assert not back.exists()
+
+
+def test_a_move_that_fails_halfway_leaves_no_files_in_the_folder_for_the_past(url, tmp_path):
+    """Nor takes any from that of the source, which it is refused to be."""
+    history = tmp_path / "past"
+    fleet = Fleet(tmp_path).fill()
+    fleet.storage.close()
+    source = shutil.move(tmp_path / "data", tmp_path / "source")
+    shutil.move(fleet.archive.path, source / "history")
+    max((source / "history").rglob("*.batches.parquet")).write_bytes(b"something else")
+    before = {each: each.read_bytes() for each in (source / "history").rglob("*.parquet")}
+    refused(source, url, "of its past cannot be read", code=1, history=history)
+    refused(source, url, f"has the past of {source}", history=source / "history")
+    assert query(url, "SELECT to_regnamespace('dynhull')") == [(None,)]
+    assert list(history.rglob("*.parquet")) == []
+    assert {each: each.read_bytes() for each in (source / "history").rglob("*.parquet")} == before

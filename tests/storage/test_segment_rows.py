@@ -11,7 +11,7 @@ from postgresql import query
 from dynhull_cluster.postgres.database import Database
 from dynhull_cluster.postgres.storage import PostgresStorage
 from dynhull_server.state.records import Append, Create, Delete, HullRow
-from dynhull_server.storage.port import DamagedError
+from dynhull_server.storage.port import DamagedError, StorageError
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.sqlite import copies
 
@@ -197,4 +197,43 @@ def test_of_a_database_too(postgres, tmp_path):
     assert served(fleet)[0].endswith("cannot be read")
     with pytest.raises(DamagedError, match="revisions 8 to 15 cannot be read"):
         read_back(fleet.storage, 20)
+    fleet.storage.close()
+
+
+def settled(fleet):
+    """The storage decides a commit whose outcome is not known, and goes on."""
+    fleet.storage._unsettled = True
+    with pytest.raises(StorageError, match="not known yet"):
+        fleet.storage.read(1)
+    fleet.storage.settle()
+    same(read_back(fleet.storage, len(fleet.records)), fleet.records)
+    require_writes(fleet)
+    fleet.file()
+
+
+def test_a_row_that_is_damaged_while_a_commit_is_in_doubt_is_put_right(fleet):
+    """Nobody has to restart the server for it, and what was committed since agrees with the totals."""
+    table = Table(fleet)
+    assert served(fleet) == []
+    table.execute("UPDATE segments SET last = last + 4 WHERE id = 2")
+    settled(fleet)
+    fleet.storage.close()
+    assert table.execute("SELECT * FROM segments WHERE id = 2") == [table.row]
+    assert served(fleet) == []
+    fleet.storage.close()
+    assert copies.check(fleet.folder / "data", no_progress, fleet.archive.path).notes == []
+
+
+def test_of_a_database_too_while_a_commit_is_in_doubt(postgres, tmp_path):
+    url = postgres.new_database()
+    archive = Archive(tmp_path / "history")
+    fleet = Fleet(tmp_path, archive=archive, make=lambda: PostgresStorage(Database(url), pytest.fail, archive=archive))
+    fleet.fill(4)
+    fleet.storage.commit([Create(HullRow(2, "other", "4567", 12.5, SETTINGS)), Append(2, [move(1)])], fleet.time)
+    before = query(url, "SELECT * FROM segments WHERE id = 2")
+    query(url, "UPDATE segments SET last = last + 4 WHERE id = 2")
+    settled(fleet)
+    assert query(url, "SELECT * FROM segments WHERE id = 2") == before
+    fleet.storage.close()
+    assert served(fleet) == []
     fleet.storage.close()

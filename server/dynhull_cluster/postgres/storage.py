@@ -219,9 +219,7 @@ class PostgresStorage(RowStorage):
             connection.execute("COMMIT")
         if findings.fatal:
             raise DamagedError(f"{self._place}: {'; '.join(findings.fatal)}: restore a backup")
-        if findings.mends:
-            raise DamagedError(f"{self._place}: {'; '.join(findings.notes)}: restart the server")
-        self._renew(findings.ledger)
+        self._renew(findings)
         return self._latest
 
     def _write(self, group: Group) -> None:

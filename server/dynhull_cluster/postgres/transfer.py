@@ -14,11 +14,12 @@ from pathlib import Path
 from dynhull_server.storage.port import DamagedError, LockedError, Progress, StorageError
 from dynhull_server.storage.rows.divided import DatabaseView, latest_epoch
 from dynhull_server.storage.rows.examine import Findings
-from dynhull_server.storage.rows.filed_check import bring_all
+from dynhull_server.storage.rows.filed_check import bring_all, undone
 from dynhull_server.storage.rows.tables import COLUMNS, Insert, Reader
 from dynhull_server.storage.rows.totals import STOPPED
 from dynhull_server.storage.segments.archive import HISTORY
 from dynhull_server.storage.segments.objects import archive_at
+from dynhull_server.storage.segments.place import is_store
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.worker_folders import parts_of, worker_folder, write_manifest
 
@@ -80,8 +81,14 @@ def to_database(folder: Path, database: Database, progress: Progress, history: s
     moved = Moved(str(folder), str(database))
     parts = parts_of(folder)
     if history is not None:
+        _require_apart(history, parts)
         archive_at(history).require_free()
-    with closing(database.connect("dynhull move")) as connection, as_storage_errors(), connection.transaction():
+    with (
+        closing(database.connect("dynhull move")) as connection,
+        as_storage_errors(),
+        connection.transaction(),
+        undone(history) as copies_files,  # not for an error of the commit itself: it may have taken place
+    ):
         hold(connection, database)
         if partitions_of(connection, database) is not None:
             raise StorageError(f"{database} has tables of dynhull: create another database")
@@ -93,6 +100,7 @@ def to_database(folder: Path, database: Database, progress: Progress, history: s
                     for sql, values in queries_of(partition, rows):
                         connection.execute(sql, values)
                 totals = findings.ledger.totals._replace(mode=STOPPED)
+                copies_files(findings.ledger)
                 bring_all(findings.ledger, part / HISTORY, history)
             put_totals(connection, partition, totals)
             copy = examined(connection, partition, lambda *_: None)
@@ -141,6 +149,15 @@ def to_folder(database: Database, folder: Path, progress: Progress, history: str
         if partitions > 1:
             write_manifest(folder, partitions, complete=True)  # at the end: without it, the copy is refused
     return moved
+
+
+def _require_apart(history: str | Path, parts: list[Path]) -> None:
+    """Raise StorageError if a database would have the past of a folder: each would remove what the other one needs."""
+    for part in parts:
+        if is_store(history) or not Path(history).exists() or not (part / HISTORY).exists():
+            continue
+        if Path(history).samefile(part / HISTORY):
+            raise StorageError(f"{history} has the past of {part}: give the database a --history-dir of its own")
 
 
 def _partitions(connection: Connection, database: Database) -> int:

@@ -1,6 +1,7 @@
 """The files of segments: are they there, and as they were written? And copies of them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..port import DamagedError, StorageError
@@ -81,6 +82,28 @@ def adopting(ledger: Ledger, source: Path | str, target: Path | str, notes: list
             yield RetireSegment(number, segment)
     if copied:
         after.sync()
+
+
+@contextmanager
+def undone(target: Path | str | None) -> Iterator[Callable[[Ledger], None]]:
+    """Call what is given with the ledgers whose files are to be copied: an error removes what was not there before.
+
+    A process that is killed leaves them. To copy them again does no harm.
+    """
+    copied: list[tuple[Archive, str]] = []
+
+    def noted(ledger: Ledger) -> None:
+        if target is not None and history_bytes(ledger):
+            archive = archive_at(target)
+            files = [segment.file for hull in ledger.hulls.values() for segment in hull.segments]
+            copied.extend((archive, each) for each in files if not archive.has(each))
+
+    try:
+        yield noted
+    except BaseException:
+        for archive, file in copied:
+            archive.remove(file)
+        raise
 
 
 def bring_all(ledger: Ledger, source: Path | str | None, target: Path | str | None) -> None:

@@ -31,6 +31,7 @@ from . import chunks
 from .divided import newest_rows
 from .encoding import weight
 from .erasing import Erasing
+from .examine import Findings
 from .fence_ledger import DropInside, ShrinkEvents, inside_steps
 from .fence_reading import read_events, read_fences, shrunk
 from .fence_runs import FenceRows
@@ -117,6 +118,10 @@ class RowStorage(ABC):
         """A reader, for one thread. Errors of the database become StorageError."""
 
     @abstractmethod
+    def _write(self, group: Group) -> None:
+        """Commit a group."""
+
+    @abstractmethod
     def _confirm(self) -> None:
         """Make all commits durable, or raise TakenOverError if another server decides by now.
 
@@ -157,12 +162,24 @@ class RowStorage(ABC):
         totals = self._ledger.totals
         return CommitStamp(totals.commits, totals.committed)
 
-    def _renew(self, ledger: Ledger) -> None:
-        """Go on with the rows as they are in the database, after a commit with an unknown outcome."""
+    def _renew(self, findings: Findings) -> None:
+        """Go on with the rows as they are in the database, after a commit with an unknown outcome.
+
+        Rows of segments that are damaged are put right, as at a start: the ledger has them so already.
+        """
         with self._visible:
-            ledger.go_on_from(self._ledger, set().union(*self._under_way.values()))
-            self._ledger = ledger
+            findings.ledger.go_on_from(self._ledger, set().union(*self._under_way.values()))
+            self._ledger = findings.ledger
             self._unsettled = False
+        if findings.mends:
+            try:
+                self._write(Group(self._ledger, findings.mends))
+            except BaseException:
+                with self._visible:
+                    self._unsettled = True
+                raise
+            for note in findings.notes:
+                log.warning(note)
 
     # Reading
 

@@ -315,6 +315,10 @@ class Archive:
             return False
         return True
 
+    def has(self, file: str) -> bool:
+        """Whether any file of a segment is there."""
+        return any((self.path / (file + end)).exists() for end in (BATCHES, STATE))
+
     def files(self, file: str) -> Iterator[str]:
         """The names of the files of a segment that are there."""
         yield file + BATCHES

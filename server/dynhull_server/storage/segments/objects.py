@@ -144,6 +144,12 @@ class ObjectArchive(Archive):
         for end in (BATCHES, STATE):
             self._drop(file + end)
 
+    def has(self, file: str) -> bool:
+        """Whether any object of a segment is there."""
+        return any(
+            self._ask(file, partial(self._is_there, self._key(file + end)), self._seconds) for end in (BATCHES, STATE)
+        )
+
     def files(self, file: str) -> Iterator[str]:
         """The names of the objects of a segment that are there."""
         yield file + BATCHES

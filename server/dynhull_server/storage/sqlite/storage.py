@@ -169,9 +169,7 @@ class SQLiteStorage(RowStorage):
         connection.execute("BEGIN")
         findings = loaded(connection)
         connection.execute("COMMIT")
-        if findings.mends:
-            raise DamagedError(f"{self._folder.database}: {'; '.join(findings.notes)}: restart the server")
-        self._renew(findings.ledger)
+        self._renew(findings)
         return self._latest
 
     def _write(self, group: Group) -> None:
