@@ -99,7 +99,8 @@ def check(
 
     All batches and snapshots are compared with their checksums, also those that the next start would not need. Of
     fences, who is inside is compared with positions and areas, and the events with each other and with who is inside.
-    While a server uses the folder, the data committed at one moment is examined, but not the log.
+    While a server uses the folder, the data committed at one moment is examined, but not the log. Run it as the user of
+    the server: root reads files that this user may not read.
 
     The exit code is 0 if everything is intact, 1 if anything is damaged, and 2 if there is no data folder:
 
