@@ -6,7 +6,7 @@ from .contents import begun
 from .contents.keyed import Keyed
 from .hull_state import PUT_AWAY_POINTS, Counts, HullState, last_cause, last_sequences, skipping_of
 from .limits import Limits
-from .records import Contents, HullSettings, Kept
+from .records import HullSettings, Kept, Parts
 from .root_state import state_of
 
 
@@ -44,7 +44,7 @@ class Dormant:
         """The state of a hull with these settings."""
         sequences, skipping, now = self._numbered or ({}, frozenset(), 0.0)
         counts = self.counts
-        contents = Keyed(settings, Contents(), None, self._limits.points_of(settings), None)
+        contents = Keyed(settings, Parts(0, []), None, self._limits.points_of(settings), None)
         contents.hold(KeyedHull.unpacked(self._packed))
         kept = Kept(counts.revision, producers=sequences, skipping=skipping, committed=self.committed)
         return HullState(self._limits, settings, kept, now, contents, counts)

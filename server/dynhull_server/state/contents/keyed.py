@@ -132,7 +132,7 @@ class Keyed:
         self.hull: AnyKeyedHull
         self._loader: KeyedLoader | None = None
         if globe is None:
-            self._loader = KeyedHull.loader(self._kind, ordered=settings.by_event_time)
+            self._loader = KeyedHull.loader(self._kind, ordered=settings.by_event_time, room=stored.count)
         else:
             self.hull = GeoKeyedHull(self._kind, ordered=settings.by_event_time, center=globe.center)
         self.follows_server = settings.window is None or settings.window.clock == "server"
@@ -357,8 +357,6 @@ class Keyed:
     def _load(self, stored: Parts) -> HeldRows | None:
         """Have what was stored. Returns what is in quarantine."""
         parts, held = stored.parts if self.globe is None else [in_one(stored.parts)], None
-        if self.globe is None and stored.count:
-            self._loader = KeyedHull.loader(self._kind, ordered=self._settings.by_event_time, room=stored.count)
         for part in parts:
             held = part.held if held is None else held
             if part.keys is not None:
@@ -369,10 +367,14 @@ class Keyed:
         times = None if stored.times is None else library_times(stored.times)
         if self._loader is not None:
             self._loader.update(keys, stored.points, times)
-        else:
-            center = None if self.globe is None else self.globe.center
+        elif self.globe is not None:
             self.hull = GeoKeyedHull.from_entities(
-                keys, stored.points, times, self._kind, ordered=self._settings.by_event_time, center=center
+                keys,
+                stored.points,
+                times,
+                self._kind,
+                ordered=self._settings.by_event_time,
+                center=self.globe.center,
             )
         if stored.times is not None:
             self._note_times(stored.times)
@@ -407,9 +409,12 @@ class Keyed:
         if len(rows.removes):
             loader.remove_many(rows.removes)
         times = None if rows.times is None else library_times(rows.times)
-        for first in range(0, len(rows.keys), LOADED_TOGETHER):
-            some = slice(first, first + LOADED_TOGETHER)
-            loader.update(rows.keys[some], rows.points[some], None if times is None else times[some])
+        if 0 < len(rows.keys) <= LOADED_TOGETHER:
+            loader.update(rows.keys, rows.points, times)
+        else:
+            for first in range(0, len(rows.keys), LOADED_TOGETHER):
+                some = slice(first, first + LOADED_TOGETHER)
+                loader.update(rows.keys[some], rows.points[some], None if times is None else times[some])
         if rows.times is not None:
             self._note_times(rows.times)
 
