@@ -8,10 +8,6 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
-from cases import slow
-
-pytestmark = slow
-
 ROOT = Path(__file__).parents[2]
 # The circles that there are, each by the package that they are in. `docs/architecture.md` explains them.
 EXCEPTIONS = ["dynhull", "dynhull_cli.load", "dynhull_server.state.fences"]

@@ -9,9 +9,6 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
-from cases import slow
-
-pytestmark = slow
 
 ROOT = Path(__file__).parents[2]
 # Packages that are read together: a gateway of several workers is a server, too.

@@ -8,10 +8,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from cases import slow
-
-pytestmark = slow
-
 TESTS = Path(__file__).parents[1]
 MENTIONED = re.compile(r"sleep|Timer|wait|join")
 SHORT = 5  # seconds: a longer wait is for what has to come
@@ -28,6 +24,7 @@ EXCEPTIONS = {
     "robustness/server/torture.py": "looks again and again whether others have failed",
     "server/callers/left.py": "gRPC says nowhere that it has heard of a departure",
     "simulation/link_life.py": "the time is simulated",
+    "simulation/link_owners.py": "the time is simulated",
     "simulation/machine.py": "the time is simulated",
     "simulation/network.py": "the time is simulated",
     "simulation/shell_life.py": "the time is simulated",

@@ -35,7 +35,7 @@ class Written(NamedTuple):
     blocks: str
 
 
-class Parts(io.RawIOBase):
+class FileParts(io.RawIOBase):
     """A file that is read in parts. What is read is checked before, whole blocks of it at a time.
 
     Args:
@@ -250,7 +250,7 @@ class Archive:
                     raise _changed(path)
                 return block
 
-            yield Parts(wrote.bytes, load)
+            yield FileParts(wrote.bytes, load)
 
     @contextmanager
     def _reading(self, file: str) -> Iterator[None]:
