@@ -454,9 +454,9 @@ ARGUMENTS: dict[str, tuple[Callable[[HullClient], object], type[Exception], str]
         "crosses is 'no'",
     ),
     "a dwell in words": (
-        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", dwell="1h"),
+        lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", dwell="an hour"),
         ValueError,
-        "dwell is '1h'",
+        "dwell is 'an hour'",
     ),
     "a dwell of nothing": (
         lambda c: c.create_fence("odd/zone", Circle(0, 0, 1), "odd/fleet", dwell=1e-9),
