@@ -289,7 +289,7 @@ def test_erasures_one_after_the_other_leave_few_files_and_no_state_for_each(tmp_
         wanted = list(expected(left_out))
         same(read_back(storage, len(wanted)), wanted)
         for revision in (1, 2, 11, len(wanted)):
-            kept = storage.state(1, revision)
+            kept = state(storage, 1, revision)
             if kept.revision:
                 same(kept.contents, replayed(Kept(records=wanted[: kept.revision]), fleet.settings).stored())
 

@@ -19,7 +19,7 @@ from .segment_rows import StoredSegment
 
 
 @dataclass(frozen=True, slots=True)
-class _Run:
+class _Stretch:
     """Consecutive segments without some keys.
 
     Attributes:
@@ -34,15 +34,17 @@ class _Run:
     records: list[Record]
     had: bool
 
-    def takes(self, other: "_Run") -> bool:
+    def takes(self, other: "_Stretch") -> bool:
         """Whether one segment is to have both."""
         moves, more = self._moves, other._moves
         follows = self.segments[-1].last + 1 == other.segments[0].first
         return follows and other.before is None and moves <= 2 * more and moves + more <= MOST_ROWS
 
-    def with_next(self, other: "_Run") -> "_Run":
+    def with_next(self, other: "_Stretch") -> "_Stretch":
         """Both."""
-        return _Run(self.segments + other.segments, self.before, self.records + other.records, self.had or other.had)
+        return _Stretch(
+            self.segments + other.segments, self.before, self.records + other.records, self.had or other.had
+        )
 
     @property
     def _moves(self) -> int:
@@ -80,7 +82,7 @@ class Erasing:
             DamagedError: a file is not as it was written.
             StorageError: it cannot be read at present.
         """
-        run: _Run | None = None
+        run: _Stretch | None = None
         for segment in self.hull.segments:
             if segment.first - 1 > self._until:
                 break
@@ -92,7 +94,7 @@ class Erasing:
             run = read
         yield from self._due(run)
 
-    def _read(self, segment: StoredSegment) -> "_Run":
+    def _read(self, segment: StoredSegment) -> _Stretch:
         """A segment without the keys."""
         with named(segment, STATE):
             before = read_state(self.archive, segment) if segment.facts.state_bytes else None
@@ -105,9 +107,9 @@ class Erasing:
         with named(segment, BATCHES):
             batches = read_batches(self.archive, segment).between(segment.first - 1, segment.last)
         records = [self._record(each) if each.revision <= self._until else each for each in batches]
-        return _Run((segment,), before, records, in_state or self._moves > moves)
+        return _Stretch((segment,), before, records, in_state or self._moves > moves)
 
-    def _due(self, run: "_Run | None") -> Iterator[tuple[tuple[StoredSegment, ...], Due]]:
+    def _due(self, run: _Stretch | None) -> Iterator[tuple[tuple[StoredSegment, ...], Due]]:
         if run is not None and run.had:
             row = self.hull.row
             yield run.segments, Due(row, columns_of(run.records, row.settings.identity), run.before)
