@@ -190,7 +190,7 @@ def test_what_cannot_be_is_refused_by_name(client):
     with pytest.raises(RevisionForgottenError, match="is before the oldest revision with a time") as refused:
         asked(TRIANGLE, "all/a", start="2026-01-01T00:00Z")
     assert refused.value.metadata["field"] == "start_time"
-    with pytest.raises(InvalidRequestError, match="end_revision is 1: is before the start"):
+    with pytest.raises(InvalidRequestError, match="end is 1: is before the start"):
         asked(TRIANGLE, "all/a", start=2, end=1)
     with pytest.raises(HullUnsuitableError, match="before the start"):
         asked(TRIANGLE, "all/a", start=client.at("all/a", 5).time, end=1)

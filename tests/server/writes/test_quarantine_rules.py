@@ -11,6 +11,7 @@ from quarantine_rules import SECOND, Model
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.batch import KeyedBatch, Write
+from dynhull_server.state.contents.joining import in_one
 from dynhull_server.state.errors import (
     InvalidBatchError,
     KeyMissingError,
@@ -69,7 +70,7 @@ class Hull:
     def snapshot(self):
         kept = self.state.kept()
         found, read = chunks.state_from(chunks.state(kept))
-        found.contents = chunks.joined([read(chunks.chunk(kept.contents, cut)) for cut in chunks.cuts(kept.contents)])
+        found.contents = in_one(read(chunks.chunk(kept.contents, cut)) for cut in chunks.cuts(kept.contents))
         found.revision = kept.revision
         self.kept, self.records = found, []
 
