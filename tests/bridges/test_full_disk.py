@@ -60,6 +60,7 @@ def test_a_disk_that_is_full_when_the_relay_starts(tmp_path: Path, endpoint: Rec
     assert delivered(endpoint) == [1, 2]
 
 
+@slow
 def test_a_disk_that_becomes_full_while_the_relay_delivers(tmp_path: Path, endpoint: Receiver) -> None:
     with (
         on_a_small_disk(tmp_path / "small") as (server, client, ballast),

@@ -11,6 +11,7 @@ from typing import Any
 import nats
 import pytest
 from brokers import broker, mosquitto, nats_server
+from cases import slow
 from command_line import dynhull
 from metrics import scrape
 from mortal_server import MortalServer
@@ -76,6 +77,7 @@ def test_an_alarm_and_a_fence_of_one_name(
     assert {f"/hook/alarm/{name}/raised", f"/hook/fence/{name}/enter"} < paths
 
 
+@slow
 def test_kills_of_all_three(tmp_path: Path) -> None:
     server, to = MortalServer(tmp_path), []
     with ExitStack() as stack, HullClient(server.address) as client:

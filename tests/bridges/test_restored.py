@@ -7,6 +7,7 @@ from pathlib import Path
 
 import nats
 from brokers import broker, nats_server
+from cases import slow
 from command_line import dynhull
 from ingest_process import ingest_process, ingested
 from mortal_server import MortalServer
@@ -30,6 +31,7 @@ def publish(port: int, first: int, last: int) -> None:
     asyncio.run(run())
 
 
+@slow
 def test_nothing_is_passed_over_after_a_restore(tmp_path: Path) -> None:
     """The ingest ends, and the next one takes what the backup lacks; the relay tells who is inside, and all since."""
     server, port, file = MortalServer(tmp_path), free_port(), tmp_path / "events"

@@ -150,6 +150,7 @@ def test_own_points_live(tmp_path, address, name, identity):
     assert seen == 2 * (["a", "ab", "abc"] if identity else ["2", "234", "2345"])
 
 
+@slow
 def test_the_positions_of_the_last_half_hour(tmp_path):
     done = demo("--day", "2013-03-08", "--hours", 1, "--window", "30m", "--out", tmp_path / "window.png")
     assert done.exit_code == 0, done.stderr
@@ -180,6 +181,7 @@ def test_what_the_picture_needs_is_missing_before_the_replay(tmp_path: Path, mon
     assert done.stderr.startswith("error: dynhull demo needs matplotlib, which is not installed. Install it with: pip")
 
 
+@slow
 def test_longitudes_and_latitudes_of_ones_own_are_on_the_globe(tmp_path):
     file, picture = tmp_path / "fleet.csv", tmp_path / "fleet.png"
     rows = ["1,a,179,-17", "1,b,-179.5,-18", "1,c,178,-18", "2,a,179.2,-16", "3,c,-18,177"]

@@ -513,6 +513,7 @@ def test_writers_and_watches_go_on_beside_other_shards(client: HullClient, name:
     assert client.verify(name).equal
 
 
+@slow
 def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
     """Workers are killed at any moment while the shards change, again and again; then the whole server."""
     options = (*WORKERS, "--data", str(tmp_path), "--snapshot-points", "100")
@@ -552,6 +553,7 @@ def test_kills_leave_the_old_shards_or_the_new_ones(tmp_path: Path) -> None:
         assert client.verify("fleet").equal
 
 
+@slow
 @pytest.mark.parametrize("options", [(), pytest.param(WORKERS, marks=with_all_cases)], ids=["process", "workers"])
 def test_a_server_that_is_killed_has_the_old_shards_or_the_new_ones(tmp_path: Path, options: tuple[str, ...]) -> None:
     points = np.random.default_rng(5).normal(size=(20_000, 2))
@@ -639,6 +641,7 @@ def in_order(points: np.ndarray) -> list[list[float]]:
 HERDS = "north/a", "cows/a"
 
 
+@slow
 @pytest.mark.parametrize("options", [pytest.param((), marks=with_all_cases), WORKERS], ids=["process", "workers"])
 def test_copies_beside_writes_are_of_one_revision(
     tmp_path: Path, options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch

@@ -266,6 +266,7 @@ def test_a_dump_beside_writes_is_of_one_revision(fleet: Fleet, postgres: Postgre
         assert client.apply(fleet.hull, insert=[[1, 1]]).revision == info.revision + 1
 
 
+@slow
 def test_machines_with_addresses_of_their_own_use_tls(postgres: PostgreSQL, tmp_path: Path) -> None:
     authority = trustme.CA()
     issued = authority.issue_cert("localhost", "127.0.0.1", "127.0.0.2")

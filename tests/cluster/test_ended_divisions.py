@@ -4,6 +4,7 @@ import asyncio
 
 import numpy as np
 import pytest
+from cases import slow
 from live_engine import engine_in_memory, insert
 from patience import PATIENCE
 
@@ -30,6 +31,7 @@ async def left_when_closed(turns: int) -> list[str]:
     return [str(each.get_coro()) for each in asyncio.all_tasks() - {asyncio.current_task()}]
 
 
+@slow
 @pytest.mark.every(8)
 @pytest.mark.parametrize("first", range(0, 16, 2))
 def test_whenever_it_is_closed_nothing_goes_on(first: int) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from client_kinds import CLIENTS
 from cluster import descendants, processes, runs
 from command_line import dynhull
@@ -60,6 +60,7 @@ def again(name: str, server: Server, killed: int) -> None:
     wait_until(lambda: processes(server.process.pid).get(name, killed) != killed)
 
 
+@slow
 @pytest.mark.parametrize("connect", CLIENTS.values(), ids=CLIENTS)
 def test_reads_of_a_pipeline_wait_for_a_killed_worker_and_stay_in_order(
     server: Server, connect: type[HullClient]
@@ -150,6 +151,7 @@ def reaches(client: HullClient) -> bool:
     return True
 
 
+@slow
 def test_a_supervisor_without_descriptors_starts_a_process_once_there_are_some(server: Server) -> None:
     supervisor = server.process.pid
     before = resource.prlimit(supervisor, resource.RLIMIT_NOFILE)
@@ -165,6 +167,7 @@ def test_a_supervisor_without_descriptors_starts_a_process_once_there_are_some(s
         wait_until(lambda: reaches(client))
 
 
+@slow
 def test_all_processes_are_restarted_one_at_a_time(server: Server) -> None:
     before = processes(server.process.pid)
     with HullClient(server.address) as client:
@@ -180,6 +183,7 @@ def test_all_processes_are_restarted_one_at_a_time(server: Server) -> None:
         assert client.get_hull(NAMES[0]).info.points == points + written
 
 
+@slow
 def test_callers_notice_no_restart_even_of_the_only_gateway(tmp_path: Path) -> None:
     options = ("--workers", "2", "--gateways", "1", "--data", str(tmp_path))
     with server_process(*options) as server:
@@ -196,6 +200,7 @@ def test_callers_notice_no_restart_even_of_the_only_gateway(tmp_path: Path) -> N
             assert caller.errors == []
 
 
+@slow
 @with_all_cases  # the gateway is killed after ten seconds
 def test_a_gateway_that_hangs_while_it_is_replaced_ends_with_the_server() -> None:
     options = ("--workers", "1", "--gateways", "1", "--grace", "0")
@@ -214,6 +219,7 @@ def is_pending(number: int, process: int) -> bool:
     return bool(int(pending, 16) & 1 << (number - 1))
 
 
+@slow
 def test_signals_during_a_restart_make_one_more() -> None:
     command = [COMMAND, "serve", "--port", "0", *WORKERS, "--in-memory", "--log-format", "json"]
     with logged_process(command) as server:
@@ -287,6 +293,7 @@ def test_a_killed_supervisor_takes_all_along_and_the_folder_is_served_again(tmp_
     assert "is the folder of a server of one process" in refused(*WORKERS, "--data", copy / "worker-0")
 
 
+@slow
 def test_a_worker_that_is_refused_at_its_start_says_why_and_all_end(tmp_path: Path) -> None:
     with server_process(*WORKERS, "--data", str(tmp_path)):
         pass

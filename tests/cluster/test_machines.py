@@ -56,6 +56,7 @@ def served(url: str) -> dict[str, int]:
     return dict(rows)
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_machines_come_and_go_and_callers_notice_only_that_some_calls_take_longer(url: str) -> None:
     with ExitStack() as stack:
@@ -100,6 +101,7 @@ def test_reads_of_a_pipeline_wait_while_partitions_move(url: str) -> None:
         assert [each.result().info.name for each in asked] == NAMES * (len(asked) // len(NAMES))
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_servers_that_stop_together_leave_nothing_to_each_other(url: str) -> None:
     """Neither waits for the other one to take over, which it would complain about in the end."""
@@ -142,6 +144,7 @@ def test_a_killed_machine_and_a_stopped_one_are_replaced(url: str) -> None:
         assert all(other.verify(name).equal for name in NAMES)
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_operators_see_who_serves_what_and_move_it(url: str) -> None:
     with machine(url) as first, machine(url) as second, HullClient(first.address, retries=0) as client:
@@ -185,6 +188,7 @@ def test_a_worker_that_gave_up_its_partitions_takes_some_when_it_is_started_agai
         assert apply_all(client, 2) == [2] * len(NAMES)
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_worker_that_is_slower_than_another_one_has_not_failed(url: str) -> None:
     join(Database(url), 1)
@@ -213,6 +217,7 @@ def test_a_worker_that_is_slower_than_another_one_has_not_failed(url: str) -> No
         assert not server.said("a partition cannot be served")
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_a_cluster_beside_a_server_of_one_process_says_that_it_waits_for_its_end(url: str) -> None:
     options = ("--journal", url, *QUIET)
@@ -301,6 +306,7 @@ def certified(tmp_path: Path, authority: trustme.CA) -> Callable[..., tuple[str,
     return issue
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_servers_of_a_cluster_connect_with_tls(
     url: str, authority: trustme.CA, certified: Callable[..., tuple[str, ...]]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from cluster import processes
 from command_line import dynhull
 from one_gateway import entries
@@ -51,6 +51,7 @@ def held(copies: HullCopies) -> dict[str, tuple[str, int, list[list[float]]]]:
 MANY_KILLS = pytest.param(34, marks=[with_all_cases, pytest.mark.timeout(1500)])
 
 
+@slow
 @pytest.mark.parametrize("rounds", [1, MANY_KILLS])
 def test_kills(server: Server, rounds: int) -> None:
     """Workers are killed while their hulls change, are deleted and made again, and then the gateway."""

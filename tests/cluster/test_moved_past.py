@@ -116,6 +116,7 @@ def test_a_partition_that_moves_again_and_again_while_segments_close_keeps_the_p
         check(other, last)
 
 
+@slow
 @pytest.mark.parametrize(
     "shape", [(), pytest.param(("--cluster", "--partitions", "1"), marks=slow)], ids=["alone", "cluster"]
 )

@@ -184,6 +184,7 @@ def test_the_owner_serves_until_the_next_one_has_read(pair: Pair) -> None:
     pair.check()
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_an_order_can_be_cancelled(mortal_pair: Pair) -> None:
     pair = mortal_pair
@@ -281,6 +282,7 @@ def contents(client: HullClient, name: str) -> list[Any]:
     return [client.get_hull(name), client.last_sequence(name, "p"), held, sorted(points.points.tolist()), keys]
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_all_kinds_of_hulls_are_followed(mortal_pair: Pair) -> None:
     """What has come since the target has read: keys, places on the globe, what is held, windows, and producers."""
@@ -326,6 +328,7 @@ def events(client: HullClient, alarm: str) -> list[AlarmEvent]:
         return list(islice(stream, last))
 
 
+@slow
 @pytest.mark.one_process("a cluster has a shape of its own")
 def test_alarms_are_followed(mortal_pair: Pair) -> None:
     """Who is raised, who waits and who takes care: what the target has read, and what has come since."""

@@ -10,7 +10,7 @@ from typing import Any
 import grpc
 import numpy as np
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from cluster import processes
 from command_line import dynhull
 from metrics import scrape
@@ -71,6 +71,7 @@ def points_of(client: HullClient, prefix: str = "") -> list[Any]:
     ]
 
 
+@slow
 @pytest.mark.one_process("its owner is the process that the test starts")
 def test_a_killed_server_its_backup_and_the_next_one_have_the_same(
     url: str, postgres: PostgreSQL, tmp_path: Path
@@ -134,6 +135,7 @@ def test_a_network_to_the_database_that_swallows_bytes(url: str) -> None:
             assert (found.revision, found.info.points) == (2, 2)
 
 
+@slow
 @pytest.mark.one_process("a gateway answers for a worker that is away")
 def test_a_database_that_is_away_for_a_while(url: str) -> None:
     given = conninfo_to_dict(url)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from cluster import processes
 from command_line import dynhull
 from patience import wait_until
@@ -78,6 +78,7 @@ def test_workers_on_a_database_are_a_cluster_of_their_own(url: str) -> None:
         goes_on(server, 3)
 
 
+@slow
 def test_a_database_of_workers_of_before_opens(url: str) -> None:
     """They had no tables of a cluster, and one address for callers. They were killed."""
     options = ("--workers", "2", "--journal", url, *QUIET)

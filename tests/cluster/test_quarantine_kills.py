@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cases import with_all_cases
+from cases import slow, with_all_cases
 from cluster import processes
 from command_line import dynhull
 from pacing import pause
@@ -145,6 +145,7 @@ def test_in_folders(tmp_path: Path) -> None:
                     each.check(client)
 
 
+@slow
 @pytest.mark.one_process("a server of several processes has a shape of its own")
 def test_in_postgresql(postgres: PostgreSQL) -> None:
     url = postgres.new_database()

@@ -6,6 +6,7 @@ from typing import NoReturn
 
 import psycopg
 import pytest
+from cases import slow
 from forked import COMMAND
 from logged_process import Logged, logged_process, require_service
 from postgresql import FAST, PostgreSQL, postgresql
@@ -29,6 +30,7 @@ def serving(url: str, *options: str) -> Iterator[Logged]:
         yield logged
 
 
+@slow
 def test_a_database_that_recovers_is_waited_for(server: PostgreSQL) -> None:
     urls = [server.new_database() for _ in SHAPES]
     server.kill()

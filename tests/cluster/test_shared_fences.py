@@ -54,6 +54,7 @@ class Follower:
         self._watch.close()
 
 
+@slow
 def test_everybody_gets_every_event_once(place: Place, client: HullClient) -> None:
     fenced(client, "all")
     cross(client, "all", 10)

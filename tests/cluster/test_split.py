@@ -189,6 +189,7 @@ def test_a_database_is_divided_while_all_kinds_of_callers_go_on(url: str) -> Non
         assert "has 4 partitions already" in split(url).stdout
 
 
+@slow
 def test_fences_that_would_lie_apart_are_named_and_nothing_is_changed(url: str) -> None:
     with one_server(url) as client:
         fill(client)
@@ -211,6 +212,7 @@ def test_fences_that_would_lie_apart_are_named_and_nothing_is_changed(url: str) 
     assert rows(url) == before
 
 
+@slow
 def test_a_split_that_is_killed_has_changed_nothing_and_the_next_one_ends_it(url: str) -> None:
     with machine(url) as server:
         writer = writing([server])

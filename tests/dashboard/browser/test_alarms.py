@@ -38,7 +38,6 @@ def heading(page: Page) -> Locator:
     return page.locator(".alarms h2")
 
 
-@pytest.mark.smoke
 def test_an_alarm_is_raised_acknowledged_muted_and_cleared(
     browser: Browser, url: str, client: HullClient, fleet: str
 ) -> None:

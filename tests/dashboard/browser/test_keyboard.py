@@ -68,7 +68,6 @@ def in_address(page: Page, text: str) -> None:
     page.wait_for_function("text => decodeURIComponent(location.search).includes(text)", arg=text)
 
 
-@pytest.mark.smoke
 def test_tab_comes_to_each_control(browser: Browser, url: str, fleet: str) -> None:
     with opened(browser, url, fleet, fences=[fleet]) as page:
         ready(page, fleet)

@@ -166,7 +166,6 @@ def test_the_list_has_the_newest_events(page: Page) -> None:
     assert lost == ["lost", "", "events 300 to 900"]
 
 
-@pytest.mark.smoke
 def test_a_hull_across_180_degrees_is_drawn_in_one_piece(
     browser: Browser, url: str, client: HullClient, name: str
 ) -> None:

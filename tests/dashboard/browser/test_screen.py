@@ -131,7 +131,6 @@ def test_nothing_overprints(browser: Browser, url: str) -> None:
         page.set_viewport_size({"width": 1440, "height": 900})
 
 
-@pytest.mark.smoke
 def test_axe_finds_nothing(browser: Browser, url: str) -> None:
     script = axe()
     with screen(browser, url) as page:

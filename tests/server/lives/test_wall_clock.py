@@ -6,6 +6,7 @@ from pathlib import Path
 
 import grpc
 import wall_clock
+from cases import slow
 from entity_messages import SECOND, STRINGS, duration, keys, points, puts, times, window
 from patience import wait_until
 from server_process import server_process
@@ -68,6 +69,7 @@ def wait_for(stub: HullServiceStub, name: str, revision: int, count: int) -> int
     return hull.clock_time.ToMicroseconds()
 
 
+@slow
 def test_points_leave_once_and_in_time_whatever_the_wall_clock_says(tmp_path: Path) -> None:
     brief = round(BRIEF * SECOND)
     with life(tmp_path / "data", "-0") as stub:

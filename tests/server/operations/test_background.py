@@ -12,6 +12,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from metrics import scrape
 from patience import PATIENCE, wait_until
@@ -199,6 +200,7 @@ def written(client: HullClient) -> bool:
     return True
 
 
+@slow
 def test_without_descriptors_what_was_acknowledged_stays_and_all_goes_on_afterwards(tmp_path: Path) -> None:
     data = str(tmp_path / "data")
     points = np.random.default_rng(6).normal(size=(600, 5, 2))

@@ -11,6 +11,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from google.protobuf.descriptor_pool import DescriptorPool
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
@@ -131,6 +132,7 @@ def test_what_a_writer_that_has_gone_left_behind_does_not_hold_up_the_end() -> N
         server.process.terminate()  # in peace, and without a word
 
 
+@slow
 @pytest.mark.one_process("a supervisor has one thread")
 def test_a_signal_that_another_thread_gets_ends_the_server() -> None:
     with server_process() as server:
