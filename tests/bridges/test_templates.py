@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from brokers import broker, mosquitto
+from cases import slow
 from command_line import dynhull
 from patience import wait_until
 from ports import free_port
@@ -177,6 +178,7 @@ def test_a_template_that_makes_too_much() -> None:
         made("{{ inside }}", event)
 
 
+@slow
 def test_a_template_that_takes_too_long() -> None:
     event = FenceEvent("snapshot", 1, "yard", "uid", inside=(SubjectsInside("a", ("k" * 200,) * 20_000, 1),))
     begun = time.thread_time()

@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from cases import slow
 from command_line import dynhull
 from forked import COMMAND, Process
 from patience import wait_until
@@ -248,6 +249,7 @@ def test_a_load_keeps_the_name_that_earlier_versions_gave_it(tmp_path, served, n
         assert client.last_sequence(name, f"load-{digest[:32]}") == 1
 
 
+@slow
 def test_resume_after_the_command_was_killed(tmp_path, served, name):
     points = np.random.default_rng(9).normal(size=(60_000, 2))
     file = tmp_path / "points.csv"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from cases import slow
 from forked import COMMAND
 from metrics import fetch, measured
 from patience import PATIENCE
@@ -39,6 +40,7 @@ def test_prometheus_takes_the_configuration() -> None:
     accepted("promtool", "check", "config", KIT / "prometheus/prometheus.yml")
 
 
+@slow
 def test_alerts_fire_on_what_they_are_for() -> None:
     accepted("promtool", "test", "rules", KIT / "prometheus/alerts_test.yml")
 

@@ -49,6 +49,7 @@ def seen(page: Page, url: str) -> dict[str, Any]:
     return page.evaluate("url => window.seen[url]", url)
 
 
+@slow
 def test_a_browser_misses_nothing_over_restarts(browser: Browser, tmp_path: Path) -> None:
     """The server is restarted, then the gateway, while points and keys come: every event once, and the exact hull."""
     served = ["--data", str(tmp_path), "--port", str(free_port())]

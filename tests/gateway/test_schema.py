@@ -67,6 +67,7 @@ def remove(gateway: Gateway, hulls: list[str]) -> None:
         gateway.call("DELETE", f"/hulls/{name}")
 
 
+@slow
 def test_every_example_of_the_description_works(gateway: Gateway) -> None:
     """In the order of the description, and then deletions in the reverse order."""
     described = gateway.get("/openapi.json").json

@@ -5,6 +5,7 @@ from math import floor
 
 import numpy as np
 import pytest
+from cases import slow
 from globes import GEO_HULLS, GEO_KEYED_HULLS, GEO_WINDOW_HULLS, around, random_center
 
 from dynhull import GeoHull
@@ -65,6 +66,7 @@ def test_the_hull_of_the_nearest_points(kind):
         hull.mcp(101)
 
 
+@slow
 def test_sketches_and_how_far_the_hull_reaches_beyond_them(kind):
     sets = [points for _, points in random_sets()][::4]  # around all centres, of all radii
     sets.append(around(np.random.default_rng(8), (12.0, 40.0), 80, 9))  # edges pass over others

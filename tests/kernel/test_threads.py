@@ -9,6 +9,7 @@ from itertools import cycle
 
 import numpy as np
 import pytest
+from cases import slow
 from inputs import cloud
 
 from dynhull import DynamicHull, FenceIndex, KeyedHull, _kernel
@@ -201,6 +202,7 @@ def test_other_threads_run_during_queries(method):
         counter.join()
 
 
+@slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on this system")
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 @pytest.mark.usefixtures("impatient")

@@ -242,6 +242,7 @@ copies.copy(Path(sys.argv[1]), Path(sys.argv[2]), strike if sys.argv[3] == "prog
 """
 
 
+@slow
 @pytest.mark.parametrize(
     ("where", "nth", "whole"),
     [

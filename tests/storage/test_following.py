@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cases import slow
 from folders import append, appended, committed_at, events, fence_row, no_progress, record, same
 from live_engine import LIMITS
 from postgresql import query
@@ -177,6 +178,7 @@ def loaded(contents: Any) -> list[int]:
     return [row.number for row in contents.hulls if row.settings.shard is None]
 
 
+@slow
 @pytest.mark.every(3)
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_read_ahead_is_what_is_there(url, seed, tmp_path):

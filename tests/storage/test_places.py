@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
+from cases import slow
 from folders import append, fill, no_progress
 from patience import wait_until
 from postgresql import PostgreSQL, postgresql, query
@@ -41,6 +42,7 @@ def uids(storage: PostgresStorage) -> list[str]:
     return [row.uid for row in storage.open(no_progress).hulls]
 
 
+@slow
 def test_another_timeline(server: PostgreSQL) -> None:
     url = server.new_database()
 

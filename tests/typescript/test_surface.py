@@ -186,6 +186,7 @@ def documented() -> dict[str, set[str]]:
     return {each[1]: set(re.findall(r"@property \{.*\} \[?(\w+)", each[0])) for each in found}
 
 
+@slow
 @pytest.mark.parametrize(("schema", "name"), TYPES.items())
 def test_types_have_the_fields_of_the_gateways_description(schema: str, name: str) -> None:
     described = (ROOT / "tests" / "surface" / "goldens" / "openapi.txt").read_text()

@@ -88,6 +88,7 @@ def flooded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield server
 
 
+@slow
 @needs_proc
 @pytest.mark.every(2)
 @pytest.mark.parametrize("token", ["", "wrong"])

@@ -69,6 +69,7 @@ def test_the_past_is_dropped_by_the_time_of_its_commits_after_the_clock_was_set_
         wait_until(dropped)
 
 
+@slow
 def test_readers_at_once_share_a_past_and_a_segment_that_is_gone_is_named(tmp_path):
     options = "--data", str(tmp_path), *SNAPSHOTS
     with measured(*options, complaints=HOLE) as (server, metrics), HullClient(server.address) as client:

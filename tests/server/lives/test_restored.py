@@ -13,6 +13,7 @@ from pathlib import Path
 import grpc
 import postgresql
 import pytest
+from cases import slow
 from client_kinds import CLIENTS
 from command_line import dynhull
 from gateway_process import gateway_process
@@ -179,6 +180,7 @@ def stub(before: Before) -> Iterator[HullServiceStub]:
         yield HullServiceStub(channel)
 
 
+@slow
 @pytest.mark.parametrize("kind", CLIENTS)
 def test_a_writer_ends(before: Before, kind: str) -> None:
     writer, revision = before.writers[kind], before.client.get_hull(f"r/{kind}").info.revision

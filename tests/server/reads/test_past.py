@@ -10,6 +10,7 @@ import grpc
 import numpy as np
 import pytest
 from application_call import called
+from cases import slow
 from command_line import dynhull
 from proxy import proxy
 from server_process import run, server_process
@@ -139,7 +140,7 @@ def served(recorded):
         yield server.address, seen
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=slow) if name == "globe" else name for name in KINDS])
 def test_every_revision_answers_as_it_did(served, name):
     address, seen = served
     order = list(seen[name])

@@ -5,6 +5,7 @@ import struct
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from refusal import refusal
 from server_process import server_process
 
@@ -16,6 +17,7 @@ from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
 from dynhull_server.engine.verification import LARGE
 
 
+@slow
 @pytest.mark.long
 def test_a_large_hull_is_written_read_and_verified() -> None:
     points = np.random.default_rng(6).normal(size=(LARGE + 100, 2))

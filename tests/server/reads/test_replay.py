@@ -6,7 +6,7 @@ from contextlib import aclosing, asynccontextmanager
 
 import numpy as np
 import pytest
-from cases import one_of
+from cases import one_of, slow
 from hypothesis import given
 from hypothesis import strategies as st
 from live_engine import engine_in_memory, insert
@@ -109,6 +109,7 @@ def test_what_is_due_at_once_is_one_event():
     asyncio.run(life())
 
 
+@slow
 @given(st.integers(1, 30_000))
 @one_of(3)
 def test_events_are_a_span_of_the_past_apart(every: int):

@@ -7,6 +7,7 @@ from pathlib import Path
 import grpc
 import numpy as np
 import pytest
+from cases import slow
 from live_engine import engine_in_memory, insert
 from refusal import refusal
 from server_process import server_process
@@ -48,6 +49,7 @@ def xy(points: points_pb2.Points) -> np.ndarray:
     return flat.reshape(-1, 2)
 
 
+@slow
 def test_a_plain_client_reads_a_hull_beyond_its_largest_message(
     client: HullClient, stub: HullServiceStub, hull: str
 ) -> None:
