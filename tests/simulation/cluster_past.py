@@ -80,7 +80,7 @@ class SharedRows(RowStorage):
     def settle(self) -> CommitStamp:
         """Look what became of it."""
         if self._unsettled:
-            self._renew(self._examined(lambda *_: None, contents=False).ledger)
+            self._renew(self._examined(lambda *_: None, contents=False))
         return self._latest
 
     @property
