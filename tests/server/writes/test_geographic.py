@@ -5,7 +5,7 @@ import json
 import grpc
 import numpy as np
 import pytest
-from cases import slow
+from cases import RESTARTS
 from command_line import dynhull as command
 from odd_places import NO_PLACES, TAKEN, TOO_FAR
 from patience import PATIENCE
@@ -239,15 +239,7 @@ def test_two_hulls_about_different_centres_are_compared(client, name):
         client.separate(f"{name}-a", f"{name}-plane")
 
 
-@pytest.mark.parametrize(
-    ("snapshot_points", "sudden"),
-    [
-        (1, True),
-        (1_000_000, False),
-        pytest.param(1, False, marks=slow),
-        pytest.param(1_000_000, True, marks=slow),
-    ],
-)
+@pytest.mark.parametrize(("snapshot_points", "sudden"), RESTARTS)
 def test_a_restart_gives_the_very_doubles_and_the_centre(tmp_path, sudden, snapshot_points):
     rng = np.random.default_rng(3)
     fleet = rng.uniform([170, -40], [200, 10], (400, 2))

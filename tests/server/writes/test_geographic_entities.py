@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from cases import slow
+from cases import RESTARTS
 from command_line import dynhull as command
 from patience import PATIENCE
 from server_process import server_process
@@ -95,15 +95,7 @@ def test_a_first_batch_of_a_window_that_deletes_what_it_inserts_chooses_by_the_r
     assert client.verify(name).equal
 
 
-@pytest.mark.parametrize(
-    ("snapshot_points", "sudden"),
-    [
-        (1, True),
-        (1_000_000, False),
-        pytest.param(1, False, marks=slow),
-        pytest.param(1_000_000, True, marks=slow),
-    ],
-)
+@pytest.mark.parametrize(("snapshot_points", "sudden"), RESTARTS)
 def test_a_restart_gives_keys_times_and_the_centre(tmp_path, sudden, snapshot_points):
     rng = np.random.default_rng(4)
     options = ["--data", str(tmp_path / "data"), "--snapshot-points", str(snapshot_points)]

@@ -1,6 +1,6 @@
 """The short way of Stream beside the whole way: the same results, refusals and bytes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -206,6 +206,15 @@ def test_equal_refusals_of_several(same: Callable[..., Answers], hull: str) -> N
     assert error[0] == grpc.StatusCode.INVALID_ARGUMENT
 
 
+def changes(examples: list[bytes], random: np.random.Generator, within: int | None = None) -> Iterator[bytes]:
+    """Messages with a few other bytes, perhaps only within so many at the beginning, of which some end early."""
+    for turn in range(20_000):
+        data = bytearray(examples[turn % len(examples)])
+        for place in random.integers(min(len(data), within or len(data)), size=random.integers(3)):
+            data[place] = random.integers(256)
+        yield bytes(data[: len(data) - random.integers(2) * random.integers(20)])
+
+
 @needs_compiled
 def test_reads_only_keys_that_it_understands() -> None:
     """Of any bytes, what is read short is all that the message has."""
@@ -219,11 +228,7 @@ def test_reads_only_keys_that_it_understands() -> None:
         examples.append(pb.StreamRequest(name=called, batch=batch).SerializeToString())
     assert all(native.puts_message(data) for data in examples)
     short = 0
-    for turn in range(20_000):
-        data = bytearray(examples[turn % len(examples)])
-        for place in random.integers(len(data), size=random.integers(3)):
-            data[place] = random.integers(256)
-        changed = bytes(data[: len(data) - random.integers(2) * random.integers(20)])
+    for changed in changes(examples, random):
         found = native.puts_message(changed)
         if found is None:
             continue
@@ -253,11 +258,7 @@ def test_reads_only_what_it_understands() -> None:
     examples.append(message("a" * 200, np.zeros((2000, 2))))
     assert all(native.points_message(data) for data in examples)
     short = 0
-    for turn in range(20_000):
-        data = bytearray(examples[turn % len(examples)])
-        for place in random.integers(min(len(data), 24), size=random.integers(3)):
-            data[place] = random.integers(256)
-        changed = bytes(data[: len(data) - random.integers(2) * random.integers(20)])
+    for changed in changes(examples, random, 24):
         found = native.points_message(changed)
         if found is None:
             continue
