@@ -46,7 +46,7 @@ class _Lane:
     """What one caller asks of one hull."""
 
     waiting: deque[_Waiting] = field(default_factory=deque)
-    tasks: set[asyncio.Task[None]] = field(default_factory=set)
+    tasks: set[asyncio.Task[None] | None] = field(default_factory=set)
 
 
 class Gatherer:
@@ -78,7 +78,6 @@ class Gatherer:
         if len(lane.tasks) < IN_FLIGHT:
             task = asyncio.create_task(self._run(to, ask, lane), name="gathered requests")
             lane.tasks.add(task)
-            task.add_done_callback(lane.tasks.discard)
         return await waiting.answer
 
     async def _run(self, to: Hashable, ask: _Ask, lane: _Lane) -> None:
@@ -89,10 +88,13 @@ class Gatherer:
                 together = _next(lane.waiting)
                 await _send(ask, together)
         finally:
+            # Not when the task is done, a turn later: a request that arrives in between would wait for an ended task.
+            lane.tasks.discard(asyncio.current_task())
+            if not lane.tasks:
+                self._lanes.pop(to)
+                together.extend(lane.waiting)
             for each in together:  # if the task was cancelled: nobody else would answer them
                 _fail(each, ProblemError(503, "the gateway stops", "DRAINING"))
-            if not lane.waiting and len(lane.tasks) == 1:
-                self._lanes.pop(to, None)
 
 
 def _kind(batch: Batch) -> frozenset[object] | None:
@@ -129,11 +131,12 @@ async def _send(ask: _Ask, together: Sequence[_Waiting]) -> None:
     """Ask together and answer each; after a refusal, each half on its own, so that each has its own error."""
     try:
         answers = await ask(together)
-    except (DynhullError, ValueError, TypeError) as error:
+    except Exception as error:
+        unlike = not isinstance(error, DynhullError | ValueError | TypeError)
         uncertain = isinstance(error, DynhullError) and (
             not error.reason or isinstance(error, OutcomeUnknownError | UnavailableError)
         )
-        if len(together) == 1 or uncertain:
+        if len(together) == 1 or uncertain or unlike:
             for each in together:
                 _fail(each, error)
             return
