@@ -8,9 +8,10 @@ from threading import Event
 import numpy as np
 import pytest
 
-from dynhull import FenceIndex, GeoKeyedHull, KeyedHull, _kernel
+from dynhull import FenceIndex, GeoKeyedHull, KeyedHull
+from dynhull._implementation import kernel
 
-if _kernel is None:
+if kernel is None:
     pytest.skip("the implementation in Python holds them in one way", allow_module_level=True)
 
 PLACES = np.random.default_rng(5).random((100, 2))
@@ -80,7 +81,7 @@ def test_each_call_finds_what_was_packed(name):
 
 def test_every_call_is_tried():
     """Of the methods that read or change the tree: those that it has, under their own names."""
-    native = {name for name in dir(_kernel.Entities) if callable(getattr_static(_kernel.Entities, name))}
+    native = {name for name in dir(kernel.Entities) if callable(getattr_static(kernel.Entities, name))}
     native -= {name for name in native if name.startswith("_")}
     elsewhere = {
         "pack": None,

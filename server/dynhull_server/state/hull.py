@@ -14,7 +14,6 @@ class Hull:
 
     Attributes:
         row: its identity and settings, as stored.
-        state: its points; read and change them only in a trip of its queue. They are made when they are needed.
         counts: the counts at the latest committed revision.
         committed: the commit of its latest revision, or of its creation, or a later one before anything else was
             published; None for one of formats that did not store it.
@@ -27,17 +26,13 @@ class Hull:
     """
 
     __slots__ = (
-        *("_dormant", "between", "committed", "counts", "divided", "due", "ended", "row", "state", "timed", "unsaved"),
+        *("_dormant", "_state", "between", "committed", "counts", "divided", "due", "ended", "row", "timed", "unsaved"),
     )
 
     def __init__(self, row: HullRow, state: HullState | Dormant, unsaved: int = 0) -> None:
         self.row = row
-        self._dormant: Dormant | None = None
-        self.state: HullState
-        if isinstance(state, Dormant):
-            self._dormant = state
-        else:
-            self.state = state
+        self._dormant = state if isinstance(state, Dormant) else None
+        self._state = None if isinstance(state, Dormant) else state
         self.counts: Counts = state.counts
         self.committed: CommitStamp | None = state.committed
         self.unsaved = unsaved
@@ -47,19 +42,24 @@ class Hull:
         self.divided = row.settings.divided
         self.due: int | None = None
 
-    def __getattr__(self, name: str) -> HullState:
-        """The state, where it has not been made: otherwise it is found before this is asked."""
-        if name != "state":
-            raise AttributeError(f"a hull has no {name!r}")
+    @property
+    def state(self) -> HullState:
+        """Its points; read and change them only in a trip of its queue."""
+        state = self._state
+        return self._woken() if state is None else state
+
+    def _woken(self) -> HullState:
+        """The state, made by whoever needs it first."""
         with WAKING:  # a thread may need it that reads, and the event loop
-            if self._dormant is not None:
-                self.state, self._dormant = self._dormant.wake(self.row.settings), None
-        return self.state
+            if self._state is None:
+                assert self._dormant is not None
+                self._state, self._dormant = self._dormant.wake(self.row.settings), None
+            return self._state
 
     def replace(self, state: HullState) -> None:
         """Have this state, which the storage has."""
         with WAKING:
-            self.state, self._dormant = state, None
+            self._state, self._dormant = state, None
 
     def put_away(self) -> None:
         """Hold the keys of a small hull in less memory, if nobody has used them since the last call."""

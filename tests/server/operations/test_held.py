@@ -14,10 +14,10 @@ from forked import Process
 from holdings import KINDS, OPTIONS, Hold
 from patience import PATIENCE
 
-from dynhull import _kernel
+from dynhull._implementation import kernel
 from dynhull_client import AsyncHullClient
 
-if _kernel is None:
+if kernel is None:
     pytest.skip("the implementation in Python takes more", allow_module_level=True)
 
 PAGE = Path(__file__).parents[3] / "docs" / "performance.md"
