@@ -2,10 +2,12 @@
 
 import { invalid } from "./errors.js"
 import { isoTime, micros } from "./json.js"
+import { spanOf } from "./spans.js"
 
 /**
  * @typedef {import("./exact.js").Point} Point
  * @typedef {string | number | bigint} AnyKey
+ * @typedef {import("./spans.js").Span} Span
  * @typedef {bigint | Date | string} Time microseconds since 1970, a Date, or a text in ISO 8601 with its zone
  * @typedef {"put" | "remove" | "insert" | "delete" | "move"} Operation
  *
@@ -19,7 +21,7 @@ import { isoTime, micros } from "./json.js"
  *
  * @typedef {object} Conditions what all rows of a batch have in common
  * @property {"absent" | "present"} [only]
- * @property {number} [ttl] seconds
+ * @property {Span} [ttl]
  * @property {"raise" | "count"} [missing]
  *
  * @typedef {object} Rows checked
@@ -94,7 +96,7 @@ function keyOf(field, row, key) {
 function conditionsOf({ only, ttl, missing }) {
   if (only && only !== "absent" && only !== "present") throw invalid("only", null, only, "must be absent or present")
   if (missing && missing !== "raise" && missing !== "count") throw invalid("missing", null, missing, "must be raise or count")
-  if (ttl !== undefined && !(Number.isFinite(ttl) && ttl > 0)) throw invalid("ttl", null, ttl, "must be seconds, more than 0")
+  if (ttl !== undefined && !(spanOf("ttl", ttl) > 0)) throw invalid("ttl", null, ttl, "must be more than 0 seconds")
 }
 
 /** Microseconds since 1970. @param {string} field @param {number | null} row @param {any} time @returns {bigint} */

@@ -14,6 +14,7 @@ const SILENCE = 45
  * @typedef {import("./writer.js").AnyKey} AnyKey
  * @typedef {import("./writer.js").Time} Time
  * @typedef {import("./json.js").Moment} Moment
+ * @typedef {import("./spans.js").Span} Span
  * @typedef {import("./past.js").Past} Past
  * @typedef {{signal?: AbortSignal | null}} Abortable
  *
@@ -74,7 +75,7 @@ const SILENCE = 45
  * @property {readonly AnyKey[]} [release]
  * @property {readonly AnyKey[]} [drop]
  * @property {"absent" | "present"} [only]
- * @property {number} [ttl]
+ * @property {Span} [ttl]
  * @property {readonly Time[]} [expireTimes]
  * @property {readonly number[]} [accuracies]
  * @property {"raise" | "count"} [missing]
@@ -86,10 +87,10 @@ const SILENCE = 45
  *
  * @typedef {object} NewHull
  * @property {"str" | "int" | null} [keyed]
- * @property {number | null} [maxAge] seconds
+ * @property {Span | null} [maxAge]
  * @property {number | null} [maxPoints]
  * @property {"server" | "data"} [clock]
- * @property {number | null} [maxSkew]
+ * @property {Span | null} [maxSkew]
  * @property {"refuse" | "clamp"} [ahead]
  * @property {"arrival" | "event_time"} [ordering]
  * @property {number | null} [pointLimit]
@@ -97,7 +98,7 @@ const SILENCE = 45
  * @property {Point | null} [center]
  * @property {Quarantine | null} [quarantine]
  * @property {number | null} [shards]
- * @property {boolean | number | string | null} [history]
+ * @property {boolean | Span | null} [history]
  * @property {number | null} [historyBytes]
  * @property {boolean} [existOk]
  *
@@ -113,21 +114,21 @@ const SILENCE = 45
  * @property {"closed" | "open"} [boundary]
  * @property {number} [margin]
  * @property {boolean} [crosses]
- * @property {number} [dwell]
+ * @property {Span} [dwell]
  * @property {number} [confirmations]
- * @property {number} [minDwell]
+ * @property {Span} [minDwell]
  * @property {boolean} [byAccuracy]
  * @property {number} [near]
  * @property {boolean} [withoutSelf]
  * @property {number} [layer]
  * @property {number} [maxEvents]
- * @property {number} [maxEventAge]
+ * @property {Span} [maxEventAge]
  * @property {readonly AnyKey[]} [expected] keys that should be inside
  * @property {string} [expectedBy] by this time of day, such as "18:00 Europe/Berlin Mon-Fri",
- * @property {number} [expectedWithin] or for the last time so many seconds ago
+ * @property {Span} [expectedWithin] or for the last time so long ago
  *
  * @typedef {FenceSettings & {name: string, created: bigint, uid: string, lastSequence: bigint, firstSequence: bigint,
- *   inside: number, subjectCount: number, consumers: Consumer[]}} Fence
+ *   dwell?: number, minDwell?: number, maxEventAge?: number, expectedWithin?: number, inside: number, subjectCount: number, consumers: Consumer[]}} Fence
  * @typedef {{name: string, acknowledged: bigint, backlog: number, oldest: bigint | null, lost: number}} Consumer
  *
  * @typedef {object} FeedConsumer a durable reader of the feed of a hull, or of a prefix
@@ -145,9 +146,9 @@ const SILENCE = 45
  * @property {string} [prefix] or what the names of all hulls that are watched begin with
  * @property {string} when the condition, such as `area > 500 km2`, `silent 5m`, `near fleet/south 3 km`
  * @property {string} [clear] what clears it; default: its opposite
- * @property {number | string} [for] how long it must hold before: seconds, or a text such as 30s
+ * @property {Span} [for] how long it must hold before
  * @property {number} [maxEvents]
- * @property {number} [maxEventAge] seconds
+ * @property {Span} [maxEventAge]
  *
  * @typedef {object} AlarmStatus an alarm at one hull
  * @property {string} hull
@@ -411,7 +412,7 @@ export class Client extends Streams {
   /**
    * How counts and measures were over the last hour: a row about every ten seconds in which the hull changed.
    * @param {string} name
-   * @param {{last?: number} & Abortable} [options] `last`: seconds
+   * @param {{last?: Span} & Abortable} [options]
    * @returns {Promise<Series>}
    */
   async series(name, { last, signal } = {}) {
@@ -484,7 +485,7 @@ export class Client extends Streams {
   /**
    * Change how much of its past a hull keeps.
    * @param {string} name
-   * @param {boolean | number | string | null} history seconds, a text such as 30d, true for ever, null for not at all
+   * @param {boolean | Span | null} history how long, true for ever, null for not at all
    * @param {{historyBytes?: number | null} & Abortable} [options]
    * @returns {Promise<HullInfo>}
    */
@@ -509,8 +510,8 @@ export class Client extends Streams {
    * Where keys were between two moments.
    * @param {string} name
    * @param {readonly AnyKey[]} keys
-   * @param {{start?: Moment, end?: Moment, every?: number} & Abortable} [options] `every`: of each key the last place in
-   *   each span of so many seconds alone
+   * @param {{start?: Moment, end?: Moment, every?: Span} & Abortable} [options] `every`: of each key the last place in
+   *   each span of this length alone
    * @returns {Promise<Map<Key, Track>>}
    */
   async track(name, keys, { start, end, every, signal } = {}) {

@@ -1,4 +1,5 @@
 import { path, problem } from "./connection.js"
+import { invalid } from "./errors.js"
 import { fromWire, momentOf, toWire } from "./json.js"
 import { Reads } from "./reads.js"
 import { alarmEvent, fenceEvent, hullEvent, hullNow } from "./watch.js"
@@ -8,6 +9,7 @@ import { alarmEvent, fenceEvent, hullEvent, hullNow } from "./watch.js"
  * @typedef {import("./hull-copies.js").HullCopies} HullCopies
  * @typedef {import("./joined.js").Following} Following
  * @typedef {import("./json.js").Moment} Moment
+ * @typedef {import("./spans.js").Span} Span
  * @typedef {import("./watch.js").HullEvent} HullEvent
  * @typedef {import("./watch.js").FenceEvent} FenceEvent
  * @typedef {import("./watch.js").AlarmEvent} AlarmEvent
@@ -24,9 +26,11 @@ import { alarmEvent, fenceEvent, hullEvent, hullNow } from "./watch.js"
  *
  * @typedef {Following & View & {wait?: boolean}} WatchOptions `wait`: for a hull that is not there yet, as is usual; else that is
  *   refused
- * @typedef {Following & View & {start?: Moment, end?: Moment, speed?: number, every?: number}} ReplayOptions
+ * @typedef {Following & View & {start?: Moment, end?: Moment, speed?: number, every?: Span}} ReplayOptions
  * @typedef {Following & {outlines?: boolean, maxVertices?: number, rate?: number, copies?: HullCopies}} ManyOptions
  */
+
+const POSITION = /^([0-9a-f]{2})+$/
 
 /** What can be followed: async iterators. Those of one client share a connection, whatever their number. */
 export class Streams extends Reads {
@@ -65,7 +69,7 @@ export class Streams extends Reads {
    * The past of a hull, from one moment to another one: the events that a watch would have had.
    * @param {string} name
    * @param {ReplayOptions} [options] `speed` says how many seconds of the past go by in one; 0, the default: as fast as
-   *   they are read. `every` is the least number of seconds of the past between events
+   *   they are read. `every` is the least time of the past between events
    * @returns {AsyncGenerator<HullEvent, void, undefined>}
    */
   async *replay(name, { start, end, speed, every, ...options } = {}) {
@@ -157,6 +161,7 @@ export class Streams extends Reads {
    * @returns {AsyncGenerator<FeedEvent, void, undefined>}
    */
   async *feedMany(prefix, { consumer, begin, position, ...following } = {}) {
+    if (position && !POSITION.test(position)) throw invalid("position", null, position, "must be the position of an event")
     const query = { prefix, consumer, begin: begin || undefined }
     yield* batches(this.#joined.follow("/feed", query, following, position))
   }

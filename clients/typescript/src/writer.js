@@ -29,7 +29,7 @@ import { InFlight } from "./in-flight.js"
  * @typedef {object} Putting
  * @property {readonly Time[]} [times] of the positions
  * @property {"absent" | "present"} [only] puts keys only if they are new, or only if they are there
- * @property {number} [ttl] seconds after which the keys leave,
+ * @property {import("./spans.js").Span} [ttl] after which the keys leave,
  * @property {readonly Time[]} [expireTimes] or the moments
  * @property {readonly number[]} [accuracies] how far the positions may be from where the keys really are
  */

@@ -46,6 +46,19 @@ live("hulls are created, written, asked and deleted", async (client, name) => {
   await assert.rejects(client.getHull(hull), { reason: "HULL_NOT_FOUND", status: 404 })
 })
 
+live("time spans are seconds or texts", async (client, name) => {
+  const [hull, fence] = [name("spans"), name("spans")]
+  await client.createHull(hull, { keyed: "str", maxAge: "1h", maxSkew: "500ms" })
+  const { inserted } = await client.put(hull, ["a"], [[0, 0]], { ttl: "30d" })
+  assert.equal(inserted, 1)
+  const area = { center: [0, 0], radius: 1 }
+  await client.createFence(fence, { area, subjects: hull, dwell: "1.5m", minDwell: "2s", maxEventAge: "7d" })
+  const { dwell, minDwell, maxEventAge } = await client.getFence(fence)
+  assert.deepEqual([dwell, minDwell, maxEventAge], [90, 2, 604800])
+  const { times } = await client.series(hull, { last: "30m" })
+  assert.ok(times.length > 0)
+})
+
 live("refusals name the field, the row and the value", async (client, name) => {
   const hull = name("refused")
   await client.createHull(hull)
@@ -422,7 +435,7 @@ live("a writer moves points, and puts keys under conditions", async (client, nam
   const writer = client.writer(keyed)
   await writer.put(["a", "b"], [[0, 0], [4, 0]], { accuracies: [0.5, 2] })
   await writer.put(["a", "c"], [[9, 9], [4, 3]], { only: "absent" })
-  await writer.put(["d"], [[1, 1]], { ttl: 0.05 })
+  await writer.put(["d"], [[1, 1]], { ttl: "50ms" })
   await writer.put(["e"], [[1, 2]], { expireTimes: [new Date(Date.now() - 1000)] })
   await writer.flush()
   const found = await client.positions(keyed, ["a", "b", "c"])
@@ -448,6 +461,10 @@ live("refusals name what is at fault as calls do", async (client, name) => {
     [() => client.put(keyed, ["a", ""], [[0, 0], [1, 1]]), "keys", 1, /^\/keys\/1: /],
     [() => client.put(keyed, ["a", "b"], [[0, 0], [1, 1]], { accuracies: [1, -1] }), "accuracies", 1, /^\/accuracies\/1: must /],
     [() => client.put(keyed, ["a"], [[0, 0]], { ttl: -1 }), "ttl", null, /^\/ttl: must be /],
+    [() => client.put(keyed, ["a"], [[0, 0]], { ttl: "soon" }), "ttl", null, /^\/?ttl: /],
+    [() => client.createHull(name("refusals/new"), { maxAge: "soon" }), "max_age", null, /^\/?max_age: /],
+    [() => client.writer(keyed).put(["a"], [[0, 0]], { ttl: "soon" }), "ttl", null, /^\/ttl: /],
+    [() => client.feedMany("", { position: "soon" }).next(), "position", null, /^\/position: must be /],
     [() => client.remove(keyed, ["zz"], { missing: "raise" }), "remove", 0, /^\/remove\/0: no such key/],
     [() => client.apply(plain, { delete: [[7, 7]] }), "delete", 0, /^\/delete\/0: no such point/],
     [() => client.apply(plain, { move: { origins: [[7, 7]], destinations: [[8, 8]] } }), "move", 0, /^\/move\/origins\/0: no such point/],

@@ -3,18 +3,6 @@
 import { invalid } from "../errors.js"
 import { duration, moment, packKeys, packNumbers, packPoints, packTimes, timestamp } from "./values.js"
 
-const SPAN = /^\s*(\d+(?:\.\d+)?)\s*(ms|s|m|h|d)?\s*$/
-/** @type {Record<string, number>} */
-const UNITS = { ms: 0.001, s: 1, m: 60, h: 3600, d: 86400 }
-
-/** Seconds, or a text such as 30m. @param {string} field @param {any} given */
-function span(field, given) {
-  if (typeof given !== "string") return duration(given, field)
-  const found = SPAN.exec(given)
-  if (found === null) throw invalid(field, null, given, "write for example 500ms, 90s, 30m, 2h or 7d; a number alone is seconds")
-  return duration(Number(found[1]) * UNITS[found[2] ?? "s"], field)
-}
-
 /** One of some words. @param {string} field @param {any} given @param {Record<string, string>} words */
 function choice(field, given, words) {
   if (given == null) return undefined
@@ -35,7 +23,7 @@ export function rules(rules) {
 /** @param {any} kept @param {any} bytes */
 export function history(kept, bytes) {
   if (kept == null || kept === false) return null
-  return { maxAge: kept === true ? null : span("history", kept), maxBytes: bytes ?? 0 }
+  return { maxAge: kept === true ? null : duration(kept, "history"), maxBytes: bytes ?? 0 }
 }
 
 /** @param {any} body */
@@ -173,7 +161,7 @@ export function alarmRule(body) {
     ...(body.prefix != null && { prefix: body.prefix }),
     when: body.when,
     clear: body.clear ?? "",
-    hold: body.for == null ? null : span("for", body.for),
+    hold: duration(body.for, "for"),
     maxEvents: body.max_events ?? 0,
     maxEventAge: duration(body.max_event_age, "max_event_age"),
   }

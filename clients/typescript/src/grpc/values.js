@@ -2,6 +2,7 @@
 
 import { instantOf } from "../batch.js"
 import { invalid } from "../errors.js"
+import { spanOf } from "../spans.js"
 
 /** @typedef {import("../hull-copy.js").Key} Key */
 
@@ -74,10 +75,10 @@ export function timestamp(time, field = "time") {
   return { seconds: String((whole - rest) / 1_000_000n), nanos: Number(rest) * 1000 }
 }
 
-/** @param {number | null | undefined} seconds @param {string} [field] */
-export function duration(seconds, field = "seconds") {
-  if (seconds == null) return null
-  if (typeof seconds !== "number" || !Number.isFinite(seconds)) throw invalid(field, null, seconds, "must be seconds")
+/** @param {import("../spans.js").Span | null | undefined} span @param {string} field */
+export function duration(span, field) {
+  if (span == null) return null
+  const seconds = spanOf(field, span)
   const whole = Math.trunc(seconds)
   return { seconds: String(whole), nanos: Math.round((seconds - whole) * 1e6) * 1000 }
 }
