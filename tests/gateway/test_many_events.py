@@ -127,9 +127,9 @@ def test_outlines_of_names(gateway: Gateway, client: HullClient, name: str) -> N
     reader.close()
 
 
-def test_an_id_of_something_else_begins_with_all(gateway: Gateway, client: HullClient, name: str) -> None:
+def test_an_id_of_another_server_begins_with_all(gateway: Gateway, client: HullClient, name: str) -> None:
     client.create_hull(name)
-    for ident in ("zz", "00", "fe203b7c85e2be96:1", "ab" * 1000):  # the last one as long as that of many partitions
+    for ident in ("ab" * 20, "ab" * 40, "ab" * 1000):  # of one partition, two, and as many as there can be
         reader = Reader(gateway, f"/events?name={name}", ident)
         reader.until("complete")
         assert set(reader.hulls) == {name}

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from datetime import timedelta
 
 import pytest
-from gateway_process import Gateway, gateway_process
+from gateway_process import Events, Gateway, gateway_process
 from server_process import server_process
 
 from dynhull_client import HullClient
@@ -89,6 +89,39 @@ def test_a_replay_after_an_event_of_a_hull_that_was_made_again_says_so(gateway: 
             "HULL_REPLACED",
             "Last-Event-ID",
         )
+
+
+OF_HULL, OF_FENCE, OF_ALARM = "/hulls/ids/events", "/fences/ids/events", "/alarms/ids/events"
+OF_MANY, REPLAY, FEED, FEEDS = "/events", "/hulls/ids/replay", "/hulls/ids/feed", "/feed"
+PLACES = OF_HULL, OF_FENCE, OF_ALARM, REPLAY, FEED
+STRANGE = ":1", "a:", "a:-1", "a:1.0", f"a:{2**64}", "a:1~", "a:\xb2", "a b:1", "nonsense"
+
+
+def test_an_id_that_cannot_be_read_is_refused(gateway: Gateway) -> None:
+    """An EventSource gives up after it; what it has received is never such an id."""
+    gateway.post("/hulls", {"name": "ids", "keyed": "str"})
+    gateway.post("/fences", {"name": "ids", "area": {"center": [0, 0], "radius": 1}, "subjects": "ids"})
+    gateway.post("/alarms", {"name": "ids", "hull": "ids", "when": "count > 3"})
+    cases = [(path, ident) for path in PLACES for ident in STRANGE]
+    cases += [(path, "a:over") for path in (OF_HULL, OF_FENCE, OF_ALARM, OF_MANY)]
+    cases += [(path, "a:1~2") for path in (OF_HULL, OF_ALARM, REPLAY, FEED)] + [(OF_FENCE, f"a:1~{2**64}")]
+    cases += [(path, ident) for path in (OF_MANY, FEEDS) for ident in ("a:1", "0", "0g", "00 11", "00", "ff" * 21)]
+    for path, ident in cases:
+        refused = gateway.get(path, Last_Event_ID=ident)
+        assert (refused.status, refused.json["reason"]) == (400, "INVALID_FIELD"), (path, ident)
+        assert (refused.json["field"], refused.json["value"]) == ("Last-Event-ID", ident), (path, ident)
+        assert refused.json["detail"].startswith("Last-Event-ID: "), (path, ident)
+    twice = gateway.get(OF_HULL, Last_Event_ID="a:1", last_event_id="a:2")
+    assert (twice.status, twice.json["field"], twice.json["value"]) == (400, "Last-Event-ID", "a:1, a:2")
+    for path in (REPLAY, FEED, FEEDS):
+        assert gateway.get(path, Last_Event_ID="any:over").status == 204
+    joined = Events(gateway, "/streams", {"subscriptions": {"a": {"path": OF_HULL, "last_event_id": "nonsense"}}})
+    assert next(problem for kind, problem in iter(joined.next, None) if kind == "problem")["field"] == "Last-Event-ID"
+    joined.close()
+    for path, ident in ((OF_HULL, ""), (OF_HULL, "a:1"), (OF_MANY, "")):
+        events = Events(gateway, path, Last_Event_ID=ident)
+        assert next(iter(events))["event"] in ("snapshot", "begin")
+        events.close()
 
 
 def test_time_spans_are_seconds_or_text_everywhere(gateway: Gateway, address: str) -> None:

@@ -29,7 +29,7 @@ from .ogc import routes as maps
 from .ogc.entities import Snapshots
 from .page import Dashboard
 from .page.routes import routes_of
-from .parameters import require_known, require_one_number
+from .parameters import require_known, require_once
 from .paths import PathsAsSent
 from .problems import RESPONSES
 from .read_only import ReadOnly
@@ -61,7 +61,7 @@ def application(client: AsyncHullClient, settings: Settings) -> FastAPI:
         redoc_url=None,
         telemetry={"tracing": False, "metrics": False, "logs": False},  # it looks for these with each request
         responses=RESPONSES,
-        dependencies=[Depends(require_known), Depends(require_one_number)],
+        dependencies=[Depends(require_known), Depends(require_once)],
         separate_input_output_schemas=False,
         generate_unique_id_function=lambda route: route.name,
     )

@@ -12,16 +12,16 @@ from pydantic import BaseModel
 
 from .problems import ProblemError, cut
 
-IDEMPOTENCY_KEY = "Idempotency-Key"
+ONCE = "Idempotency-Key", "Last-Event-ID"
 
 
-async def require_one_number(request: Request) -> None:
-    """Raise ProblemError if a request has two numbers: whichever is taken, the other one would seem to be applied."""
-    keys = request.headers.getlist(IDEMPOTENCY_KEY)
-    if len(keys) > 1:
-        detail = f"{IDEMPOTENCY_KEY}: the header is given {len(keys)} times: give it once"
-        more = {"field": IDEMPOTENCY_KEY, "value": cut(", ".join(keys))}
-        raise ProblemError(HTTPStatus.BAD_REQUEST, detail, "INVALID_FIELD", **more)
+async def require_once(request: Request) -> None:
+    """Raise ProblemError if a header is given twice: whichever is taken, the other one would seem to be applied."""
+    for name in ONCE:
+        given = request.headers.getlist(name)
+        if len(given) > 1:
+            detail = f"{name}: the header is given {len(given)} times: give it once"
+            raise ProblemError(HTTPStatus.BAD_REQUEST, detail, "INVALID_FIELD", field=name, value=cut(", ".join(given)))
 
 
 async def require_known(request: Request) -> None:

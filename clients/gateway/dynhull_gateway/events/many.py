@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from pydantic_core import to_json
 
-from dynhull_client import AsyncHullClient, AsyncManyWatch, DynhullError, InvalidRequestError, ManyChange
+from dynhull_client import AsyncHullClient, AsyncManyWatch, DynhullError, ManyChange
 
 from .documents import HullNow
 from .messages import COMMENT, message, place, problem
@@ -79,8 +79,6 @@ class ManyFeed(SharedWatch[ManyChange]):
                 async with self._client.watch_many(**self._view.arguments(), position=position) as watch:
                     async for text in _picture(watch):
                         yield text
-            except InvalidRequestError:  # an id of something else: all of it, then
-                version = generation = -1
             except DynhullError as error:
                 yield problem(error)
                 return

@@ -1,8 +1,10 @@
 """Events as text for EventSource."""
 
 import json
+import re
 from typing import Any
 
+from pydantic import AfterValidator
 from pydantic_core import to_json
 
 from dynhull_client import DynhullError
@@ -37,6 +39,30 @@ def over(uid: str = "") -> str:
     return f"{uid or ANY}:{OVER}"
 
 
+def _id_of(form: str, words: str) -> AfterValidator:
+    """Refuses a Last-Event-ID of no event of a stream: to begin elsewhere in silence would be to lose events."""
+    known = re.compile(form, re.ASCII)
+
+    def checked(ident: str | None) -> str | None:
+        if ident and not (known.fullmatch(ident) and all(int(each) < 2**64 for each in NUMBER.findall(ident))):
+            raise ValueError(f"must be the id of an event of such a stream, {words}")
+        return ident or None  # an EventSource without an id has an empty one
+
+    return AfterValidator(checked)
+
+
+NUMBER = re.compile(r"(?<=[:~])\d+")
+PLACE = r"[!-~]+:\d{1,20}"
+POSITION = r"(?:[0-9a-f]{2})+"
+ENDED = rf"[!-~]+:{OVER}"
+REVISION_ID = _id_of(PLACE, "UID:REVISION")
+SEQUENCE_ID = _id_of(PLACE, "UID:SEQUENCE")
+PART_ID = _id_of(rf"{PLACE}(?:~\d{{1,20}})?", "UID:SEQUENCE")
+ENDING_ID = _id_of(f"{PLACE}|{ENDED}", "UID:REVISION")
+MANY_ID = _id_of(POSITION, "a position")
+MANY_ENDING_ID = _id_of(f"{POSITION}|{ENDED}", "a position")
+
+
 def is_over(ident: str | None) -> bool:
     """Whether a Last-Event-ID is that of the last event of a stream."""
     uid, _, end = (ident or "").rpartition(":")
@@ -56,19 +82,15 @@ def place(ident: str) -> bytes:
 def parted(ident: str | None) -> tuple[str | None, int]:
     """A Last-Event-ID "UID:AFTER~EXACT" as "UID:AFTER" and the number behind, which is 0 for others."""
     place, _, exact = (ident or "").partition("~")
-    return (place, int(exact)) if exact.isdecimal() and len(exact) <= 20 else (ident, 0)
+    return place or None, int(exact or 0)
 
 
 def resumed(ident: str | None) -> tuple[str, int] | None:
-    """The uid and the number in a Last-Event-ID; None if there is none, or none of ours."""
+    """The uid and the number in a Last-Event-ID; None if there is none."""
     uid, _, number = (ident or "").rpartition(":")
-    ours = uid and number.isdecimal() and len(number) <= 20 and int(number) < 2**64
-    return (uid, int(number)) if ours else None
+    return (uid, int(number)) if uid else None
 
 
-def position_of(ident: str) -> bytes | None:
-    """The position of many hulls in a Last-Event-ID; None if it is none of ours: the reader gets all of them."""
-    try:
-        return bytes.fromhex(ident)
-    except ValueError:
-        return None
+def position_of(ident: str | None) -> bytes | None:
+    """The position of many hulls in a Last-Event-ID; None if there is none."""
+    return bytes.fromhex(ident) if ident else None

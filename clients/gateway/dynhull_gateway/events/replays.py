@@ -14,7 +14,7 @@ from ..problems import ProblemError
 from ..schemas import HullPath
 from . import documents
 from .messages import COMMENT, is_over, last_problem, message, over, resumed
-from .routes import OF_A_HULL, Described, FormOf, LastEventId, Layer, MaxVertices, WithKeys, WithMeasures, admit, events
+from .routes import OF_A_HULL, Described, FormOf, LastOrEnd, Layer, MaxVertices, WithKeys, WithMeasures, admit, events
 from .stream import EventStream
 from .texts import HullTexts, View
 
@@ -54,7 +54,7 @@ async def replay(
     measures: WithMeasures = False,
     layer: Layer = 1,
     max_vertices: MaxVertices = None,
-    last_event_id: LastEventId = None,
+    last_event_id: LastOrEnd = None,
 ) -> Response:
     """Play the past of a hull: the events of `/hulls/{name}/events` from one moment to another one, and then "end".
 

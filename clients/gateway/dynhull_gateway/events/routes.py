@@ -1,7 +1,7 @@
 """Where events are read."""
 
-from collections.abc import Awaitable, Callable, Sequence
-from contextlib import suppress
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Annotated, Any
 
@@ -9,13 +9,21 @@ import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from dynhull_client import Alarm, AsyncHullClient, DeadlineError, Fence, HullNotFoundError, UnavailableError
+from dynhull_client import (
+    Alarm,
+    AsyncHullClient,
+    DeadlineError,
+    Fence,
+    HullNotFoundError,
+    InvalidRequestError,
+    UnavailableError,
+)
 
 from .. import examples, schemas
 from ..bodies import JsonRoute
 from ..callers import Caller, address_of, token_of
 from ..fences import arguments_of
-from ..problems import ProblemError
+from ..problems import ProblemError, cut
 from ..schemas import LARGEST, NAME, AlarmPath, FencePath, HullPath, Prefix
 from . import documents
 from .alarm_events import AlarmReading, alarm_events
@@ -24,7 +32,18 @@ from .feeds import PATIENCE_SECONDS, Feed
 from .fence_events import Reading
 from .fence_events import events as fence_events
 from .many import ManyFeed, ManyView
-from .messages import is_over, parted, position_of, resumed
+from .messages import (
+    ENDING_ID,
+    MANY_ENDING_ID,
+    MANY_ID,
+    PART_ID,
+    REVISION_ID,
+    SEQUENCE_ID,
+    is_over,
+    parted,
+    position_of,
+    resumed,
+)
 from .past_fence import PastEvents
 from .shared import begin_at
 from .stream import EventStream
@@ -32,13 +51,20 @@ from .texts import Form, View
 
 router = APIRouter(tags=["events"], route_class=JsonRoute)
 
-LastEventId = Annotated[
-    str | None, Header(alias="Last-Event-ID", max_length=300, description="The id of the last event that was received.")
-]
-LastPosition = Annotated[
-    str | None,
-    Header(alias="Last-Event-ID", max_length=2000, description="The id of the last event that was received."),
-]
+
+def last_event_id(most: int = 300) -> Any:
+    """The header with the id of the last event that a reader has."""
+    said = "The id of the last event that was received."
+    return Header(alias="Last-Event-ID", max_length=most, description=said)
+
+
+LastRevision = Annotated[str | None, last_event_id(), REVISION_ID]
+LastSequence = Annotated[str | None, last_event_id(), SEQUENCE_ID]
+LastPart = Annotated[str | None, last_event_id(), PART_ID]
+LastOrEnd = Annotated[str | None, last_event_id(), ENDING_ID]
+LastOfMany = Annotated[str | None, last_event_id(2000), MANY_ID]
+# Forty digits for each of at most 1024 partitions.
+LastOfManyOrEnd = Annotated[str | None, last_event_id(40_960), MANY_ENDING_ID]
 ONE_A_DAY = 1 / 86400  # the least that a watch takes
 Rate = Annotated[
     float, Query(ge=ONE_A_DAY, le=100, description="The most events a second, each with all changes before it.")
@@ -80,11 +106,6 @@ AfterSequence = Annotated[
 ]
 AfterRevision = Annotated[
     int | None, Query(ge=0, le=LARGEST, description="Begin after this revision; 0 for all batches that are kept.")
-]
-# Forty digits for each of at most 1024 partitions.
-LastFeedPosition = Annotated[
-    str | None,
-    Header(alias="Last-Event-ID", max_length=40_960, description="The id of the last event that was received."),
 ]
 FromTheBeginning = Annotated[bool, Query(description="Begin with the oldest batches that are kept.")]
 FeedConsumer = Annotated[
@@ -131,7 +152,7 @@ async def hull_events(
     layer: Layer = 1,
     max_vertices: MaxVertices = None,
     wait: Wait = False,
-    last_event_id: LastEventId = None,
+    last_event_id: LastRevision = None,
 ) -> Response:
     """Follow a hull: events "snapshot", "change", "progress" and "deleted", with ids UID:REVISION.
 
@@ -173,7 +194,7 @@ async def watch_many(
     outlines: WithOutlines = False,
     max_vertices: MaxVertices = None,
     rate: Rate = 10.0,
-    last_event_id: LastPosition = None,
+    last_event_id: LastOfMany = None,
 ) -> Response:
     """Follow many hulls: those of a prefix, or those with the given names, which may come later.
 
@@ -194,11 +215,11 @@ async def watch_many(
     caller = address_of(request) if token is None else token
     _admit_many(request, caller)
     view = ManyView(token, prefix, tuple(sorted(set(name))), outlines, max_vertices, rate)
-    with suppress(UnavailableError, DeadlineError):  # an answer of 503 would end an EventSource for good
-        async with client.watch_many(**view.arguments(), timeout=PATIENCE_SECONDS) as allowed:
+    position = position_of(last_event_id)
+    with suppress(UnavailableError, DeadlineError), _in_header(last_event_id):  # 503 would end an EventSource for good
+        async with client.watch_many(**view.arguments(), position=position, timeout=PATIENCE_SECONDS) as allowed:
             await anext(allowed)  # whether these hulls may be read
     state = request.app.state
-    position = None if last_event_id is None else position_of(last_event_id)
     keepalive = state.settings.keepalive_seconds
     texts = state.shared.read(view, partial(ManyFeed, client, view), lambda feed: feed.read(position, keepalive))
     return EventStream(texts, state.health, figures, figures.many_stream(caller))
@@ -214,7 +235,7 @@ async def follow_fence(
     consumer: Consumer = None,
     after: AfterSequence = None,
     conflate: Conflate = False,
-    last_event_id: LastEventId = None,
+    last_event_id: LastPart = None,
 ) -> Response:
     """Follow a fence: each event once and in order, named by its type, with ids UID:SEQUENCE.
 
@@ -248,7 +269,7 @@ async def follow_alarm(
     name: AlarmPath,
     consumer: Consumer = None,
     after: AfterSequence = None,
-    last_event_id: LastEventId = None,
+    last_event_id: LastSequence = None,
 ) -> Response:
     """Follow an alarm: each event once and in order, named by its type, with ids UID:SEQUENCE.
 
@@ -297,7 +318,7 @@ async def hull_feed(
     name: HullPath,
     after: AfterRevision = None,
     consumer: FeedConsumer = None,
-    last_event_id: LastEventId = None,
+    last_event_id: LastOrEnd = None,
 ) -> Response:
     """Follow every batch of a hull with its rows: events "batch", each once and in order, with ids UID:REVISION.
 
@@ -321,7 +342,7 @@ async def feed_of_many(
     prefix: Prefix = "",
     begin: FromTheBeginning = False,
     consumer: FeedConsumer = None,
-    last_event_id: LastFeedPosition = None,
+    last_event_id: LastOfManyOrEnd = None,
 ) -> Response:
     """Follow every batch of all hulls of a prefix, those to come, too: events "batch", each once, by their commits.
 
@@ -336,8 +357,9 @@ async def feed_of_many(
         raise ValueError("give either consumer, which knows its place, or begin")
     if is_over(last_event_id):
         return Response(status_code=204)
-    position = None if last_event_id is None or consumer is not None else position_of(last_event_id)
-    return await _feed(request, client, FeedReading(None, prefix, "", position or (0 if begin else None), consumer))
+    position = None if consumer is not None else position_of(last_event_id)
+    with _in_header(last_event_id):
+        return await _feed(request, client, FeedReading(None, prefix, "", position or (0 if begin else None), consumer))
 
 
 async def _feed(request: Request, client: AsyncHullClient, reading: FeedReading) -> EventStream:
@@ -355,6 +377,18 @@ def _resumed(ident: str | None, consumer: str | None, after: int | None) -> tupl
     if after is not None:
         raise ValueError("give either consumer, which knows its place, or after")
     return None
+
+
+@contextmanager
+def _in_header(ident: str | None) -> Iterator[None]:
+    """Name the header where the server refuses the position in it."""
+    try:
+        yield
+    except InvalidRequestError as error:
+        if ident is None or error.field != "position":
+            raise
+        detail = f"Last-Event-ID: {error.problem}"
+        raise ProblemError(400, detail, "INVALID_FIELD", field="Last-Event-ID", value=cut(ident)) from None
 
 
 async def _require_keys(client: AsyncHullClient, name: str) -> None:
