@@ -271,7 +271,7 @@ class Model:
                 case SetHistory() if not self._hulls[change.number].deleted:
                     self._keep_past(self._hulls[change.number], change)
                 case EraseKeys() if not self._hulls[change.number].deleted:
-                    self._hulls[change.number].past.erased = change.stored.erasure.last
+                    self._hulls[change.number].past.erased = change.stored[0].erasure.last
                 case PutFeedConsumer() | DropFeedConsumer():
                     self.consumers.landed(change)
                 case Delete():

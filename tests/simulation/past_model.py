@@ -28,6 +28,8 @@ NUMBERED = ("producer", "sequence", "may_skip")
 
 # A key that is put and removed, and then erased.
 ERASED = 7
+# One that no hull ever has.
+NOBODY = 99
 
 
 @dataclass(slots=True, eq=False)

@@ -12,7 +12,7 @@ from .cluster_plan import Operation, Plan
 from .globe import GLOBE
 from .operations import TIMED
 from .past_archive import DAMAGE, FILE_PLACES, LATE, STORE_PLACES
-from .past_model import ERASED
+from .past_model import ERASED, NOBODY
 
 # What clients ask of the past.
 OF_PREFIXES = ("consume_many", "unconsume_many")
@@ -179,9 +179,14 @@ def written_and_erased(draw: random.Random, name: str) -> list[Operation]:
     """A key is put and removed, perhaps filed, and erased."""
     put = _writes(name)[1]
     rest: Operation = {"do": "rest", "name": name, "seconds": draw.choice((0.01, ROUND))}
-    erase: Operation = {"do": "erase", "name": name, "at": 0.0}
+    erase: Operation = {"do": "erase", "name": name, "at": 0.0} | beside(draw)
     gone = put | {"keys": [draw.randrange(4)], "removes": [ERASED]}
     return [put | {"keys": [ERASED, 0]}, *[rest] * draw.randint(0, 2), gone, *[rest] * draw.randint(0, 1), erase]
+
+
+def beside(draw: random.Random) -> Operation:
+    """Who else asks at once for the same key to be erased, or for one that never was; and one who goes away."""
+    return {"others": draw.choices((ERASED, NOBODY), k=draw.choice((0, 0, 1, 2))), "goes": draw.random() < 0.2}
 
 
 def changes_history(draw: random.Random, name: str) -> Operation:
@@ -217,6 +222,8 @@ def of_past(draw: random.Random, name: str, *, files: bool) -> Operation:
     if draw.random() < 0.05:
         return {"do": "clock", "name": name, "seconds": draw.choice(JUMPS)}
     op: Operation = {"do": do, "name": name, "at": draw.random() ** draw.choice((1, 3))}
+    if do == "erase":
+        op |= beside(draw)
     if do == "keep_past":
         op["history"], op["history_bytes"] = draw.choice(HISTORIES)
     if do == "as_of" and draw.random() < 0.5:

@@ -1,6 +1,7 @@
 """Reads of the past of hulls, as the server's handlers make them, and what each answer must be."""
 
-from collections.abc import Iterator
+import asyncio
+from collections.abc import Coroutine, Iterator
 from contextlib import aclosing, nullcontext
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from dynhull_server.state.feed_consumers import ConsumerId
 from dynhull_server.state.hull_state import HullState
 from dynhull_server.state.records import Keys
 from dynhull_server.state.tracks import Moves
+from dynhull_server.storage.past import Erasure
 
 from .clients import Client, Outline, content, outline
 from .cluster_plan import Operation
@@ -31,7 +33,7 @@ from .entities import Entity, Key, loaded
 from .globe import points
 from .model import Model, Truth
 from .operations import TIMED
-from .past_model import ERASED, consumer_of, plain
+from .past_model import ERASED, NOBODY, consumer_of, plain
 from .quarantine_model import waiting_of
 from .schedule import Schedule
 
@@ -100,7 +102,7 @@ class PastReader:
             case "keep_past":
                 await self._engine.hulls.set_history(live.name, op["history"], op["history_bytes"])
             case _:
-                await self._erase(live)
+                await self._erase(live, op)
 
     def _forgotten(self, truth: Truth, error: RevisionForgottenError | MomentForgottenError) -> None:
         """Something of the past is not kept, or has not come."""
@@ -288,14 +290,30 @@ class PastReader:
         if rows:
             raise self._model.finds(f"the track of {live.name} goes on after {last}: {rows}")
 
-    async def _erase(self, live: LiveHull) -> None:
-        """Erase a key from the past."""
+    async def _erase(self, live: LiveHull, op: Operation) -> None:
+        """Erase a key from the past. Others ask for it at once, or for a key that never was, and one may go away."""
         live.require_keys("keys")
-        key = str(ERASED) if TIMED[live.name] == "str" else ERASED
-        found = await self._engine.hulls.filing.erase(live, _keys(live, [key]))
-        if found is not None:
-            past = self._model.truth_of(live.number).past
-            past.gone = max(past.gone, found.last)
+
+        def ask(key: int) -> Coroutine[Any, Any, Erasure | None]:
+            name = str(key) if TIMED[live.name] == "str" else key
+            return self._engine.hulls.filing.erase(live, _keys(live, [name]))
+
+        if op.get("goes"):
+            gone = asyncio.get_running_loop().create_task(ask(ERASED))
+            await asyncio.sleep(0)
+            gone.cancel()
+        others = op.get("others", [])
+        answers = await asyncio.gather(ask(ERASED), *map(ask, others), return_exceptions=True)
+        past = self._model.truth_of(live.number).past
+        found = [each for each in answers if isinstance(each, Erasure)]
+        past.gone = max([past.gone, *(each.last for each in found)])
+        if len({each.last for each in found}) < len(found):
+            raise self._model.finds(f"{live.name} was erased from more than once: {found}")
+        for key, answer in zip([ERASED, *others], answers, strict=True):
+            if key == NOBODY and isinstance(answer, Erasure):
+                raise self._model.finds(f"a key that {live.name} never had is said to be erased: {answer}")
+            if isinstance(answer, BaseException):
+                raise answer
 
     async def probe(self, name: str) -> None:
         """After all faults, the whole past that is to be there is there."""

@@ -11,7 +11,7 @@ from dynhull_server.state.feed_consumers import FeedConsumer
 from dynhull_server.state.fences.model.records import FenceEvent, Inside, KeptFence
 from dynhull_server.state.records import CommitStamp, Contents, HullRow, Kept, Keys, Parts, Record
 from dynhull_server.state.tracks import KeyChanges
-from dynhull_server.storage.past import Erasure, Hole, Moment, StoredHistory
+from dynhull_server.storage.past import EraseRequest, Erasure, Hole, Moment, StoredHistory
 from dynhull_server.storage.port import NEWEST, NotCommittedError, Progress, Storage, StorageStep, StoredContents
 
 from .model import Model
@@ -224,9 +224,9 @@ class FaultyStorage:
         """Steps; each may fail."""
         yield from self._steps(self._inner.file_history(now))
 
-    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator[StorageStep]:
+    def erase(self, number: int, requests: Sequence[EraseRequest], until: int, now: int) -> Iterator[StorageStep]:
         """Steps; each may fail."""
-        yield from self._steps(self._inner.erase(number, keys, until, now))
+        yield from self._steps(self._inner.erase(number, requests, until, now))
 
     def _steps(self, steps: Iterator[StorageStep]) -> Iterator[StorageStep]:
         with closing(steps):  # type: ignore[type-var]  # all are generators

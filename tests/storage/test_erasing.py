@@ -2,6 +2,7 @@
 
 import gc
 import shutil
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from folders import no_progress, same, state
 from dynhull.keys import PackedKeys, take_keys
 from dynhull_server.state.contents import replayed
 from dynhull_server.state.records import FOREVER, NO_TIME, Append, HeldChange, HeldRows, Kept, KeyRows, Record
+from dynhull_server.storage.past import EraseRequest
 from dynhull_server.storage.port import DamagedError
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.sqlite import copies
@@ -61,7 +63,7 @@ def leave(fleet):
 
 
 def erase(fleet, until):
-    fleet.carry_out(fleet.storage.erase(1, PackedKeys.pack(GONE), until, fleet.time))
+    fleet.carry_out(fleet.storage.erase(1, [EraseRequest(PackedKeys.pack(GONE))], until, fleet.time))
 
 
 def without(records, until):
@@ -130,7 +132,7 @@ def test_a_key_is_in_no_file_and_in_no_revision_any_more(fleet):
 def test_what_does_not_have_the_key_stays_as_it_is(fleet):
     until = leave(fleet)
     before = fleet.files
-    fleet.carry_out(fleet.storage.erase(1, PackedKeys.pack(["somebody else"]), until, fleet.time))
+    fleet.carry_out(fleet.storage.erase(1, [EraseRequest(PackedKeys.pack(["somebody else"]))], until, fleet.time))
     assert set(before) <= set(fleet.files)
     assert fleet.storage.erasures(1) == ()
     erase(fleet, until)
@@ -162,10 +164,18 @@ def test_a_kill_at_any_point_leaves_the_past_as_it_was_or_without_the_key(tmp_pa
         return looking
 
     fleet.archive.write, fleet.archive.remove = watched(write), watched(remove)
-    for step in fleet.storage.erase(1, PackedKeys.pack(GONE), until, fleet.time):
+    requests = [EraseRequest(PackedKeys.pack(keys)) for keys in (GONE[:1], ["nobody"], GONE)]
+    for step in fleet.storage.erase(1, requests, until, fleet.time):
         look()
         fleet.storage.commit([step], fleet.time)
     look()
+    first, nobody, second = (each.erased for each in requests)
+    assert nobody is None
+    assert (first.keys, second.keys) == (1, 2)
+    assert fleet.storage.erasures(1) == (first, second)
+    moves = Counter(key for each in fleet.records for keys in (each.rows.keys, each.rows.removes) for key in keys)
+    held = 2  # the first of them was put into quarantine, and has left it
+    assert [first.moves, second.moves] == [moves[GONE[0]] + held, moves[GONE[1]]]
     fleet.storage.close()
     outcomes = []
     for copy in taken:
@@ -183,13 +193,13 @@ def test_a_kill_at_any_point_leaves_the_past_as_it_was_or_without_the_key(tmp_pa
         storage.close()
         assert copies.check(copy / "data", no_progress, left.path).notes == []
     assert outcomes == sorted(outcomes)
-    assert {0, 1} == set(outcomes)
+    assert {0, 2} == set(outcomes)
 
 
 def test_a_commit_that_is_found_after_all_keeps_its_files(fleet):
     """The outcome of the commit that replaces the files is unknown at first, and whoever erases has given up."""
     until = leave(fleet)
-    steps = fleet.storage.erase(1, PackedKeys.pack(GONE), until, fleet.time)
+    steps = fleet.storage.erase(1, [EraseRequest(PackedKeys.pack(GONE))], until, fleet.time)
     for step in steps:
         fleet.storage.commit([step], fleet.time)
         if type(step).__name__ == "EraseKeys":
@@ -271,7 +281,7 @@ def test_erasures_one_after_the_other_leave_few_files_and_no_state_for_each(tmp_
         key = take_keys(gone, np.array([place]))
         commit(Record(len(fleet.records) + 1, KeyRows(PackedKeys.pack(names[-1:]), point, key), cause="batch"))
         snapshots()
-        steps = fleet.storage.erase(1, key, len(fleet.records), fleet.time)
+        steps = fleet.storage.erase(1, [EraseRequest(key)], len(fleet.records), fleet.time)
         for number, step in enumerate(steps):
             if place == len(gone) - 1:
                 for part in ("data", "history"):

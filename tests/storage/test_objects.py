@@ -13,6 +13,7 @@ from proxy import Proxy
 
 from dynhull.keys import PackedKeys
 from dynhull_server.state.records import Delete
+from dynhull_server.storage.past import EraseRequest
 from dynhull_server.storage.port import DamagedError, StorageError
 from dynhull_server.storage.rows import storage
 from dynhull_server.storage.segments import objects as store_calls
@@ -69,7 +70,7 @@ def test_the_past_is_in_objects_each_written_once(fleet):
     assert len(list(copy.rglob("*.parquet"))) == len(before)
     fleet.storage = fleet.make()
     fleet.storage.open(no_progress)
-    steps = fleet.storage.erase(1, PackedKeys.pack(KEYS[:1]), len(fleet.records), fleet.time)
+    steps = fleet.storage.erase(1, [EraseRequest(PackedKeys.pack(KEYS[:1]))], len(fleet.records), fleet.time)
     fleet.carry_out(steps)
     assert not set(before) <= set(objects(fleet))
     assert all(KEYS[0] not in each.rows.keys for each in read_back(fleet.storage, fleet.storage.oldest(1)))

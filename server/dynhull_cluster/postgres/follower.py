@@ -261,7 +261,7 @@ class Follower:
             if file:
                 hull.set_segments((*hull.segments, segment_from(place, first, last, file, facts)))
             else:
-                hull.add_erasure(erasure_from(place, first, last, facts))
+                hull.add_erasures([erasure_from(place, first, last, facts)])
             self._weigh(hull, segment_weight(row))
 
     def _weigh(self, hull: HullRows, more: int) -> None:

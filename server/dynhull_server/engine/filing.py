@@ -2,6 +2,7 @@
 
 import asyncio
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..state.errors import (
 from ..state.hull import Hull
 from ..state.hull_state import HullState
 from ..state.records import Kept, Keys
-from ..storage.past import Erasure
+from ..storage.past import EraseRequest, Erasure
 from ..storage.port import NotCommittedError, Storage
 from .driver import Driver
 from .live_hull import LiveHull
@@ -33,6 +34,22 @@ SNAPSHOTS = 2
 # Half of the time segments are written, if there is so much to write: most of it goes on beside the interpreter, and
 # what the journal must keep meanwhile is not to grow without end.
 PAUSE = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """An erasure that somebody waits for, unless they have gone away."""
+
+    request: EraseRequest
+    answer: "asyncio.Future[Erasure | None]"
+
+    def reply(self) -> None:
+        if not self.answer.done():
+            self.answer.set_result(self.request.erased)
+
+    def refuse(self, error: Exception) -> None:
+        if not self.answer.done():
+            self.answer.set_exception(error)
 
 
 class Filing:
@@ -55,6 +72,7 @@ class Filing:
         self._pasts = pasts
         self._turn = asyncio.Lock()
         self._erasing = Outliving()
+        self._asked: dict[int, list[_Asked]] = {}  # of each hull, what waits for the turn
         self.unsure: set[Hull] = set()
 
     async def round(self) -> None:
@@ -78,6 +96,9 @@ class Filing:
     async def erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
         """Erase keys from the past of a hull. None if it has none of them. What has begun goes on without its caller.
 
+        All that wait for the same hull are carried out together, since each segment is read and written once for that:
+        each as if those before it had been alone, and all in one commit.
+
         What the journal has is filed first, so that it has nothing of them any more. The journal of a hull without a
         history forgets all of its past.
 
@@ -97,33 +118,49 @@ class Filing:
         if window is not None and window.max_points:
             reason = f"keeps its {window.max_points} newest: those that a key has pushed out would seem to have stayed"
             raise HullUnsuitableError(hull.name, f"{reason}. Shorten its history instead", field="keys")
-        await self._turn.acquire()  # who goes away before has asked for nothing: their keys would keep others waiting
-        return await self._erasing.run(self._erase(hull, keys))
+        asked = _Asked(EraseRequest(keys), asyncio.get_running_loop().create_future())
+        waiting = self._asked.setdefault(hull.number, [])
+        waiting.append(asked)
+        if len(waiting) == 1:
+            self._erasing.begin(self._erase_asked(hull))
+        return await asked.answer
 
-    async def _erase(self, hull: LiveHull, keys: Keys) -> Erasure | None:
-        """Erase keys, and end the turn."""
-        try:
-            return await self._erase_in_turn(hull, keys)
-        finally:
-            self._turn.release()
+    async def _erase_asked(self, hull: LiveHull) -> None:
+        """Carry out together what waits for the turn, and answer it."""
+        async with self._turn:
+            # Who has gone away by now has asked for nothing.
+            asked = [each for each in self._asked.pop(hull.number) if not each.answer.done()]
+            try:
+                if asked:
+                    await self._erase_together(hull, asked)
+            except Exception as error:
+                for each in asked:
+                    each.refuse(error)
 
-    async def _erase_in_turn(self, hull: LiveHull, keys: Keys) -> Erasure | None:
+    async def _erase_together(self, hull: LiveHull, asked: list["_Asked"]) -> None:
         unsaved = hull.unsaved
-        _, found = await hull.read(partial(_without, keys), rows=hull.counts.points)
-        if not isinstance(found, Kept):
-            reason = f"has the key {found!r} now: remove it first, since what is erased is the past"
-            raise HullUnsuitableError(hull.name, reason, field="keys")
+        _, (kept, present) = await hull.read(
+            partial(_kept, [each.request.keys for each in asked]), rows=hull.counts.points
+        )
+        for each, key in zip(asked, present, strict=True):
+            if key is not None:
+                reason = f"has the key {key!r} now: remove it first, since what is erased is the past"
+                each.refuse(HullUnsuitableError(hull.name, reason, field="keys"))
+        left = [each for each, key in zip(asked, present, strict=True) if key is None]
+        if kept is not None:
+            await self._erase_past(hull, unsaved, kept, [each.request for each in left])
+        for each in left:
+            each.reply()
+
+    async def _erase_past(self, hull: LiveHull, unsaved: int, kept: Kept, requests: list[EraseRequest]) -> None:
         try:
             for _ in range(SNAPSHOTS):
-                steps = self._storage.snapshot(hull.number, found)
+                steps = self._storage.snapshot(hull.number, kept)
                 await self._driver.commit_steps(steps, self._driver.on_disk)
             hull.saved(unsaved)
-            before = await self._erasures(hull)
-            steps = self._storage.erase(hull.number, keys, found.revision, self._driver.commit_time())
+            steps = self._storage.erase(hull.number, requests, kept.revision, self._driver.commit_time())
             await self._driver.commit_steps(steps, self._driver.in_history)
-            after = await self._erasures(hull)
-        except KeyError:
-            raise HullNotFoundError(hull.name) from None
+            gone = await self._driver.on_disk(partial(self._storage.row, hull.number)) is None
         except NotStoredError:
             raise
         except NotCommittedError as error:
@@ -134,15 +171,20 @@ class Filing:
             raise OutcomeUnknownError(words_for_callers(error)) from error
         finally:
             self._pasts.forget()
-        return next((each for each in after if each not in before), None)
-
-    async def _erasures(self, hull: LiveHull) -> tuple[Erasure, ...]:
-        found: tuple[Erasure, ...] = await self._driver.on_disk(partial(self._storage.erasures, hull.number))
-        return found
+        if gone:
+            raise HullNotFoundError(hull.name)
 
 
-def _without(keys: Keys, state: HullState) -> Kept | int | str:
-    """The hull as it is; or the first of some keys that it has, also in quarantine."""
+def _kept(requests: list[Keys], state: HullState) -> tuple[Kept | None, list[int | str | None]]:
+    """The hull as it is, and of each request the first of its keys that it has, also in quarantine, None for none.
+
+    None for the hull if there is no request without one.
+    """
+    present = [_present(keys, state) for keys in requests]
+    return state.kept() if None in present else None, present
+
+
+def _present(keys: Keys, state: HullState) -> int | str | None:
     contents = state.contents
     assert isinstance(contents, Keyed)  # the keys are those of such a hull
     listed = key_list(keys)
@@ -152,4 +194,4 @@ def _without(keys: Keys, state: HullState) -> Kept | int | str:
         for key in listed:
             if key in contents.quarantine:
                 return key  # type: ignore[no-any-return]
-    return state.kept()
+    return None

@@ -18,10 +18,14 @@ class Outliving:
 
     async def run(self, work: Coroutine[Any, Any, T]) -> T:
         """The result of some work."""
+        return await asyncio.shield(self.begin(work))
+
+    def begin(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+        """Begin some work."""
         working = asyncio.get_running_loop().create_task(work)
         self._working.add(working)
         working.add_done_callback(self._ended)
-        return await asyncio.shield(working)
+        return working
 
     def _ended(self, working: "asyncio.Task[Any]") -> None:
         self._working.discard(working)

@@ -26,7 +26,7 @@ from ..state.records import Append, CommitStamp, Contents, Create, Delete, HullR
 from ..state.tracks import KeyChanges
 from ..state.ways import KeyWays
 from .of_keys import changes_of_keys, contents_of_keys, ways_of
-from .past import Erasure, Found, Hole, Moment, StoredHistory, created
+from .past import EraseRequest, Erasure, Found, Hole, Moment, StoredHistory, created
 from .port import NEWEST, DamagedError, NotCommittedError, Progress, StorageStep, StoredContents
 from .segments.columns import columns_of
 
@@ -231,9 +231,9 @@ class MemoryStorage:
         del number
         return ()
 
-    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator[StorageStep]:
+    def erase(self, number: int, requests: Sequence[EraseRequest], until: int, now: int) -> Iterator[StorageStep]:
         """Nothing is left before the snapshots."""
-        del number, keys, until, now
+        del number, requests, until, now
         yield from ()
 
     def snapshot(self, number: int, kept: Kept) -> Iterator[StorageStep]:

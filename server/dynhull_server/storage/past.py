@@ -58,6 +58,19 @@ class Erasure:
         return self.first <= revision <= self.last
 
 
+@dataclass(slots=True, eq=False)
+class EraseRequest:
+    """Keys that somebody wants erased from the past of a hull.
+
+    Attributes:
+        keys: the keys.
+        erased: what has been erased, once it is committed; None while it is not, and if the past has none of them.
+    """
+
+    keys: Keys
+    erased: Erasure | None = None
+
+
 def erased_since(before: Sequence[Erasure], now: Sequence[Erasure]) -> bool:
     """Whether keys were erased meanwhile. An erasure that is gone has changed nothing: its revisions were dropped."""
     return not Counter(now) <= Counter(before)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from ..state.feed_consumers import FeedConsumer
 from ..state.fences.model.records import FenceEvent, FenceRow, Inside, KeptFence
-from ..state.records import CommitStamp, HullRow, Kept, Keys, Record
-from .past import Past
+from ..state.records import CommitStamp, HullRow, Kept, Record
+from .past import EraseRequest, Past
 from .refusals import Meaning
 
 if TYPE_CHECKING:
@@ -210,8 +210,10 @@ class Storage(Past, Protocol):
             DamagedError: a row of the journal is damaged.
         """
 
-    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator["StorageStep"]:
+    def erase(self, number: int, requests: Sequence[EraseRequest], until: int, now: int) -> Iterator["StorageStep"]:
         """Erase keys from the past of a hull up to revision `until`, as of which it does not have them.
+
+        All requests at once; each says then what was erased for it. A key that several name is that of the first.
 
         Two snapshots as of that revision, or later ones, are there. Commit each step before the next is taken; one of
         them erases everything. Before it a kill leaves all as it was, and after it no key comes back. Run only one at a
@@ -219,7 +221,7 @@ class Storage(Past, Protocol):
 
         Args:
             number: the hull. If it is not there any more, nothing is left to do.
-            keys: the keys.
+            requests: the keys.
             until: the revision.
             now: the time in microseconds since 1970.
 

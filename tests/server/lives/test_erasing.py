@@ -110,6 +110,45 @@ def test_a_key_is_erased_from_what_can_be_read_of_the_past(tmp_path):
         assert not client.at("fleet", 12).positions([KEYS[0], KEYS[2], KEYS[3]]).present.any()
 
 
+def test_what_many_ask_for_at_once_is_answered_to_each(tmp_path):
+    """One of them goes away, one names a key that the hull has, one a key that never was, and two the same key."""
+    options = "--data", str(tmp_path), *SNAPSHOTS
+    with server_process(*options, killed=True) as server, HullClient(server.address) as client:
+        client.create_hull("fleet", keyed="str", history=True)
+        write(client, "fleet", KEYS, 12)
+        client.remove("fleet", KEYS[:30])
+        seen = client.at("fleet", 9).positions(KEYS[30:]).positions
+
+        async def ask():
+            async with AsyncHullClient(server.address) as other:
+                wanted = [[key] for key in KEYS[:28]] + [KEYS[27:30], [KEYS[35], KEYS[3]], ["nobody"]]
+                calls = [asyncio.create_task(other.erase_history("fleet", keys)) for keys in wanted]
+                calls[5].cancel()
+                return await asyncio.gather(*calls, return_exceptions=True)
+
+        *single, pair, present, nobody = asyncio.run(ask())
+        assert isinstance(single.pop(5), asyncio.CancelledError)
+        twice = single.pop()  # whoever comes first of these two
+        assert {(each.keys, each.moves) for each in single} == {(1, 13)}
+        assert (twice.moves if twice else 0, pair.keys, pair.moves) in {(13, 3, 26), (0, 3, 39)}
+        assert nobody is None
+        assert isinstance(present, HullUnsuitableError)
+        assert "has the key 'vehicle 35' now" in str(present)
+        # Whether who has gone away has asked for anything depends on when.
+        if client.at("fleet", 9).positions([KEYS[5]]).present.any():
+            assert client.erase_history("fleet", [KEYS[5]]).moves == 13
+        kept = client.history("fleet").erasures
+        assert sum(each.moves for each in kept) == 30 * 13
+        server.process.kill()
+        server.process.wait()
+    with server_process(*options) as server, HullClient(server.address) as client:
+        assert client.history("fleet").erasures == kept
+        past = client.at("fleet", 9)
+        assert not past.positions(KEYS[:30]).present.any()
+        np.testing.assert_array_equal(past.positions(KEYS[30:]).positions, seen)
+    assert dynhull("check", str(tmp_path)).exit_code == 0
+
+
 def test_where_the_files_are_is_not_told_when_they_cannot_be_written(tmp_path):
     with (
         server_process("--data", str(tmp_path), complaints=None) as server,

@@ -31,9 +31,9 @@ class Full(SQLiteStorage):
         self.erased: list[Any] = []
         self.begun, self.may_go_on = threading.Event(), threading.Event()
 
-    def erase(self, number: int, keys: Any, until: int, now: int) -> Iterator[Any]:
+    def erase(self, number: int, requests: Any, until: int, now: int) -> Iterator[Any]:
         del number, until, now
-        self.erased.append(list(keys))
+        self.erased.append([list(each.keys) for each in requests])
         self.begun.set()
         assert self.may_go_on.wait(PATIENCE)
         raise OSError(errno.ENOSPC, "No space left on device", "a file of the server")
@@ -49,20 +49,27 @@ def test_who_goes_before_their_turn_has_asked_for_nothing_and_no_failure_is_left
         await engine.start(lambda *_: None)
         await engine.hulls.create("fleet", HullSettings("str", history=FOREVER))
         hull = engine.hulls.get("fleet")
-        first, second = (
-            asyncio.create_task(engine.hulls.filing.erase(hull, PackedKeys.pack([key]))) for key in ("a", "b")
-        )
+        loop = asyncio.get_running_loop()
+
+        def caller(key: str) -> "asyncio.Task[Any]":
+            return loop.create_task(engine.hulls.filing.erase(hull, PackedKeys.pack([key])))
+
+        first = caller("a")
         assert await asyncio.to_thread(storage.begun.wait, PATIENCE)
-        for caller in (second, first):
-            caller.cancel()
+        second, third, fourth = map(caller, ("b", "c", "d"))
+        await asyncio.sleep(0)
+        for gone in (second, first):
+            gone.cancel()
             with pytest.raises(asyncio.CancelledError):
-                await caller
+                await gone
         storage.may_go_on.set()
-        with pytest.raises(Exception, match=r"^No space left on device$"):
-            await engine.hulls.filing.erase(hull, PackedKeys.pack(["c"]))
+        for left in (third, fourth):
+            with pytest.raises(Exception, match=r"^No space left on device$"):
+                await left
+        del first, second, third, fourth, gone, left
         gc.collect()
         assert not complaints
-        assert storage.erased == [["a"], ["c"]]
+        assert storage.erased == [[["a"]], [["c"], ["d"]]]
         await supervisor.stop()
         await engine.close()
 

@@ -1,6 +1,6 @@
 """Erasing keys from segments: the same batches without them, in other files."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,8 @@ import numpy.typing as npt
 from dynhull.keys import key_list, take_keys
 
 from ...state.records import Contents, HeldRows, Kept, KeyRows, Keys, Record
-from ..past import Erasure
+from ..past import EraseRequest, Erasure
+from ..port import NEWEST
 from ..segments.archive import BATCHES, STATE, Archive
 from ..segments.columns import columns_of
 from .filed import named, read_batches, read_state
@@ -56,21 +57,22 @@ class Erasing:
 
     Args:
         hull: the hull.
-        keys: the keys.
+        requests: the keys. Those that several name are those of the first.
         until: the revision.
         archive: has the files.
 
     Attributes:
-        hull, archive: the same.
+        hull, requests, archive: the same.
     """
 
-    def __init__(self, hull: HullRows, keys: Keys, until: int, archive: Archive) -> None:
+    def __init__(self, hull: HullRows, requests: Sequence[EraseRequest], until: int, archive: Archive) -> None:
         self.hull = hull
         self.archive = archive
-        self._keys = set(key_list(keys))
+        self.requests = requests
         self._until = until
-        self._first = until
-        self._moves = 0
+        self._of = {key: at for at in reversed(range(len(requests))) for key in key_list(requests[at].keys)}
+        self._firsts = np.full(len(requests), NEWEST)
+        self._moves = np.zeros(len(requests), np.int64)
 
     def segments(self) -> Iterator[tuple[tuple[StoredSegment, ...], Due]]:
         """Segments that have one of the keys, and of what to make the one that has none and takes their place.
@@ -99,66 +101,73 @@ class Erasing:
         with named(segment, STATE):
             before = read_state(self.archive, segment) if segment.facts.state_bytes else None
         found = [] if before is None else [before.contents.keys, held_keys(before.contents)]
-        in_state = any(self._among(keys).any() for keys in found if keys is not None)
+        owners = [each[each >= 0] for each in (self._owners(keys) for keys in found if keys is not None)]
+        in_state = any(map(len, owners))
         if before is not None and in_state:
             before = replace(before, contents=self._without(before.contents))
-            self._first = min(self._first, segment.first - 1)
-        moves = self._moves
+            np.minimum.at(self._firsts, np.concatenate(owners), segment.first - 1)
+        moves = self._moves.sum()
         with named(segment, BATCHES):
             batches = read_batches(self.archive, segment).between(segment.first - 1, segment.last)
         records = [self._record(each) if each.revision <= self._until else each for each in batches]
-        return _Stretch((segment,), before, records, in_state or self._moves > moves)
+        return _Stretch((segment,), before, records, in_state or bool(self._moves.sum() > moves))
 
     def _due(self, run: _Stretch | None) -> Iterator[tuple[tuple[StoredSegment, ...], Due]]:
         if run is not None and run.had:
             row = self.hull.row
             yield run.segments, Due(row, columns_of(run.records, row.settings.identity), run.before)
 
-    def done(self, now: int) -> Erasure:
-        """What has been erased, at a time."""
-        return Erasure(self._first, self._until, now, len(self._keys), self._moves)
+    def done(self, now: int) -> list[tuple[EraseRequest, Erasure]]:
+        """What has been erased for whom, at a time."""
+        return [
+            (request, Erasure(first, self._until, now, len(set(key_list(request.keys))), moves))
+            for request, first, moves in zip(self.requests, self._firsts.tolist(), self._moves.tolist(), strict=True)
+            if first != NEWEST
+        ]
 
-    def _among(self, keys: Keys) -> npt.NDArray[np.bool_]:
-        """Which keys are to be erased."""
-        return np.fromiter((key in self._keys for key in key_list(keys)), np.bool_, len(keys))
+    def _owners(self, keys: Keys) -> npt.NDArray[np.intp]:
+        """The places of the requests that name keys; -1 for those that are to stay."""
+        return np.fromiter((self._of.get(key, -1) for key in key_list(keys)), np.intp, len(keys))
 
     def _record(self, record: Record) -> Record:
         rows = record.rows
         if not isinstance(rows, KeyRows):
             return record
-        put, removed = self._among(rows.keys), self._among(rows.removes)
-        count = int(put.sum() + removed.sum())
         held = rows.held
-        if held is not None:
-            holds, drops = self._among(held.rows.keys), self._among(held.dropped)
-            count += int(holds.sum() + drops.sum())
-            held = replace(held, rows=_held(held.rows, ~holds), dropped=_keys(held.dropped, ~drops))
-        if not count:
+        named = [rows.keys, rows.removes, *(() if held is None else (held.rows.keys, held.dropped))]
+        owners = [self._owners(keys) for keys in named]
+        erased = np.concatenate(owners)
+        erased = erased[erased >= 0]
+        if not len(erased):
             return record
-        self._moves += count
-        self._first = min(self._first, record.revision)
+        np.add.at(self._moves, erased, 1)
+        np.minimum.at(self._firsts, erased, record.revision)
+        put, removed, *of_held = (each < 0 for each in owners)  # what stays of each
+        if held is not None:
+            holds, drops = of_held
+            held = replace(held, rows=_held(held.rows, holds), dropped=_keys(held.dropped, drops))
         left = replace(
             rows,
-            keys=_keys(rows.keys, ~put),
-            points=rows.points[~put],
-            removes=_keys(rows.removes, ~removed),
-            times=None if rows.times is None else rows.times[~put],
-            deadlines=None if rows.deadlines is None else rows.deadlines[~put],
+            keys=_keys(rows.keys, put),
+            points=rows.points[put],
+            removes=_keys(rows.removes, removed),
+            times=None if rows.times is None else rows.times[put],
+            deadlines=None if rows.deadlines is None else rows.deadlines[put],
             held=held,
-            accuracies=None if rows.accuracies is None else rows.accuracies[~put],
+            accuracies=None if rows.accuracies is None else rows.accuracies[put],
         )
         return replace(record, rows=left)
 
     def _without(self, contents: Contents) -> Contents:
         assert contents.keys is not None  # only hulls with keys are asked about
-        left = ~self._among(contents.keys)
+        left = self._owners(contents.keys) < 0
         held = contents.held
         return Contents(
             contents.points[left],
             _keys(contents.keys, left),
             None if contents.times is None else contents.times[left],
             None if contents.deadlines is None else contents.deadlines[left],
-            None if held is None else _held(held, ~self._among(held.keys)),
+            None if held is None else _held(held, self._owners(held.keys) < 0),
             None if contents.accuracies is None else contents.accuracies[left],
         )
 

@@ -118,7 +118,7 @@ class EraseKeys:
 
     number: int
     replaced: tuple[tuple[tuple[StoredSegment, ...], StoredSegment], ...]
-    stored: StoredErasure
+    stored: tuple[StoredErasure, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -403,10 +403,11 @@ class Group:
             for old in olds:
                 self._retire_segment(RetireSegment(step.number, old))
             self._add_segment(now, new)
-        values = erasure_values(step.stored, step.number)
-        self.statements.append(Insert("segments", values))
-        self._weigh(now, segment_weight(values))
-        self._effects.append(lambda: now.rows.add_erasure(step.stored))
+        for stored in step.stored:
+            values = erasure_values(stored, step.number)
+            self.statements.append(Insert("segments", values))
+            self._weigh(now, segment_weight(values))
+        self._effects.append(lambda: now.rows.add_erasures(step.stored))
 
     def _drop_erasure(self, step: DropErasure) -> None:
         now = self._hull(step.number)

@@ -185,9 +185,9 @@ class HullRows:
         """Have no longer one of the segments."""
         self.segments = tuple(each for each in self.segments if each != segment)
 
-    def add_erasure(self, stored: StoredErasure) -> None:
-        """Have one more erasure, the newest."""
-        self.erasures = (*self.erasures, stored)
+    def add_erasures(self, stored: Iterable[StoredErasure]) -> None:
+        """Have more erasures, the newest ones."""
+        self.erasures = (*self.erasures, *stored)
 
     def drop_erasure(self, stored: StoredErasure) -> None:
         """Have no longer one of the erasures."""

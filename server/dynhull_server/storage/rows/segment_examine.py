@@ -89,6 +89,7 @@ class SegmentExamination:
         self._damaged: list[tuple[Any, ...]] = []
         self._places: set[int] = set()
         self._found: defaultdict[int, list[StoredSegment]] = defaultdict(list)  # that their hulls do not have yet
+        self._erased: defaultdict[int, list[StoredErasure]] = defaultdict(list)  # the same
         self.newest = 0
         self.dead: list[int] = []
 
@@ -137,7 +138,7 @@ class SegmentExamination:
         if file:
             self._found[number].append(segment_from(place, first, last, file, facts))
         else:
-            hull.add_erasure(erasure_from(place, first, last, facts))
+            self._erased[number].append(erasure_from(place, first, last, facts))
         found = segment_weight(values)  # type: ignore[arg-type]  # a row has these columns
         hull.weigh(found)
         return found
@@ -197,10 +198,13 @@ class SegmentExamination:
         return found
 
     def _hand_out(self) -> None:
-        """Give their hulls the segments that were found."""
+        """Give their hulls the segments and the erasures that were found."""
         for number, found in self._found.items():
             self._hulls[number].set_segments((*self._hulls[number].segments, *found))
+        for number, erased in self._erased.items():
+            self._hulls[number].add_erasures(erased)
         self._found.clear()
+        self._erased.clear()
 
     def _lost(self, row: tuple[Any, ...], hull: HullRows, committed: int) -> Values:
         """A row that says which revisions there were, and which no file can satisfy."""

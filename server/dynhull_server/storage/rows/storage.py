@@ -23,7 +23,7 @@ from ...state.records import CommitStamp, Contents, HullRow, Kept, Keys, Parts, 
 from ...state.tracks import KeyChanges
 from ...state.ways import KeyWays
 from ..of_keys import changes_of_keys, contents_of_keys, ways_of
-from ..past import Erasure, Hole, Moment, StoredHistory, created
+from ..past import EraseRequest, Erasure, Hole, Moment, StoredHistory, created
 from ..port import NEWEST, DamagedError, NotCommittedError, StorageError, StorageStep, StoredContents
 from ..segments.archive import NEEDS, Archive, is_installed
 from ..segments.parquet import load
@@ -514,7 +514,7 @@ class RowStorage(ABC):
             hulls = self._settled().hulls.values()
             return [hull.row.number for hull in hulls if hull.segments or hull.erasures or hull.row.settings.history]
 
-    def erase(self, number: int, keys: Keys, until: int, now: int) -> Iterator[StorageStep]:
+    def erase(self, number: int, requests: Sequence[EraseRequest], until: int, now: int) -> Iterator[StorageStep]:
         """File what the journal has of the keys, then replace the segments that have them."""
         archive = self._archive
         if archive is None:
@@ -525,7 +525,7 @@ class RowStorage(ABC):
         with self._visible:
             found = self._settled().hulls.get(number)
         if found is not None:
-            yield from self._erase(Erasing(found.copy(), keys, until, archive), now)
+            yield from self._erase(Erasing(found.copy(), requests, until, archive), now)
         yield from self._remove_files(archive)
 
     def _erase(self, erasing: Erasing, now: int) -> Iterator[StorageStep]:
@@ -541,8 +541,11 @@ class RowStorage(ABC):
                 yield NameFile(place, file)
                 replaced.append((segments, due.write(erasing.archive, place, file)))
             if replaced:
-                stored = StoredErasure(next(self._ledger.segment_ids), erasing.done(now))
+                done = erasing.done(now)
+                stored = tuple(StoredErasure(next(self._ledger.segment_ids), each) for _, each in done)
                 yield EraseKeys(number, tuple(replaced), stored)
+                for request, erased in done:
+                    request.erased = erased
         except BaseException:
             self._abandon(places)
             raise
