@@ -4,7 +4,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from server_process import server_process
 
 from dynhull import DynamicHull
 from dynhull_client import (
+    DynhullError,
     HullClient,
     HullNotFoundError,
     LimitExceededError,
@@ -24,6 +25,7 @@ from dynhull_client import (
     ProducerInUseError,
     UnavailableError,
 )
+from dynhull_client._gathering import Gathering
 
 POINTS = np.random.default_rng(3).normal(size=(400, 10, 2))
 
@@ -239,6 +241,48 @@ def test_a_writer_gives_up_a_server_that_stays_away(connect: type[HullClient]) -
                 os.kill(each, signal.SIGKILL)
             writer.put(insert=POINTS[0])
             writer.flush()
+
+
+def out_of_memory(monkeypatch: pytest.MonkeyPatch, times: float) -> Callable[[], int]:
+    """Have the first so many batches not be made; returns how many it were."""
+    joined, failed = Gathering.joined, 0
+
+    def failing(gathering: Gathering) -> object:
+        nonlocal failed
+        if failed < times:
+            failed += 1
+            raise MemoryError
+        return joined(gathering)
+
+    monkeypatch.setattr(Gathering, "joined", failing)
+    return lambda: failed
+
+
+def test_a_batch_that_there_was_no_memory_for_is_made_later(
+    client: HullClient, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failed = out_of_memory(monkeypatch, 2)
+    with client.writer(name, linger=0.01) as writer:
+        outcome = writer.put(insert=POINTS[0])  # it is made where requests are made, and nobody is there to hear
+        wait_until(outcome.done)
+        assert (outcome.result().points, failed()) == (10, 2)
+    failed = out_of_memory(monkeypatch, 1)
+    with client.writer(name, linger=3600, batch_points=20) as writer:
+        first = writer.put(insert=POINTS[1])
+        with pytest.raises(MemoryError):
+            writer.put(insert=POINTS[2])  # it is in the batch all the same, which was not full before
+        writer.flush()
+        assert (first.result().points, failed()) == (30, 1)
+
+
+def test_batches_that_there_is_never_memory_for_end_a_writer(
+    client: HullClient, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failed = out_of_memory(monkeypatch, float("inf"))
+    with pytest.raises(DynhullError, match="request"), client.writer(name, linger=0.01, patience=0.3) as writer:  # noqa: PT012
+        wait_until(writer.put(insert=POINTS[0]).done)
+        writer.flush()
+    assert failed() > 1
 
 
 def test_what_a_writer_cannot_do(client: HullClient, name: str) -> None:

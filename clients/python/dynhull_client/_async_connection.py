@@ -139,11 +139,20 @@ class AsyncConnection(Connection):
             What ended the call.
         """
         said: list[grpc.aio.AioRpcError] = []
+        unmade: list[BaseException] = []
+
+        def sent(sending: asyncio.Task[None]) -> None:
+            """End a call whose requests have ended before their end, without which it would last for ever."""
+            if not sending.cancelled() and (error := sending.exception()) is not None:
+                unmade.append(error)
+                call.cancel()
+
         try:
             with CallErrors(self, method):
                 call = self.begin(getattr(self.stub, method), None, None)
                 call.add_done_callback(lambda ended: said.append(_status(ended)))
                 sending = asyncio.create_task(_send(call, requests))
+                sending.add_done_callback(sent)
                 try:
                     async for response in call:  # `read` leaves out responses that are there when a write has failed
                         if not await hear(response):
@@ -152,11 +161,16 @@ class AsyncConnection(Connection):
                     if said:  # gRPC may have forgotten it since, for that of a write that failed
                         raise said[0] from None
                     raise
+                except asyncio.CancelledError:
+                    if not unmade:
+                        raise
                 finally:
                     call.cancel()
                     await end(sending)  # a task of gRPC's own may wait for ever for a call that has ended
         except DynhullError as error:
             return error
+        if unmade:
+            return DynhullError(f"a request could not be made: {unmade[0]!r}", grpc.StatusCode.UNKNOWN, "", {})
         return DynhullError("the server ended the call", grpc.StatusCode.OK, "", {})
 
     async def close(self) -> None:

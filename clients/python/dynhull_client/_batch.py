@@ -196,7 +196,7 @@ def keep_last_rows(batch: batch_pb2.Batch) -> None:
     rows = np.array(sorted({key: row for row, key in enumerate(plain_keys(keys))}.values()), np.intp)
     if len(rows) == len(keys):
         return
-    batch.puts.keys.CopyFrom(encode_keys(take_keys(keys, rows)))
+    kept = encode_keys(take_keys(keys, rows))
     puts = batch.puts
     columns: tuple[tuple[Any, int], ...] = (
         (puts.points, BYTES_PER_POINT),
@@ -205,8 +205,10 @@ def keep_last_rows(batch: batch_pb2.Batch) -> None:
     )
     if puts.HasField("accuracies"):
         columns += ((puts.accuracies, BYTES_PER_TIME),)
-    for packed, width in columns:
-        packed.packed = np.frombuffer(packed.packed, f"V{width}")[rows].tobytes() if packed.packed else b""
+    taken = [np.frombuffer(each.packed, f"V{width}")[rows].tobytes() if each.packed else b"" for each, width in columns]
+    puts.keys.CopyFrom(kept)  # only now: there may be no memory for a column
+    for (each, _), packed in zip(columns, taken, strict=True):
+        each.packed = packed
 
 
 def _concatenate(whole: Message, pieces: Sequence[Message]) -> None:

@@ -308,14 +308,14 @@ class InFlight(Generic[Future]):
         return not self._full(following) and following.gathering.admits(part)
 
     def _complete(self, following: Next[Future]) -> None:
-        """Number the batch being gathered: it is to be sent."""
-        self._next = None
-        self._last = following.number or self._last + 1
-        message = pb.NumberedBatch(batch=following.gathering.joined(), sequence=self._last)
+        """Number the batch being gathered: it is to be sent. It stays as it is where there is no memory for it."""
+        number = following.number or self._last + 1
+        message = pb.NumberedBatch(batch=following.gathering.joined(), sequence=number)
         if self._writing.may_skip:
             message.after_sequence = self._before
-            self._before = self._last
         size = message.ByteSize() + FRAME_BYTES
+        self._next = None
+        self._last = self._before = number
         self._waiting.append(SentBatch(following.outcome, message, size))
         self._waiting_bytes += size
 
