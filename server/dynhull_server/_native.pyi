@@ -88,6 +88,11 @@ class LastPlaces:
         The clock and the cause of the last batch; keys that are put, and removed, as lengths and text; and the points, times and deadlines of those that are put.
         """
 
+def footer_groups(footer: bytes, column: int) -> tuple[int, int, list[tuple[int, bytes | None, bytes | None, int]]] | None:
+    """
+    Where the groups of rows of a Parquet file lie in its footer: the list, the first of them, and of each its end, the least and the greatest value of a column, and how many rows have none. None for what is no such footer.
+    """
+
 def key_codes(lengths: bytes, data: bytes) -> bytes:
     """
     The number of each key, as int32: equal ones have the same, each that is new one more than those before.

@@ -127,6 +127,11 @@ class Native(Protocol):
     def results(self, outcomes: "list[tuple[int, tuple[Any, ...]]]") -> bytes | None:
         """A StreamResponse with several results: `acknowledgements` in rpc/short_batches.py."""
 
+    def footer_groups(
+        self, footer: bytes, column: int
+    ) -> "tuple[int, int, list[tuple[int, bytes | None, bytes | None, int]]] | None":
+        """Where the groups of rows of a file lie in its footer: `_chosen` in storage/segments/parquet.py."""
+
     def key_codes(self, lengths: bytes, data: bytes) -> bytes:
         """`_codes` in storage/segments/gathered.py."""
 

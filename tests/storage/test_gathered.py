@@ -366,3 +366,52 @@ def test_keys_of_few_rows_are_written_one_by_one_and_read_as_those_of_many(rows,
     assert np.array_equal(found.rows.points, places + rows - 1)
     some = columns_of_keys([keys_from_parquet(BytesIO(content), "a file", PackedKeys.pack(["key 007", "key 063"]))])
     assert list(some.keys) == ["key 007", "key 063"] * rows
+
+
+@pytest.mark.skipif(native is None, reason="C++ is not built")
+@pytest.mark.parametrize("identity", ["str", "int"])
+@pytest.mark.parametrize("group_rows", [7, 64, 1000])
+def test_a_footer_of_the_groups_that_have_some_keys_leads_to_the_same_rows(identity, group_rows, monkeypatch):
+    """The list of its groups has its size in four bits, in a byte, or in two."""
+    monkeypatch.setattr(parquet, "GROUP_ROWS", group_rows)
+    names = [f"key {each:03}" for each in range(200)]
+    numbers = np.arange(200, dtype=np.uint64) * np.uint64(2**56)
+
+    def keyed(some):
+        return PackedKeys.pack([names[each] for each in some]) if identity == "str" else numbers[list(some)]
+
+    moved = [KeyRows(keyed(range(200)), np.full((200, 2), float(turn)), keyed([])) for turn in range(5)]
+    nothing = KeyRows(keyed([]), np.empty((0, 2)), keyed([]))
+    columns = columns_of([Record(turn + 1, each) for turn, each in enumerate([*moved, nothing])], identity)
+    file = BytesIO(to_parquet(columns, {}))
+    for some in ([0], [199], [3, 4, 120], range(0, 200, 2), range(200), []):
+        found = keys_from_parquet(file, "a file", keyed(some))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(parquet, "native", None)
+            expected = keys_from_parquet(file, "a file", keyed(some))
+        assert found.same == expected.same
+        assert (found.about, found.state) == (expected.about, expected.state)
+        assert found.table.equals(expected.table, check_metadata=True)
+        assert len(found.table) == 5 * len(some) + 1
+
+
+@pytest.mark.skipif(native is None, reason="C++ is not built")
+def test_what_is_no_footer_is_left_to_who_knows_all_of_parquet():
+    content = to_parquet(columns_of(lived(KINDS["keyed"], [("put", 3, 2, 0)] * 3), "str"), {})
+    size = int.from_bytes(content[-8:-4], "little")
+    footer, column = content[-8 - size : -8], parquet.ORDER.index("key")
+    begin, first, ((end, least, greatest, none),) = native.footer_groups(footer, column)
+    assert (least, greatest, none) == (b"key 0", b"key 1", 0)
+    assert 0 < begin < first < end < size
+    assert native.footer_groups(footer, 99)[2] == [(end, None, None, 0)]
+    for length in range(first + 1, end):  # a list of groups that goes beyond the end
+        assert native.footer_groups(footer[:length], column) is None
+    rng = np.random.default_rng(1)
+    for _ in range(2000):
+        changed = bytearray(footer)
+        changed[rng.integers(size)] ^= 1 << int(rng.integers(8))
+        found = native.footer_groups(bytes(changed), column)
+        assert found is None or all(0 < each[0] <= size for each in found[2])
+    for content in (b"", b"PAR1", content[:-1] + b"2", b"\xff\xff\xff\xffPAR1", bytes(100)):
+        with pytest.raises(DamagedError):
+            keys_from_parquet(BytesIO(content), "a file", PackedKeys.pack(["key 0"]))

@@ -9,6 +9,7 @@
 
 #include "batches.hpp"
 #include "encoding.hpp"
+#include "footer.hpp"
 #include "key_codes.hpp"
 #include "last_places.hpp"
 #include "messages.hpp"
@@ -418,6 +419,20 @@ nb::object results(const nb::list& outcomes) {
 
 nb::bytes bytes(const std::string& text) { return nb::bytes(text.data(), text.size()); }
 
+// Where the list of groups of rows begins in a footer, and the first group; and of each group its end, and of one
+// column the least value, the greatest one, None for what is not known, and how many rows have none.
+nb::object footer_groups(const nb::bytes& footer, std::uint64_t column) {
+  const auto found = Footer::of({footer.c_str(), footer.size()}, column);
+  if (!found) return nb::none();
+  const auto value = [](const std::optional<std::string_view>& text) {
+    return text ? nb::object(nb::bytes(text->data(), text->size())) : nb::none();
+  };
+  nb::list groups;
+  for (const Footer::Group& group : found->groups)
+    groups.append(nb::make_tuple(group.end, value(group.least), value(group.greatest), group.nulls));
+  return nb::make_tuple(found->list, found->first, groups);
+}
+
 LastPlaces* last_places(std::uint8_t kind) {
   if (kind != OF_STRINGS && kind != OF_INTEGERS) throw nb::value_error("no kind of keys");
   return new LastPlaces(kind);
@@ -524,6 +539,12 @@ NB_MODULE(_native, module) {
            nb::sig("def taken(self) -> tuple[int, int, bytes, bytes, bytes, bytes, bytes, bytes, bytes]"),
            "The clock and the cause of the last batch; keys that are put, and removed, as lengths and text; and the "
            "points, times and deadlines of those that are put.");
+  module.def(
+      "footer_groups", &dynhull_server::footer_groups, "footer"_a, "column"_a,
+      nb::sig("def footer_groups(footer: bytes, column: int) -> "
+              "tuple[int, int, list[tuple[int, bytes | None, bytes | None, int]]] | None"),
+      "Where the groups of rows of a Parquet file lie in its footer: the list, the first of them, and of each its end, "
+      "the least and the greatest value of a column, and how many rows have none. None for what is no such footer.");
   module.def(
       "key_codes", &dynhull_server::key_codes, "lengths"_a, "data"_a,
       nb::sig("def key_codes(lengths: bytes, data: bytes) -> bytes"),

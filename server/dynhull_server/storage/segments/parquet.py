@@ -10,13 +10,14 @@ from __future__ import annotations
 from base64 import b64encode
 from bisect import bisect_left
 from functools import cache, partial
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dynhull.keys import PackedKeys, key_list
 
+from ...compiled import native
 from ...state.contents.key_rows import select_keys
 from ...state.records import FOREVER, NO_TIME, Contents, Identity, Parts
 from ...state.ways import KeyWays, Stamps
@@ -27,7 +28,7 @@ from .gathered import key_codes
 
 if TYPE_CHECKING:
     import io
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import numpy.typing as npt
     import pyarrow as pa
@@ -35,12 +36,19 @@ if TYPE_CHECKING:
 
     from dynhull.keys import Keys
 
+    from ...compiled import Native
+
     Rows = npt.NDArray[np.intp]
 
 # The columns of numbers in which a row may have none, and what stands for it.
 NOTHING = dict.fromkeys(("commit", "committed", "clock", "event_time"), NO_TIME) | {"expire_time": FOREVER}
 
+# The least key of a group of rows and the greatest; what is less than any, and more than any, where that is not known.
+Ends = tuple[tuple[Any, ...], tuple[Any, ...]]
+UNKNOWN: Ends = ((0,), (1,))
+
 VERSION = 1
+MAGIC = b"PAR1"  # the last bytes of each file, after the number of those of the footer
 ACCURACY = "accuracy"  # a column of files in which some position has an error, the last one
 FORMAT, SCALE, STATE = b"dynhull.format", b"dynhull.scale", b"dynhull.state"
 SCHEMA = b"ARROW:schema"  # where pyarrow has the types of columns, and what they say of themselves
@@ -284,10 +292,10 @@ def keys_from_parquet(source: io.IOBase, name: str, keys: Keys) -> RowsOfKeys:
     import pyarrow as pa
 
     try:
-        file = _opened(source, name)
-        metadata, found = file.metadata, file.metadata.metadata
         values = sorted(key_list(keys))
-        groups = _groups(metadata, ORDER.index("key"), values)
+        value = bytes.decode if isinstance(keys, PackedKeys) else _integer
+        file, groups = _of_keys(source, name, values, value)
+        metadata, found = file.metadata, file.metadata.metadata
         same = _same([metadata.row_group(group) for group in groups]) if groups else {}
         names = (*ORDER, ACCURACY)[: metadata.num_columns]
         table = file.read_row_groups(groups, columns=_unknown(names, same), use_threads=False)
@@ -412,11 +420,11 @@ def _stamps(file: pq.ParquetFile, groups: Sequence[int], rows: slice | Rows) -> 
     return Stamps(*(_integers(table, each, NO_TIME)[rows] for each in ("revision", "commit", "committed")))
 
 
-def _opened(source: pa.NativeFile | io.IOBase, name: str) -> pq.ParquetFile:
+def _opened(source: pa.NativeFile | io.IOBase, name: str, metadata: pq.FileMetaData | None = None) -> pq.ParquetFile:
     """A file whose words are read as places in a list of them. DamagedError if it is none of ours, or too new."""
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(source, read_dictionary=CODED, pre_buffer=False)  # all bytes are near
+    file = pq.ParquetFile(source, metadata=metadata, read_dictionary=CODED, pre_buffer=False)  # all bytes are near
     found = file.metadata.metadata or {}
     if FORMAT not in found:
         raise DamagedError(f"{name} is a Parquet file of another program")
@@ -432,18 +440,78 @@ def _has_places(file: pq.ParquetFile) -> bool:
     return "RLE_DICTIONARY" in file.metadata.row_group(0).column(ORDER.index("key")).encodings
 
 
-def _groups(metadata: pq.FileMetaData, column: int, values: list[Any]) -> list[int]:
-    """The groups of rows, which lie by key, that may have one with these keys, or with none: these are the last."""
-    places = range(metadata.num_row_groups)
+def _integer(stored: bytes) -> int:
+    return int.from_bytes(stored, "little")
+
+
+def _of_keys(
+    source: io.IOBase, name: str, values: list[Any], value: Callable[[bytes], Any]
+) -> tuple[pq.ParquetFile, Sequence[int]]:
+    """A file, and those of its groups of rows that may have one with these keys, or with none.
+
+    `value` returns a key of which a footer has the bytes.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    footer = None if native is None else _chosen(native, source, values, value)
+    if footer is not None:
+        file = _opened(source, name, pq.read_metadata(pa.BufferReader(footer)))
+        return file, range(file.num_row_groups)
+    file = _opened(source, name)
+    column = ORDER.index("key")
 
     @cache
-    def ends(place: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """The least key and the greatest: what is less than any, and more than any, where that is not known."""
-        statistics = metadata.row_group(place).column(column).statistics
-        if statistics is None or not statistics.has_min_max:
-            return (0,), (1,)
-        return (0, statistics.min), (1,) if statistics.null_count else (0, statistics.max)
+    def ends(place: int) -> Ends:
+        found = file.metadata.row_group(place).column(column).statistics
+        if found is None or not found.has_min_max:
+            return UNKNOWN
+        return (0, found.min), (1,) if found.null_count else (0, found.max)
 
+    return file, _groups(ends, file.num_row_groups, values)
+
+
+def _chosen(native: Native, source: io.IOBase, values: list[Any], value: Callable[[bytes], Any]) -> bytes | None:
+    """The footer of a file as if it had no other groups than those of some keys; None for pyarrow to read all of it."""
+    place = source.seek(-len(MAGIC) - 4, SEEK_END)
+    end = source.read(4 + len(MAGIC))
+    size = int.from_bytes(end[:4], "little")
+    if size > place or end[4:] != MAGIC:
+        return None
+    source.seek(place - size)
+    footer = source.read(size)
+    found = native.footer_groups(footer, ORDER.index("key"))
+    if found is None:
+        return None
+    begin, first, of_groups = found
+
+    def ends(place: int) -> Ends:
+        _, least, greatest, none = of_groups[place]
+        if least is None or greatest is None:
+            return UNKNOWN
+        return (0, value(least)), (1,) if none else (0, value(greatest))
+
+    starts = [first, *(each[0] for each in of_groups)]
+    some = [footer[starts[group] : starts[group + 1]] for group in _groups(ends, len(of_groups), values)]
+    shorter = b"".join([footer[:begin], _list_of_structs(len(some)), *some, footer[starts[-1] :]])
+    return b"".join([shorter, len(shorter).to_bytes(4, "little"), MAGIC])
+
+
+def _list_of_structs(size: int) -> bytes:
+    """What such a list begins with in Thrift's compact protocol."""
+    struct, many = 12, 15
+    if size < many:
+        return bytes([size << 4 | struct])
+    found = bytearray([many << 4 | struct])
+    while size >= 128:
+        found.append(size & 127 | 128)
+        size >>= 7
+    return bytes([*found, size])
+
+
+def _groups(ends: Callable[[int], Ends], count: int, values: list[Any]) -> list[int]:
+    """The groups of rows, which lie by key, that may have one with these keys, or with none: these are the last."""
+    places = range(count)
     found = set[int]()
     for place in reversed(places):
         if ends(place)[1] != (1,):
