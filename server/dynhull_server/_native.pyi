@@ -74,9 +74,11 @@ def results(outcomes: list[tuple[int, tuple[Any, ...]]]) -> bytes | None:
     """The same with several results and their numbers."""
 
 class LastPlaces:
-    """Of each key the last place that batches of the journal give it."""
+    """
+    Of each key the last place that batches of the journal give it; there is room for `most` keys at once.
+    """
 
-    def __init__(self, kind: int) -> None: ...
+    def __init__(self, kind: int, most: int = 0) -> None: ...
 
     def add(self, payloads: list[bytes], batches: list[int]) -> int:
         """

@@ -274,6 +274,10 @@ class FaultyStorage:
         """The revision as of a time."""
         return self._of_past(lambda: self._inner.moment(number, time))
 
+    def state_revision(self, number: int, until: int) -> int:
+        """The revision of a kept state."""
+        return self._of_past(lambda: self._inner.state_revision(number, until))
+
     def state(self, number: int, until: int) -> tuple[Kept, Parts]:
         """A kept state."""
         return self._of_past(lambda: self._inner.state(number, until))

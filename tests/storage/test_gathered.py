@@ -412,6 +412,6 @@ def test_what_is_no_footer_is_left_to_who_knows_all_of_parquet():
         changed[rng.integers(size)] ^= 1 << int(rng.integers(8))
         found = native.footer_groups(bytes(changed), column)
         assert found is None or all(0 < each[0] <= size for each in found[2])
-    for content in (b"", b"PAR1", content[:-1] + b"2", b"\xff\xff\xff\xffPAR1", bytes(100)):
+    for other in (b"", b"PAR1", content[:-1] + b"2", b"\xff\xff\xff\xffPAR1", bytes(100)):
         with pytest.raises(DamagedError):
-            keys_from_parquet(BytesIO(content), "a file", PackedKeys.pack(["key 0"]))
+            keys_from_parquet(BytesIO(other), "a file", PackedKeys.pack(["key 0"]))

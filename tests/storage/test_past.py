@@ -70,12 +70,15 @@ def test_a_state_and_the_batches_after_it_are_every_revision_that_is_kept(opened
         for until in range(5, 25):
             kept = state(opened.storage, 1, until)
             assert (kept.revision, kept.records) == (14 if until >= 14 else 5, [])
+            assert opened.storage.state_revision(1, until) == kept.revision
             assert kept.committed == stamps[kept.revision]
             same(kept.contents.points, points(9, kept.revision))
             same(all_batches(opened.storage, kept.revision, until), records(kept.revision + 1, until))
-        for read in (lambda: opened.storage.state(1, 4), lambda: opened.storage.batches(1, 4, 6)):
+        for read in (opened.storage.state_revision, opened.storage.state):
             with pytest.raises(DamagedError, match="no longer kept"):
-                read()
+                read(1, 4)
+        with pytest.raises(DamagedError, match="no longer kept"):
+            opened.storage.batches(1, 4, 6)
         opened.reopen()
 
 

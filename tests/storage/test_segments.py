@@ -91,6 +91,7 @@ def require_all_of_keys(storage, records):
             assert [revision for revision, *_ in found] == sorted(revision for revision, *_ in found)
             whole = state(storage, 1, after)
             revision, rows, contents = storage.key_state(1, keys, after)
+            assert storage.state_revision(1, after) == revision == storage.state(1, after)[0].revision
             expected = dict(zip(whole.contents.keys or (), whole.contents.points.tolist(), strict=True))
             there = {wanted[row]: point for row, point in zip(rows.tolist(), contents.points.tolist(), strict=True)}
             assert revision == whole.revision

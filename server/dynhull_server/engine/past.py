@@ -12,6 +12,7 @@ from weakref import WeakValueDictionary
 from dynhull.arrays import Points
 
 from ..state.contents import begun
+from ..state.contents.live import LiveContents
 from ..state.core import SMALL
 from ..state.errors import (
     HullNotFoundError,
@@ -25,7 +26,7 @@ from ..state.errors import (
 from ..state.fences.model.fence import Fence
 from ..state.hull import Hull
 from ..state.hull_state import Counts, HullState
-from ..state.records import CommitStamp, Kept, Keys, Parts, Record
+from ..state.records import CommitStamp, Kept, Keys, Record
 from ..state.root_state import state_of
 from ..state.tracks import Moves, Tracker
 from ..storage.past import Erasure, Hole, Moment, Past, created, erased_since
@@ -316,9 +317,8 @@ class PastHulls:
         while rebuilt is None or rebuilt.state.counts.revision < revision:
             try:
                 if rebuilt is None:
-                    erasures, kept, parts = await self._stored(hull, revision)
-                    at = kept.revision
-                    rebuilt, ahead = await self._begin(hull, revision, erasures, kept, parts)
+                    erasures, at = await self._where_to_begin(hull, revision)
+                    rebuilt, ahead = await self._begin(hull, revision, erasures, at)
                 else:
                     at = rebuilt.state.counts.revision
                     ahead = await self._step(rebuilt, ahead, revision)
@@ -333,34 +333,35 @@ class PastHulls:
                 rebuilt, at = None, NEWEST  # what followed it has been dropped meanwhile: a newer state leads there
         return rebuilt
 
-    async def _stored(self, hull: Hull, revision: int) -> tuple[tuple[Erasure, ...], Kept, Parts]:
-        """The newest stored state at or before a revision, its points, and the erasures before it was read."""
+    async def _where_to_begin(self, hull: Hull, revision: int) -> tuple[tuple[Erasure, ...], int]:
+        """The erasures from the past of a hull, and the revision of the newest state that leads to another one."""
         number = hull.row.number
-
-        def stored() -> tuple[tuple[Erasure, ...], Kept, Parts]:
-            erasures = self._past.erasures(number)
-            kept, parts = self._past.state(number, revision)
-            self._require_room(parts.count)
-            if not kept.revision:
-                kept.committed = created(hull.row)
-            return erasures, kept, parts
-
-        found: tuple[tuple[Erasure, ...], Kept, Parts] = await self.ask(hull.name, stored)
+        found: tuple[tuple[Erasure, ...], int] = await self.ask(
+            hull.name, lambda: (self._past.erasures(number), self._past.state_revision(number, revision))
+        )
         return found
 
     async def _begin(
-        self, hull: Hull, revision: int, erasures: tuple[Erasure, ...], kept: Kept, parts: Parts
+        self, hull: Hull, revision: int, erasures: tuple[Erasure, ...], at: int
     ) -> tuple[_Rebuilt, list[Record]]:
-        """A hull from a stored state and some batches after it, which are read while the state is loaded.
+        """A hull from a stored state and some batches after it, which are read while the state is read and loaded.
 
-        And others after these, which are read while the hull is built of both.
+        And others after these, which are read while the hull is built of both. The state is that of revision `at`, or,
+        if that one turns out to be damaged, an older one.
         """
         number, round_, settings = hull.row.number, self.erasures, hull.row.settings
         limits, now = self._driver.limits, self._driver.machine.clock.monotonic()
 
+        def load() -> tuple[Kept, int, LiveContents]:
+            kept, parts = self._past.state(number, revision)
+            self._require_room(parts.count)
+            if not kept.revision:
+                kept.committed = created(hull.row)
+            return kept, parts.count, begun(kept, settings, limits.points_of(settings), parts)
+
         def read() -> list[Record]:
             found: list[Record] = []
-            after = kept.revision
+            after = at
             for _ in range(AHEAD):
                 if after >= revision or sum(len(each.rows) for each in found) >= AHEAD_ROWS:
                     break
@@ -368,12 +369,11 @@ class PastHulls:
                 after = found[-1].revision
             return found
 
-        contents, records = await self._both(
-            hull.name, partial(begun, kept, settings, limits.points_of(settings), parts), read
-        )
-        rows = parts.count + sum(1 + len(each.rows) for each in records)
+        (kept, points, contents), records = await self._both(hull.name, load, read)
+        if kept.revision == at:
+            kept.records = records
+        rows = points + sum(1 + len(each.rows) for each in kept.records)
         self._require_room(rows)
-        kept.records = records
         last = kept.last_revision
         build = partial(state_of, limits, settings, kept, now, contents)
         onwards = partial(self._gathered, number, last, revision, erasures) if last < revision else None

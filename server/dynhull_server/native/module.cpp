@@ -417,8 +417,6 @@ nb::object results(const nb::list& outcomes) {
   return nb::bytes(response.data.data(), response.data.size());
 }
 
-nb::bytes bytes(const std::string& text) { return nb::bytes(text.data(), text.size()); }
-
 // Where the list of groups of rows begins in a footer, and the first group; and of each group its end, and of one
 // column the least value, the greatest one, None for what is not known, and how many rows have none.
 nb::object footer_groups(const nb::bytes& footer, std::uint64_t column) {
@@ -433,9 +431,9 @@ nb::object footer_groups(const nb::bytes& footer, std::uint64_t column) {
   return nb::make_tuple(found->list, found->first, groups);
 }
 
-LastPlaces* last_places(std::uint8_t kind) {
+LastPlaces* last_places(std::uint8_t kind, std::size_t most) {
   if (kind != OF_STRINGS && kind != OF_INTEGERS) throw nb::value_error("no kind of keys");
-  return new LastPlaces(kind);
+  return new LastPlaces(kind, most);
 }
 
 // Adds the batches of payloads up to the first that cannot be added; the number of those that are.
@@ -451,14 +449,29 @@ std::size_t add_batches(LastPlaces& places, const nb::list& payloads, const nb::
   return added;
 }
 
+// Bytes that are written later.
+nb::object room(std::size_t size) {
+  nb::object room = nb::steal(PyBytes_FromStringAndSize(nullptr, Py_ssize_t(size)));
+  if (!room.is_valid()) throw nb::python_error();
+  return room;
+}
+
 nb::tuple taken(const LastPlaces& places) {
   const LastPlaces::Taken found = [&] {
     const nb::gil_scoped_release release;
     return places.taken();
   }();
-  return nb::make_tuple(places.clock, places.cause, bytes(found.put.lengths), bytes(found.put.text),
-                        bytes(found.removed.lengths), bytes(found.removed.text), bytes(found.points),
-                        bytes(found.times), bytes(found.deadlines));
+  const nb::object lengths = room(found.put.lengths), text = room(found.put.text);
+  const nb::object removed_lengths = room(found.removed.lengths), removed_text = room(found.removed.text);
+  const nb::object points = room(found.points), times = room(found.times), deadlines = room(found.deadlines);
+  const auto of = [](const nb::object& bytes) { return PyBytes_AS_STRING(bytes.ptr()); };
+  {
+    const nb::gil_scoped_release release;
+    places.write(
+        {{of(lengths), of(text)}, {of(removed_lengths), of(removed_text)}, of(points), of(times), of(deadlines)});
+  }
+  return nb::make_tuple(places.clock, places.cause, lengths, text, removed_lengths, removed_text, points, times,
+                        deadlines);
 }
 
 }  // namespace
@@ -530,8 +543,10 @@ NB_MODULE(_native, module) {
              nb::sig("def results(outcomes: list[tuple[int, tuple[typing.Any, ...]]]) -> bytes | None"),
              "The same with several results and their numbers.");
   using dynhull_server::LastPlaces;
-  nb::class_<LastPlaces>(module, "LastPlaces", "Of each key the last place that batches of the journal give it.")
-      .def(nb::new_(&dynhull_server::last_places), "kind"_a)
+  nb::class_<LastPlaces>(
+      module, "LastPlaces",
+      "Of each key the last place that batches of the journal give it; there is room for `most` keys at once.")
+      .def(nb::new_(&dynhull_server::last_places), "kind"_a, "most"_a = 0)
       .def("add", &dynhull_server::add_batches, "payloads"_a, "batches"_a,
            nb::sig("def add(self, payloads: list[bytes], batches: list[int]) -> int"),
            "Add payloads with so many batches each, up to the first that cannot be; the number of those that are.")

@@ -165,6 +165,10 @@ class MemoryStorage:
         before = [each for each in found if each.committed is not None and each.committed.time <= time]
         return before[-1] if before else None
 
+    def state_revision(self, number: int, until: int) -> int:
+        """The revision of the newest snapshot that is not after `until`."""
+        return self.read(number, until).revision
+
     def state(self, number: int, until: int) -> tuple[Kept, Parts]:
         """The newest snapshot of a revision not after `until`, and its contents."""
         kept = self.read(number, until)

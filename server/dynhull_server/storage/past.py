@@ -128,6 +128,9 @@ class Past(Protocol):
         None if the time is before that of the oldest revision whose commit is known.
         """
 
+    def state_revision(self, number: int, until: int) -> int:
+        """The revision of the state that `state` returns. If that is damaged, it may return an older one."""
+
     def state(self, number: int, until: int) -> tuple[Kept, Parts]:
         """The newest state that is kept of a revision not after `until`, without its points, and these.
 

@@ -105,3 +105,28 @@ def test_a_replay(tmp_path, erased):
                     await anext(events)
 
     asyncio.run(life())
+
+
+@pytest.mark.parametrize("thought", [0, 17])
+def test_batches_that_follow_another_state_than_the_one_that_was_read_are_read_again(tmp_path, thought, monkeypatch):
+    """Those after the newest state are read while that one is; it may turn out to be damaged, and an older one read."""
+
+    async def life():
+        async with served(tmp_path) as engine:
+            pasts, hull = engine.hulls.pasts, engine.hulls.get("k1")._hull
+            gathered, begun = pasts._past.gathered, []
+            monkeypatch.setattr(pasts._past, "state_revision", lambda *_: thought)
+            monkeypatch.setattr(pasts._past, "gathered", lambda *asked: begun.append(asked[1]) or gathered(*asked))
+            for revision in (17, BATCHES - 1):
+                async with pasts.state(hull, revision) as state:
+                    assert state.counts.revision == revision
+                    assert state.contents.find(PackedKeys.pack(["other", GONE])).points.tolist() == [
+                        [revision - 1, 1],
+                        [8 + revision, 9],
+                    ]
+                pasts.forget()
+            return begun
+
+    begun = asyncio.run(life())
+    assert begun.count(0) == 2
+    assert begun.count(17) == (thought == 17)

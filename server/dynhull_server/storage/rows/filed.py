@@ -91,11 +91,13 @@ class Filed:
             return None
         return oldest
 
+    def state_revision(self, hull: HullRows, until: int) -> int:
+        """The revision of the newest state beside a segment that is not after another one."""
+        return _begins(hull, until).first - 1
+
     def state(self, hull: HullRows, until: int) -> tuple[Kept, Parts]:
         """The newest state that lies beside a segment and is not after a revision, and its contents."""
         segment = _begins(hull, until)
-        if until >= segment.first:
-            self._read_ahead(segment)
         if segment.first == 1:
             return Kept(), Parts(0, [Contents()])
         with self._named(segment, STATE):

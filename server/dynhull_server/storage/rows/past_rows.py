@@ -70,6 +70,12 @@ def moment_at(reader: Reader, hull: HullRows, time: int) -> Moment | None:
     return oldest if oldest.committed is not None and oldest.committed.time <= time else None
 
 
+def state_revision(hull: HullRows, until: int) -> int:
+    """The revision of the newest snapshot that is not after `until`; 0 where there is none."""
+    _require_kept(hull, until, hull.oldest)
+    return max((each.revision for each in hull.snapshots if each.revision <= until), default=0)
+
+
 def state_until(reader: Reader, hull: HullRows, until: int) -> tuple[Kept, Parts]:
     """The newest snapshot of a revision not after `until`, and its contents; the empty hull where there is none."""
     _require_kept(hull, until, hull.oldest)
@@ -118,7 +124,7 @@ def _last_places(native: Native, reader: Reader, hull: HullRows, after: int, unt
 
     Only whole rows of batches, none of which does more than put and remove.
     """
-    places, end, size = native.LastPlaces(KINDS[hull.row.settings.identity]), after, 0
+    places, end, size = native.LastPlaces(KINDS[hull.row.settings.identity], until - after), after, 0
     last: BatchRow = ()
     with as_damage(hull):
         for rows in _few_bytes(whole_rows(hull, batch_rows(reader, hull.between(after, until)))):

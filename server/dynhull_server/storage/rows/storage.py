@@ -61,6 +61,7 @@ from .past_rows import (
     moment_at,
     oldest_moment,
     require_batches,
+    state_revision,
     state_until,
 )
 from .reading import commit_of, read_each, read_hull, read_records
@@ -229,6 +230,14 @@ class RowStorage(ABC):
         if found is not None:
             return found
         return self._of_past(number, lambda filed, hull: filed.moment(hull, time), lambda *_: None)
+
+    def state_revision(self, number: int, until: int) -> int:
+        """The revision of the newest snapshot that is not after `until`."""
+        return self._of_past(
+            number,
+            lambda filed, hull: filed.state_revision(hull, until) if until < hull.oldest else None,
+            lambda _, hull: state_revision(hull, until),
+        )
 
     def state(self, number: int, until: int) -> tuple[Kept, Parts]:
         """The newest snapshot of a revision not after `until`, and its contents."""
