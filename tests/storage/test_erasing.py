@@ -1,8 +1,11 @@
 """Keys are erased from the past of a hull: all of it at once, in every file, and nothing else is lost."""
 
 import gc
+import itertools
 import shutil
+import sqlite3
 from collections import Counter
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +18,7 @@ from dynhull_server.state.contents import replayed
 from dynhull_server.state.records import FOREVER, NO_TIME, Append, HeldChange, HeldRows, Kept, KeyRows, Record
 from dynhull_server.storage.past import EraseRequest
 from dynhull_server.storage.port import DamagedError
+from dynhull_server.storage.rows.group import Wipe
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.sqlite import copies
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -319,3 +323,56 @@ def test_erasures_one_after_the_other_leave_few_files_and_no_state_for_each(tmp_
         assert 19 <= len(storage.erasures(1)) <= 20
         storage.close()
         assert copies.check(copy / "data", no_progress, copy / "history").notes == []
+
+
+def traces(fleet):
+    """The files of the database that have a key, in whatever part of them, and segments."""
+    data = [
+        each for each in (fleet.folder / "data").iterdir() if any(key.encode() in each.read_bytes() for key in GONE)
+    ]
+    return sorted(each.name for each in (*data, *(file for key in GONE for file in holds(fleet.archive.path, key))))
+
+
+def test_no_file_has_a_trace_of_it(fleet):
+    """Neither pages of the database that are free nor its log, as long as nobody else reads that."""
+    fleet.carry_out(itertools.islice(fleet.storage.snapshot(1, at_first(fleet)), 1))  # nobody ends it
+    until = leave(fleet)
+    assert len(traces(fleet)) > 4
+    with closing(sqlite3.connect(fleet.folder / "data" / "dynhull.db")) as other:
+        other.execute("BEGIN")
+        other.execute("SELECT count(*) FROM batches").fetchone()
+        erase(fleet, until)
+        assert traces(fleet) == ["dynhull.db-wal"]
+        fleet.file()
+        assert traces(fleet) == ["dynhull.db-wal"]
+    fleet.file()
+    assert traces(fleet) == []
+    fleet.put(1)
+    fleet.storage.close()
+    assert traces(fleet) == ["dynhull.db"]  # it has come back
+    assert copies.check(fleet.folder / "data", no_progress, fleet.archive.path).notes == []
+
+
+def at_first(fleet):
+    return Kept(2, replayed(Kept(records=fleet.records[:2]), fleet.settings).stored())
+
+
+def test_a_kill_before_the_log_has_ended_leaves_no_trace_after_the_next_start(tmp_path):
+    fleet = Fleet(tmp_path).fill(2)
+    until = leave(fleet)
+    for step in fleet.storage.erase(1, [EraseRequest(PackedKeys.pack(GONE))], until, fleet.time):
+        if isinstance(step, Wipe):
+            break
+        fleet.storage.commit([step], fleet.time)
+    assert traces(fleet) == ["dynhull.db-wal"]
+    for part in ("data", "history"):
+        shutil.copytree(tmp_path / part, tmp_path / "copy" / part)
+    fleet.storage.close()
+    fleet.folder = tmp_path / "copy"
+    fleet.archive = Archive(fleet.folder / "history")
+    fleet.storage = SQLiteStorage(fleet.folder / "data", archive=fleet.archive)
+    fleet.storage.open(no_progress)
+    fleet.file()
+    assert traces(fleet) == []
+    same(read_back(fleet.storage, until), without(fleet.records, until))
+    fleet.storage.close()

@@ -1,9 +1,11 @@
-"""What the journal drops becomes segments; and what is erased from them."""
+"""Snapshots of hulls; what the journal drops behind them becomes segments; and what is erased from these."""
 
 import asyncio
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -72,6 +74,7 @@ class Filing:
         self._pasts = pasts
         self._turn = asyncio.Lock()
         self._erasing = Outliving()
+        self._snapshots: WeakValueDictionary[int, asyncio.Lock] = WeakValueDictionary()  # of each hull, one at a time
         self._asked: dict[int, list[_Asked]] = {}  # of each hull, what waits for the turn
         self.unsure: set[Hull] = set()
 
@@ -137,42 +140,67 @@ class Filing:
                 for each in asked:
                     each.refuse(error)
 
+    async def snapshot(self, hull: LiveHull) -> None:
+        """Write a snapshot of a hull as it is."""
+        async with self._turn_of_snapshots(hull):
+            unsaved = hull.unsaved
+            _, kept = await hull.read(lambda state: state.kept(), rows=hull.counts.points)
+            await self._write_snapshot(hull, kept)
+            hull.saved(unsaved)
+
+    def _turn_of_snapshots(self, hull: LiveHull) -> asyncio.Lock:
+        return self._snapshots.setdefault(hull.number, asyncio.Lock())
+
+    async def _write_snapshot(self, hull: LiveHull, kept: Kept) -> None:
+        await self._driver.commit_steps(self._storage.snapshot(hull.number, kept), self._driver.on_disk)
+
     async def _erase_together(self, hull: LiveHull, asked: list["_Asked"]) -> None:
-        unsaved = hull.unsaved
-        _, (kept, present) = await hull.read(
-            partial(_kept, [each.request.keys for each in asked]), rows=hull.counts.points
-        )
-        for each, key in zip(asked, present, strict=True):
-            if key is not None:
-                reason = f"has the key {key!r} now: remove it first, since what is erased is the past"
-                each.refuse(HullUnsuitableError(hull.name, reason, field="keys"))
+        async with self._turn_of_snapshots(hull):  # one that is under way may be of a revision with the keys
+            unsaved = hull.unsaved
+            keys = [each.request.keys for each in asked]
+            _, (kept, present) = await hull.read(partial(_kept, keys), rows=hull.counts.points)
+            for each, key in zip(asked, present, strict=True):
+                if key is not None:
+                    reason = f"has the key {key!r} now: remove it first, since what is erased is the past"
+                    each.refuse(HullUnsuitableError(hull.name, reason, field="keys"))
+            if kept is None:
+                return
+            with _as_answers(hull):
+                for _ in range(SNAPSHOTS):
+                    await self._write_snapshot(hull, kept)
+            hull.saved(unsaved)
         left = [each for each, key in zip(asked, present, strict=True) if key is None]
-        if kept is not None:
-            await self._erase_past(hull, unsaved, kept, [each.request for each in left])
+        await self._erase_past(hull, kept.revision, [each.request for each in left])
         for each in left:
             each.reply()
 
-    async def _erase_past(self, hull: LiveHull, unsaved: int, kept: Kept, requests: list[EraseRequest]) -> None:
+    async def _erase_past(self, hull: LiveHull, until: int, requests: list[EraseRequest]) -> None:
         try:
-            for _ in range(SNAPSHOTS):
-                steps = self._storage.snapshot(hull.number, kept)
-                await self._driver.commit_steps(steps, self._driver.on_disk)
-            hull.saved(unsaved)
-            steps = self._storage.erase(hull.number, requests, kept.revision, self._driver.commit_time())
-            await self._driver.commit_steps(steps, self._driver.in_history)
-            gone = await self._driver.on_disk(partial(self._storage.row, hull.number)) is None
-        except NotStoredError:
-            raise
-        except NotCommittedError as error:
-            raise not_stored(error) from error
-        except UNREADABLE as error:
-            raise past_refusal(error) from error
-        except Exception as error:
-            raise OutcomeUnknownError(words_for_callers(error)) from error
+            with _as_answers(hull):
+                steps = self._storage.erase(hull.number, requests, until, self._driver.commit_time())
+                await self._driver.commit_steps(steps, self._driver.in_history)
+                gone = await self._driver.on_disk(partial(self._storage.row, hull.number)) is None
         finally:
             self._pasts.forget()
         if gone:
             raise HullNotFoundError(hull.name)
+
+
+@contextmanager
+def _as_answers(hull: LiveHull) -> Iterator[None]:
+    """Convert errors of the storage to what callers get."""
+    try:
+        yield
+    except KeyError:
+        raise HullNotFoundError(hull.name) from None
+    except NotStoredError:
+        raise
+    except NotCommittedError as error:
+        raise not_stored(error) from error
+    except UNREADABLE as error:
+        raise past_refusal(error) from error
+    except Exception as error:
+        raise OutcomeUnknownError(words_for_callers(error)) from error
 
 
 def _kept(requests: list[Keys], state: HullState) -> tuple[Kept | None, list[int | str | None]]:

@@ -5,7 +5,6 @@ from ..storage.port import Storage
 from .division import Divisions, StoredShard
 from .driver import Driver
 from .hulls import Hulls
-from .live_hull import LiveHull
 
 # So many times the points that make a snapshot due are between the last two when another one does not wait for more.
 BURST = 2
@@ -51,7 +50,7 @@ class Housekeeping:
                 live = self._hulls.of(hull)
                 least = max(least_points, live.size)
                 if live.unsaved >= least or (live.settings.history and live.between >= BURST * least):
-                    await self._snapshot(live)
+                    await self._hulls.filing.snapshot(live)
             except HullNotFoundError:
                 continue
             except Exception as error:  # go on with the other hulls
@@ -65,12 +64,6 @@ class Housekeeping:
                 failure = failure or error
         if failure is not None:
             raise failure
-
-    async def _snapshot(self, hull: LiveHull) -> None:
-        unsaved = hull.unsaved
-        _, kept = await hull.read(lambda state: state.kept(), rows=hull.counts.points)
-        await self._driver.commit_steps(self._storage.snapshot(hull.number, kept), self._driver.on_disk)
-        hull.saved(unsaved)
 
     async def _snapshot_of_shard(self, shard: StoredShard) -> None:
         taken = shard.take()

@@ -170,12 +170,16 @@ class DropDeadSegment:
     place: int
 
 
+@dataclass(frozen=True, slots=True)
+class Wipe:
+    """Step: nothing but a commit, after which no file of the database has what was dropped before."""
+
+
 SegmentStep = (
     SetHistory | NameFile | CloseSegment | RetireSegment | MendSegment | EraseKeys | DropErasure | DropDeadSegment
 )
-AnyStep = (
-    Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull | SegmentStep | FenceStep
-)
+HullStep = Chunk | Finish | DropSnapshot | DropBatches | DropNewest | Cut | DropDead | ChangeHull
+AnyStep = HullStep | SegmentStep | FenceStep | Wipe
 
 
 class Group:
@@ -191,6 +195,7 @@ class Group:
     Attributes:
         statements: the changes of rows.
         before, totals: the totals before and after them.
+        wipes: whether there is a `Wipe` among them.
         commit: the commit that they are.
     """
 
@@ -204,6 +209,7 @@ class Group:
         self._feed_consumers: dict[ConsumerId, StoredFeedConsumer | None] = {}
         self._effects: list[Callable[[], object]] = []
         self.statements: list[Statement] = []
+        self.wipes = False
         self._fences = FenceChanges(ledger, self.statements, self._effects)
         for change in changes:
             self._take(change)
@@ -264,6 +270,8 @@ class Group:
                 self._erase(change)
             case DropErasure():
                 self._drop_erasure(change)
+            case Wipe():
+                self.wipes = True
             case DropDeadSegment():
                 self._drop_dead_segment(change.place)
             case PutFeedConsumer():

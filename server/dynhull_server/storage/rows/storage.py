@@ -107,6 +107,7 @@ class RowStorage(ABC):
         self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
         self._filing: set[int] = set()  # rows of segments that are being written
         self._late: dict[int, float] = {}  # of rows whose files may come yet: when they are removed once more, or 0
+        self._wiping = False  # what was dropped may be in files of the database still, and is not to be
         self._looked = -inf  # when it was looked for files that belong to nobody
 
     @property
@@ -129,6 +130,10 @@ class RowStorage(ABC):
         What cannot be undone waits for it: a crash must not take back the commit that it follows from, and what was
         read before it is nobody else's.
         """
+
+    def _wipe(self) -> Iterator[StorageStep]:
+        """The steps after which no file of the database has what was dropped before; none where that is not ours."""
+        return iter(())
 
     # Committing
 
@@ -459,6 +464,8 @@ class RowStorage(ABC):
 
     def file_history(self, now: int) -> Iterator[StorageStep]:
         """Write segments of what is due, and remove those that are not to be kept any longer."""
+        if self._wiping:
+            yield from self._wipe()
         archive = self._archive
         if archive is None:
             return
@@ -525,9 +532,15 @@ class RowStorage(ABC):
 
     def erase(self, number: int, requests: Sequence[EraseRequest], until: int, now: int) -> Iterator[StorageStep]:
         """File what the journal has of the keys, then replace the segments that have them."""
-        archive = self._archive
-        if archive is None:
-            return
+        if self._archive is not None:
+            yield from self._erase_filed(number, requests, until, now, self._archive)
+        self._look_for_dead_chunks()
+        yield from self._drop_dead("chunks")
+        yield from self._wipe()
+
+    def _erase_filed(
+        self, number: int, requests: Sequence[EraseRequest], until: int, now: int, archive: Archive
+    ) -> Iterator[StorageStep]:
         while (hull := self._ledger.hulls.get(number)) and hull.due > hull.filed:
             yield from self._close_segment(number, archive)
         yield from self._trim(number)

@@ -23,7 +23,7 @@ from ..opening import closed_on_error
 from ..port import DamagedError, LockedError, NotCommittedError, Progress, StorageError, StorageStep, StoredContents
 from ..refusals import Meaning
 from ..rows.examine import Findings
-from ..rows.group import Group
+from ..rows.group import Group, Wipe
 from ..rows.incarnation import new_incarnation
 from ..rows.ledger import Ledger
 from ..rows.storage import RowStorage
@@ -107,6 +107,7 @@ class SQLiteStorage(RowStorage):
                     raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
                 stack.callback(self._disconnect)
                 self._load(findings, version)
+                self._wiping = own is not None and own.mode != STOPPED  # perhaps keys were being erased
                 self._checkpointer = stack.enter_context(closing(self._folder.connect(OpenMode.WRITE)))
                 self._restart_log(own)
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
@@ -177,6 +178,8 @@ class SQLiteStorage(RowStorage):
         try:
             if connection is None:
                 connection = self._writer = self._connect_writer()
+            if group.wipes:
+                self._begin_log_anew(connection)
             connection.execute("BEGIN IMMEDIATE")
             carry_out(connection, group.statements)
             connection.execute(UPDATE_TOTALS, group.totals.row)
@@ -197,6 +200,20 @@ class SQLiteStorage(RowStorage):
                 raise _not_committed(error) from error
             group.adopt()
             self._unsettled = False
+        if group.wipes:
+            connection.execute(f"PRAGMA journal_size_limit = {LONGEST_LOG_BYTES}")
+
+    def _begin_log_anew(self, connection: sqlite3.Connection) -> None:
+        """Have the next commit be the first one in the log, which ends after it.
+
+        A log that is cut before would be one that was lost, if the process ended then. While another process reads the
+        log it goes on as it is.
+        """
+        with self._housekeeping:
+            busy, left = self._copy_log("RESTART")
+        self._wiping = bool(busy or left)
+        if not self._wiping:
+            connection.execute("PRAGMA journal_size_limit = 0")
 
     def _roll_back(self) -> None:
         """End the transaction; if that fails, close the connection."""
@@ -264,6 +281,14 @@ class SQLiteStorage(RowStorage):
     def bytes_used(self) -> int:
         """The size of the database and its log in bytes."""
         return sum(self._folder.disk.size(file) or 0 for file in (self._folder.database, self._folder.log))
+
+    @_as_storage_errors()
+    def _wipe(self) -> Iterator[StorageStep]:
+        """Rows that are deleted are written over, so the log alone has them; most of it is copied before the commit."""
+        self._wiping = True
+        with self._housekeeping:
+            self._copy_log("PASSIVE")
+        yield Wipe()
 
     def _copy_log(self, mode: str) -> tuple[int, int]:
         """Copy the log into the database. Returns whether another process prevented it, and the pages left."""
@@ -340,7 +365,7 @@ class SQLiteStorage(RowStorage):
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA wal_autocheckpoint = 0")
             connection.execute(f"PRAGMA journal_size_limit = {LONGEST_LOG_BYTES}")
-            connection.execute("PRAGMA secure_delete = OFF")
+            connection.execute("PRAGMA secure_delete = ON")
             self._set_synchronous(connection)
         return connection
 
