@@ -107,7 +107,8 @@ class RowStorage(ABC):
         self._under_way: dict[int, set[int]] = {}  # chunks of unfinished snapshots
         self._filing: set[int] = set()  # rows of segments that are being written
         self._late: dict[int, float] = {}  # of rows whose files may come yet: when they are removed once more, or 0
-        self._wiping = False  # what was dropped may be in files of the database still, and is not to be
+        self._erased = False  # what was dropped may be in free parts of the database still, and is not to be
+        self._wiping = False  # the same, in these or in its log
         self._looked = -inf  # when it was looked for files that belong to nobody
 
     @property
@@ -536,6 +537,7 @@ class RowStorage(ABC):
             yield from self._erase_filed(number, requests, until, now, self._archive)
         self._look_for_dead_chunks()
         yield from self._drop_dead("chunks")
+        self._erased = True
         yield from self._wipe()
 
     def _erase_filed(
