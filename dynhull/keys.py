@@ -22,6 +22,7 @@ MOST_KEY_BYTES = 255
 LARGEST_KEY = 2**64 - 1
 MOST_SHOWN = 60  # characters of a value in a message
 FEW = 256  # lengths that are added faster without numpy
+FEW_ROWS = 8  # keys that are taken faster without numpy
 CONTINUATION_MASK, CONTINUATION = 0xC0, 0x80  # the two highest bits of a UTF-8 byte that starts no character
 
 
@@ -130,6 +131,12 @@ class PackedKeys(Sequence[str]):
         starts = self._offsets()
         return self._data[starts[row] : starts[row + 1]]
 
+    def _taken(self, rows: npt.NDArray[np.intp]) -> PackedKeys:
+        lengths = np.frombuffer(self._lengths, np.uint8)[rows]
+        ends = np.cumsum(lengths, dtype=np.int64)
+        places = np.arange(ends[-1]) + np.repeat(self._offsets()[:-1][rows] - ends + lengths, lengths)
+        return PackedKeys(lengths, np.frombuffer(self._data, np.uint8)[places])
+
     def _check(self, name: str) -> None:
         empty = self._lengths.find(0)
         if empty >= 0:
@@ -207,7 +214,11 @@ def key_list(keys: Keys) -> list[Any]:
 
 def take_keys(keys: Keys, rows: npt.NDArray[np.intp]) -> Keys:
     """The keys of some rows, in the order of `rows`. O(size of the keys)."""
-    return PackedKeys.pack([keys[row] for row in rows.tolist()]) if isinstance(keys, PackedKeys) else keys[rows]
+    if not isinstance(keys, PackedKeys):
+        return keys[rows]
+    if len(rows) <= FEW_ROWS:
+        return PackedKeys.pack([keys[row] for row in rows.tolist()])
+    return keys._taken(rows)
 
 
 def _is_str(key_type: KeyType) -> bool:

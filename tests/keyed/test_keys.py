@@ -8,7 +8,7 @@ import polars as pl
 import pyarrow as pa
 import pytest
 
-from dynhull.keys import PackedKeys, as_key, as_keys
+from dynhull.keys import FEW_ROWS, PackedKeys, as_key, as_keys, key_list, take_keys
 
 STRINGS = ["a", "bé", "日本", "\U0001f600" * 63]
 INTEGERS = [3, 0, 2**31]
@@ -154,3 +154,11 @@ def test_one_key():
     ]:
         with pytest.raises(error, match=message):
             as_key(key, key_type)
+
+
+@pytest.mark.parametrize("count", [0, 1, FEW_ROWS, FEW_ROWS + 1, 3000])
+@pytest.mark.parametrize("kind", ["str", "int"])
+def test_some_of_many_keys_are_taken_in_the_order_that_is_asked_for(kind, count):
+    names = [f"{'é' * (row % 9)}{row}" if kind == "str" else row * 2**53 + 1 for row in range(1000)]
+    rows = np.random.default_rng(1).integers(0, 1000, count)
+    assert key_list(take_keys(as_keys(names, kind), rows)) == [names[row] for row in rows]

@@ -178,7 +178,7 @@ class Filing:
         try:
             with _as_answers(hull):
                 steps = self._storage.erase(hull.number, requests, until, self._driver.commit_time())
-                await self._driver.commit_steps(steps, self._driver.in_history)
+                await self._driver.commit_steps(steps, self._driver.in_history, PAUSE)
                 gone = await self._driver.on_disk(partial(self._storage.row, hull.number)) is None
         finally:
             self._pasts.forget()
