@@ -73,7 +73,7 @@ class EraseRequest:
 
 def erased_since(before: Sequence[Erasure], now: Sequence[Erasure]) -> bool:
     """Whether keys were erased meanwhile. An erasure that is gone has changed nothing: its revisions were dropped."""
-    return not Counter(now) <= Counter(before)
+    return now != before and not Counter(now) <= Counter(before)  # equal as a rule, and compared without hashes
 
 
 @dataclass(frozen=True, slots=True)

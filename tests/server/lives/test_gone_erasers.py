@@ -1,4 +1,4 @@
-"""Callers that go away while keys are erased from the past of a hull. An engine without a server around it."""
+"""Who else is at work while keys are erased from the past of a hull. An engine without a server around it."""
 
 import asyncio
 import errno
@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from complaints import complaints_of
 from live_engine import LIMITS
@@ -16,6 +17,7 @@ from dynhull.keys import PackedKeys
 from dynhull_server.engine.engine import Engine
 from dynhull_server.engine.supervisor import Supervisor
 from dynhull_server.engine.threads import Machine
+from dynhull_server.state.batch import KeyedBatch, Write
 from dynhull_server.state.records import FOREVER, HullSettings
 from dynhull_server.storage.segments.archive import Archive
 from dynhull_server.storage.sqlite.storage import SQLiteStorage
@@ -70,6 +72,53 @@ def test_who_goes_before_their_turn_has_asked_for_nothing_and_no_failure_is_left
         gc.collect()
         assert not complaints
         assert storage.erased == [[["a"]], [["c"], ["d"]]]
+        await supervisor.stop()
+        await engine.close()
+
+    asyncio.run(life())
+
+
+class Late(SQLiteStorage):
+    """The first snapshot is written when that is permitted."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, archive=Archive(folder / "history"))
+        self.begun, self.may_go_on = threading.Event(), threading.Event()
+
+    def snapshot(self, number: int, kept: Any) -> Iterator[Any]:
+        if not self.begun.is_set():
+            self.begun.set()
+            assert self.may_go_on.wait(PATIENCE)
+        yield from super().snapshot(number, kept)
+
+
+def test_a_snapshot_that_is_under_way_brings_nothing_back(tmp_path: Path) -> None:
+    async def life() -> None:
+        storage, machine = Late(tmp_path), Machine()
+        supervisor = Supervisor(machine.clock, pytest.fail, pytest.fail)
+        engine = Engine(LIMITS, storage, supervisor, machine)
+        await engine.start(lambda *_: None)
+        await engine.hulls.create("fleet", HullSettings("str", history=FOREVER))
+        hull, gone, none = engine.hulls.get("fleet"), PackedKeys.pack(["who is gone"]), PackedKeys.pack([])
+
+        async def write(keys: PackedKeys, removes: PackedKeys) -> None:
+            batch = KeyedBatch("str", keys, np.zeros((len(keys), 2)), removes)
+            await engine.hulls.apply(Write("fleet", batch, engine.driver.time()), create=False)
+
+        loop = asyncio.get_running_loop()
+        await write(gone, none)
+        snapshot = loop.create_task(engine.hulls.filing.snapshot(hull))
+        assert await asyncio.to_thread(storage.begun.wait, PATIENCE)
+        await write(none, gone)
+        erasing = loop.create_task(engine.hulls.filing.erase(hull, gone))
+        done, _ = await asyncio.wait({erasing}, timeout=0.5)
+        assert not done
+        storage.may_go_on.set()
+        await snapshot
+        erased = await erasing
+        assert erased is not None
+        assert erased.moves == 2
+        assert not [each for each in tmp_path.iterdir() if each.is_file() and b"who is gone" in each.read_bytes()]
         await supervisor.stop()
         await engine.close()
 
