@@ -95,6 +95,11 @@ def footer_groups(footer: bytes, column: int) -> tuple[int, int, list[tuple[int,
     Where the groups of rows of a Parquet file lie in its footer: the list, the first of them, and of each its end, the least and the greatest value of a column, and how many rows have none. None for what is no such footer.
     """
 
+def keys_at(ends: object, text: bytes, codes: object) -> tuple[bytes, bytes]:
+    """
+    The lengths and the text of the keys with some numbers, of keys that lie one after the other; int32.
+    """
+
 def key_codes(lengths: bytes, data: bytes) -> bytes:
     """
     The number of each key, as int32: equal ones have the same, each that is new one more than those before.

@@ -132,6 +132,9 @@ class Native(Protocol):
     ) -> "tuple[int, int, list[tuple[int, bytes | None, bytes | None, int]]] | None":
         """Where the groups of rows of a file lie in its footer: `_chosen` in storage/segments/parquet.py."""
 
+    def keys_at(self, ends: "npt.NDArray[Any]", text: bytes, codes: "npt.NDArray[Any]") -> "tuple[bytes, bytes]":
+        """The lengths and the text of keys: `_Words.keys` in storage/segments/parquet.py."""
+
     def key_codes(self, lengths: bytes, data: bytes) -> bytes:
         """`_codes` in storage/segments/gathered.py."""
 

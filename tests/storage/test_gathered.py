@@ -190,6 +190,9 @@ def test_rows_by_key_lead_to_the_same_state(kind, steps, after, less, group_rows
         found = rows.last_places(hull, after, until)
         some = rows.batches_between(after, until)
     same(rows.batches().columns, columns)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parquet, "native", None)
+        same(rows.columns(0, len(rows.starts) - 1), columns)
     same(some.columns.between(after, until), columns.between(after, until))
     if found is None:
         return
@@ -199,6 +202,48 @@ def test_rows_by_key_lead_to_the_same_state(kind, steps, after, less, group_rows
     other.catch_up([found], 0.0)
     same(seen(other), seen(one))
     same(seen(built(hull, records, after, [found])), seen(one))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("part_rows", [1, 7, 2**15])
+def test_batches_that_follow_each_other_come_a_part_at_a_time_from_any_revision_on(kind, part_rows, monkeypatch):
+    monkeypatch.setattr(by_key, "PART_ROWS", part_rows)
+    monkeypatch.setattr(parquet, "GROUP_ROWS", 10)
+    hull = KINDS[kind]
+    records = lived(hull, [("both", 1 << place % 8 | 1, place % 7, 0) for place in range(40)])
+    columns = columns_of(records, hull.identity)
+    content, last = to_parquet(columns, {}), len(records)
+    for first in (0, 1, last // 2, last - 1):
+        rows, _, _ = rows_from_parquet(content, "a file")
+        for _ in range(2):
+            at, parts = first, 0
+            while at < last:
+                part = rows.next_batches(at)
+                assert len(part.columns) <= max(part_rows, columns.revision.tolist().count(at + 1))
+                end = int(part.columns.revision[-1])
+                same(part.columns.between(at, end), columns.between(at, end))
+                assert [each.revision for each in part.between(at, last)] == list(range(at + 1, end + 1))
+                assert rows.next_batches(at) is part
+                at, parts = end, parts + 1
+            assert part_rows > len(columns) or parts > 1 or first == last - 1
+    same(rows.batches().columns, columns)
+    assert rows.next_batches(0) is rows.batches()
+
+
+@pytest.mark.skipif(native is None, reason="C++ is not built")
+def test_keys_with_some_numbers_are_the_same_in_both_languages():
+    names = ["b", "c", "é", "a" * 255, "ab"]
+    text, lengths = "".join(names).encode(), [len(each.encode()) for each in names]
+    ends = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
+    for codes in ([4, 0, 3, 3, 1, 2], [], [2]):
+        found = native.keys_at(ends, text, np.array(codes, np.int32))
+        assert list(PackedKeys(*found)) == [names[each] for each in codes]
+    for wrong in ([5], [-1], [0, 2**31 - 1]):
+        with pytest.raises(ValueError, match="where they are said to"):
+            native.keys_at(ends, text, np.array(wrong, np.int32))
+    for other in (ends[::-1].copy(), ends + 1, ends - 1, ends[:0]):
+        with pytest.raises(ValueError, match="where they are said to"):
+            native.keys_at(other, text, np.arange(5, dtype=np.int32))
 
 
 def test_the_last_places_of_a_thousand_moves_of_a_few_keys_need_no_records():

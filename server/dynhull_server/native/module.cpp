@@ -431,6 +431,45 @@ nb::object footer_groups(const nb::bytes& footer, std::uint64_t column) {
   return nb::make_tuple(found->list, found->first, groups);
 }
 
+// Bytes that are written later.
+nb::object room(std::size_t size) {
+  nb::object room = nb::steal(PyBytes_FromStringAndSize(nullptr, Py_ssize_t(size)));
+  if (!room.is_valid()) throw nb::python_error();
+  return room;
+}
+
+// The lengths and the text of the keys with some numbers. Of all keys, one after the other, `ends` has where each
+// begins, and the end of the last one.
+nb::tuple keys_at(nb::handle ends, nb::handle text, nb::handle codes) {
+  const View<std::int32_t> of_ends(ends), of_codes(codes);
+  const View<char> all(text);
+  const auto refuse = [](bool wrong) {
+    if (wrong) throw nb::value_error("keys do not lie where they are said to");
+  };
+  std::size_t total = 0;
+  {
+    const nb::gil_scoped_release release;
+    for (const std::int32_t code : of_codes.values()) {
+      refuse(code < 0 || std::size_t(code) + 1 >= of_ends.size());
+      const std::int32_t begin = of_ends.data()[code], end = of_ends.data()[code + 1];
+      refuse(begin < 0 || end < begin || std::size_t(end) > all.size() || end - begin > 255);
+      total += std::size_t(end - begin);
+    }
+  }
+  const nb::object lengths = room(of_codes.size()), found = room(total);
+  {
+    const nb::gil_scoped_release release;
+    char *length = PyBytes_AS_STRING(lengths.ptr()), *at = PyBytes_AS_STRING(found.ptr());
+    for (const std::int32_t code : of_codes.values()) {
+      const std::size_t begin = std::size_t(of_ends.data()[code]), size = std::size_t(of_ends.data()[code + 1]) - begin;
+      *length++ = static_cast<char>(size);
+      std::memcpy(at, all.data() + begin, size);
+      at += size;
+    }
+  }
+  return nb::make_tuple(lengths, found);
+}
+
 LastPlaces* last_places(std::uint8_t kind, std::size_t most) {
   if (kind != OF_STRINGS && kind != OF_INTEGERS) throw nb::value_error("no kind of keys");
   return new LastPlaces(kind, most);
@@ -447,13 +486,6 @@ std::size_t add_batches(LastPlaces& places, const nb::list& payloads, const nb::
   std::size_t added = 0;
   while (added < views.size() && places.add(views[added].text(), counts[added])) ++added;
   return added;
-}
-
-// Bytes that are written later.
-nb::object room(std::size_t size) {
-  nb::object room = nb::steal(PyBytes_FromStringAndSize(nullptr, Py_ssize_t(size)));
-  if (!room.is_valid()) throw nb::python_error();
-  return room;
 }
 
 nb::tuple taken(const LastPlaces& places) {
@@ -560,6 +592,9 @@ NB_MODULE(_native, module) {
               "tuple[int, int, list[tuple[int, bytes | None, bytes | None, int]]] | None"),
       "Where the groups of rows of a Parquet file lie in its footer: the list, the first of them, and of each its end, "
       "the least and the greatest value of a column, and how many rows have none. None for what is no such footer.");
+  module.def("keys_at", &dynhull_server::keys_at, "ends"_a, "text"_a, "codes"_a,
+             nb::sig("def keys_at(ends: object, text: bytes, codes: object) -> tuple[bytes, bytes]"),
+             "The lengths and the text of the keys with some numbers, of keys that lie one after the other; int32.");
   module.def(
       "key_codes", &dynhull_server::key_codes, "lengths"_a, "data"_a,
       nb::sig("def key_codes(lengths: bytes, data: bytes) -> bytes"),

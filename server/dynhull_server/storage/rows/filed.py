@@ -111,7 +111,7 @@ class Filed:
 
     def batches(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """Some batches after a revision: no more than one segment has."""
-        return _some(self._rows_after(hull, after, until, ordered=True).batches().between(after, until))
+        return _some(self._rows_after(hull, after, until).next_batches(after).between(after, until))
 
     def gathered(self, hull: HullRows, after: int, until: int) -> list[Record]:
         """What some batches after a revision come to: no more than one segment has."""
@@ -187,15 +187,12 @@ class Filed:
         with self._turn:
             self._open.pop(file, None)
 
-    def _rows_after(self, hull: HullRows, after: int, until: int, *, ordered: bool = False) -> RowsByKey:
-        """The segment with the batches that follow a revision. The next one is read meanwhile if it is needed, too.
-
-        That one with its batches in order, if these are what is needed.
-        """
+    def _rows_after(self, hull: HullRows, after: int, until: int) -> RowsByKey:
+        """The segment with the batches that follow a revision. The next one is read meanwhile if it is needed, too."""
         segment = _segment(hull, after + 1)
         rows = self._rows(segment)
         if segment.last < min(until, hull.start):
-            self._read_ahead(_segment(hull, segment.last + 1), ordered=ordered)
+            self._read_ahead(_segment(hull, segment.last + 1))
         return rows
 
     def _batches(self, segment: StoredSegment) -> Batches:
@@ -204,7 +201,7 @@ class Filed:
     def _rows(self, segment: StoredSegment) -> RowsByKey:
         reading, begins = self._reading(segment)
         if begins:
-            self._read(segment, reading, ordered=False)
+            self._read(segment, reading)
         with self._named(segment, BATCHES):
             return reading.result()
 
@@ -221,28 +218,23 @@ class Filed:
                 rows -= _count(self._open.popitem(last=False)[1])
             return reading, True
 
-    def _read(self, segment: StoredSegment, reading: "Future[RowsByKey]", ordered: bool) -> None:
-        """Read a segment, perhaps with its batches in order.
-
-        Others wait for it; if it cannot be read, who needs it next tries again.
-        """
+    def _read(self, segment: StoredSegment, reading: "Future[RowsByKey]") -> None:
+        """Read a segment. Others wait for it; if it cannot be read, who needs it next tries again."""
         try:
             found = read_rows(self._archive, segment)
-            if ordered:
-                found.batches()
             self._readable(segment.file + BATCHES)
             reading.set_result(found)
         except Exception as error:
             self.forget(segment.file)
             reading.set_exception(error)
 
-    def _read_ahead(self, segment: StoredSegment, *, ordered: bool = False) -> None:
+    def _read_ahead(self, segment: StoredSegment) -> None:
         """Read a segment beside the caller, unless another one is being read so."""
         if self._ahead is not None and self._ahead.is_alive():
             return
         reading, begins = self._reading(segment)
         if begins:
-            self._ahead = Thread(target=self._read, args=(segment, reading, ordered), name="read ahead")
+            self._ahead = Thread(target=self._read, args=(segment, reading), name="read ahead")
             self._ahead.start()
 
     @contextmanager

@@ -22,6 +22,9 @@ Places = npt.NDArray[np.int32]
 
 # Batches of fewer rows than this part of all are put in order alone.
 FEW = 16
+# Who reads all batches in turn has so many rows of them put in order at a time, in memory that is used again: for all
+# of them it would be new, which takes longer than what is done with it. So many readers find what they had.
+PART_ROWS, PARTS = 2**15, 4
 
 
 @dataclass(slots=True)
@@ -52,6 +55,7 @@ class RowsByKey:
     packed: Callable[[Places], Keys]
     detail: dict[int, str]
     _batches: Batches | None = field(default=None, init=False)
+    _parts: list[tuple[int, int, Batches]] = field(default_factory=list, init=False)  # the last used at the end
     _turn: Any = field(default_factory=Lock, init=False)
 
     def __len__(self) -> int:
@@ -63,6 +67,22 @@ class RowsByKey:
             if self._batches is None:
                 self._batches = Batches(self.columns(0, len(self.starts) - 1))
             return self._batches
+
+    def next_batches(self, after: int) -> Batches:
+        """The batches that follow a revision, and perhaps some before it: not all of them, but one at least."""
+        place, _ = self._numbers(after, after)
+        with self._turn:
+            if self._batches is not None:
+                return self._batches
+            part = next((each for each in self._parts if each[0] <= place < each[1]), None)
+            if part is None:
+                end = int(np.searchsorted(self.starts, self.starts[place] + PART_ROWS, side="right")) - 1
+                end = min(max(end, place + 1), len(self.starts) - 1)
+                part = place, end, Batches(self.columns(place, end))
+            else:
+                self._parts.remove(part)
+            self._parts = [*self._parts, part][-PARTS:]
+            return part[2]
 
     def batches_between(self, after: int, until: int) -> Batches:
         """The batches after one revision up to another one; of others some may be there, too."""

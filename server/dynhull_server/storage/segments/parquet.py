@@ -632,7 +632,7 @@ class _Words:
         self._lengths, self._text = BytesIO(), BytesIO(bytes(most))  # integers have no lengths
         self._count = 0
         self._last: str | int | None = None
-        self._array: pa.Array | None = None
+        self._ends: npt.NDArray[np.int32] | None = None  # where each begins, and the end of the last one
 
     def numbers(self, column: pa.ChunkedArray) -> npt.NDArray[np.int32]:
         """The numbers of the keys of the next group, NONE for no key. The first may be the last one before it."""
@@ -669,24 +669,23 @@ class _Words:
 
     def keys(self, codes: npt.NDArray[np.int32]) -> Keys:
         """The keys with some numbers; all strings in order are those that are there, and not copied."""
+        import pyarrow as pa
+
         ascending = bool((codes[1:] > codes[:-1]).all())
         self._text.truncate()
         if self._identity == "str" and len(codes) == self._count and ascending:
             return PackedKeys(self._lengths.getvalue(), self._text.getvalue())
-        if self._array is None:
-            self._array = self._all()
-        return _packed(self._array, codes, self._identity)
-
-    def _all(self) -> pa.Array:
-        """All keys as an array over their bytes."""
-        import pyarrow as pa
-
         text = self._text.getvalue()
         if self._identity == "int":
-            return pa.array(np.frombuffer(text, np.uint64))
-        ends = np.zeros(self._count + 1, np.int32)
-        np.cumsum(np.frombuffer(self._lengths.getvalue(), np.uint8), out=ends[1:])
-        return pa.StringArray.from_buffers(self._count, pa.py_buffer(ends), pa.py_buffer(text))
+            integers: npt.NDArray[np.uint64] = np.frombuffer(text, np.uint64)[codes]
+            return integers
+        if self._ends is None:
+            self._ends = np.zeros(self._count + 1, np.int32)
+            np.cumsum(np.frombuffer(self._lengths.getvalue(), np.uint8), out=self._ends[1:])
+        if native is not None:
+            return PackedKeys(*native.keys_at(self._ends, text, np.ascontiguousarray(codes)))
+        words = pa.StringArray.from_buffers(self._count, pa.py_buffer(self._ends), pa.py_buffer(text))
+        return _packed(words, codes, self._identity)
 
 
 def _of_revisions(file: pq.ParquetFile, names: list[str], placed: _Placed) -> dict[str, Integers]:
