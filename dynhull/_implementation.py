@@ -38,7 +38,7 @@ class _Kernel(Protocol):
     def orientations(self, a: "Points", b: "Points", c: "Points") -> "npt.NDArray[np.int8]": ...
     def turnings_if_valid(self, rings: "list[Points]") -> list[int]: ...
     def sign_of_measure(self, vertices: "Points", measure: str, bound: float) -> int | None: ...
-    def set_threads(self, threads: int) -> None: ...
+    def set_threads(self, threads: int, beside: bool) -> None: ...
 
 
 def _load() -> _Kernel | None:
@@ -55,7 +55,7 @@ def _load() -> _Kernel | None:
             raise
         _warn_of_the_reference()
         return None
-    built.set_threads(threads)
+    built.set_threads(threads, False)
     return built
 
 
@@ -87,7 +87,7 @@ kernel = _load()
 KERNEL: Literal["cpp", "python"] = "python" if kernel is None else "cpp"
 
 
-def set_threads(threads: int | None) -> None:
+def set_threads(threads: int | None, *, beside: bool = False) -> None:
     """Set how many threads one call may use, from 1 to 64.
 
     Batches of 1,024 rows and more, builds of 32,768 points and more and `locate` of 16,384 points and more use several
@@ -95,8 +95,11 @@ def set_threads(threads: int | None) -> None:
     alone. None: as many as processors are available to the process, or for some time one, if others use these. That is
     the default, unless the environment variable DYNHULL_THREADS has another number at import. ValueError for other
     numbers. Without the kernel there is no effect.
+
+    With `beside`, and one thread, what a put of 1,024 keys and more crosses is found in another thread meanwhile, for
+    the next `take`; for some time not so, if others use the processors.
     """
     if threads is not None and not 1 <= index(threads) <= MOST_THREADS:
         raise ValueError(f"threads must be from 1 to {MOST_THREADS}, got {threads}")
     if kernel is not None:
-        kernel.set_threads(index(threads or 0))
+        kernel.set_threads(index(threads or 0), beside)

@@ -579,9 +579,9 @@ def chan(xy: Annotated[NDArray[numpy.float64], dict(shape=(None, 2), order='C', 
     The same by Chan's algorithm, with its rounds (guess, groups, steps, closed). O(n log h).
     """
 
-def set_threads(threads: int) -> None:
+def set_threads(threads: int, beside: bool) -> None:
     """
-    How many threads one call may use; 0 for one on each processor available to the process.
+    How many threads one call may use; 0 for one on each processor available to the process. And whether, if that is one, one more finds what a put crosses.
     """
 
 def threads() -> int:

@@ -46,19 +46,24 @@ class Team {
   static constexpr unsigned MOST = 64;  // threads, the caller included
 
   // How many threads a call may use, the caller's included; 0 for one on each processor available to the process, but
-  // none beside the caller's for some time after helpers came late: then others use the processors.
-  static void set_limit(unsigned threads) { limit_ = threads; }
+  // none beside the caller's for some time after helpers came late: then others use the processors. `beside`: so may
+  // what is not of the call's own work, in one more thread, where the limit is one.
+  static void set_limit(unsigned threads, bool beside = false) {
+    limit_ = threads;
+    beside_ = beside;
+  }
   static unsigned limit() {
     const unsigned set = limit_;
     return std::min(set > 0 ? set : processors(), MOST);
   }
+  static bool beside() { return beside_ && limit_ == 1; }
 
   // The team, for this caller alone, with this number of helpers, or fewer if they cannot start. Null if another caller
   // has it, or if there is no memory for it.
   static Team* taken(unsigned helpers) {
     Team* const team = of_this_process();
     if (team == nullptr || team->taken_.exchange(true)) return nullptr;
-    if (limit_ == 0 && team->alone_ > 0) {
+    if ((limit_ == 0 || beside()) && team->alone_ > 0) {
       --team->alone_;
       team->give_back();
       return nullptr;
@@ -226,6 +231,7 @@ class Team {
   }
 
   static inline std::atomic<unsigned> limit_ = 0;
+  static inline std::atomic<bool> beside_ = false;
   static inline std::atomic<Team*> current_ = nullptr;  // never deleted: its threads run until the process ends
 
   std::atomic<bool> taken_ = false;
@@ -248,13 +254,10 @@ class Team {
 // The calling thread, and with it helpers for as long as this lives: up to `wanted` threads together.
 class Threads {
  public:
-  explicit Threads(std::size_t wanted) {
-    if (wanted < 2) return;
-    const auto threads = static_cast<unsigned>(std::min<std::size_t>(wanted, Team::limit()));
-    if (threads < 2) return;
-    team_ = Team::taken(threads - 1);
-    if (team_ != nullptr) count_ = std::min(threads, 1 + team_->helpers());
-  }
+  explicit Threads(std::size_t wanted) { take(std::min<std::size_t>(wanted, Team::limit())); }
+  // Two, if there may be one for work beside the calling thread's own.
+  struct Beside {};
+  explicit Threads(Beside) { take(Team::beside() ? 2 : 1); }
   Threads(const Threads&) = delete;
   ~Threads() {
     if (team_ != nullptr) team_->give_back();
@@ -292,6 +295,13 @@ class Threads {
       }
     }
   };
+
+  void take(std::size_t wanted) {
+    if (wanted < 2) return;
+    const auto threads = static_cast<unsigned>(wanted);
+    team_ = Team::taken(threads - 1);
+    if (team_ != nullptr) count_ = std::min(threads, 1 + team_->helpers());
+  }
 
   Team* team_ = nullptr;
   unsigned count_ = 1;

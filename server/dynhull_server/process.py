@@ -72,9 +72,13 @@ def run(settings: Settings, make: Callable[[], Awaitable[Alone]]) -> None:
 
 
 def share_processors(settings: Settings) -> None:
-    """Set the threads of a batch: by default the processors, divided by the workers, less one for other work."""
+    """Set the threads of a batch: by default the processors, divided by the workers, less one for other work.
+
+    That is the fences of the batch, too, where one thread is left for it.
+    """
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    set_threads(settings.threads or min(64, max(1, processors // (settings.workers or 1) - 1)))
+    share = processors // (settings.workers or 1)
+    set_threads(settings.threads or min(64, max(1, share - 1)), beside=settings.threads is None and share > 1)
 
 
 def allow_connections(most: int) -> None:

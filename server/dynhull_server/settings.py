@@ -90,7 +90,8 @@ class Settings(BaseModel):
         ge=1,
         le=64,
         description="Number of threads that a process may use for one batch; by default the processors, divided by the "
-        "workers, less one for the rest of the process, and at least one.",
+        "workers, less one for the rest of the process, and at least one. That one then decides the fences of a large "
+        "batch, too, if there is one thread for the batch.",
     )
     create_on_write: bool = Field(False, description="Create a missing hull with its first batch.")
     snapshot_points: int = Field(

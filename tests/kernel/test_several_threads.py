@@ -105,13 +105,13 @@ def test_locate_names_the_first_bad_row():
         hull.locate(queries[:40_000])
 
 
-def fenced(places, random):
+def fenced(places, random, crossing=0.3):
     """A keyed hull with polygons and circles over it, some with a margin, some that report who passes through."""
     hull = KeyedHull.from_entities(np.arange(len(places), dtype=np.uint64), places, key_type="int")
     index = FenceIndex(hull)
     for fence in range(120):
         center, size = random.random(2), 0.01 + 0.05 * random.random()
-        options = {"margin": 0.01 * (fence % 2), "cross": random.random() < 0.3}
+        options = {"margin": 0.01 * (fence % 2), "cross": random.random() < crossing}
         if fence % 3:
             corners = center + size * np.array([[0, 0], [1, 0.2], [1.2, 1], [0.3, 0.6]])
             index.set_polygons(fence, [[corners]], **options)
@@ -139,6 +139,44 @@ def test_crossings():
     _, again = fenced(places, np.random.default_rng(1))
     for fence in range(0, 120, 2):
         assert sorted(many[1].inside(fence)) == sorted(one[1].inside(fence)) == sorted(again.inside(fence))
+
+
+def change(turn, hull, index, keys, places):
+    """Something else that a hull or its index is asked before crossings are taken."""
+    match turn:
+        case 1:
+            index.inside(7)
+        case 2:
+            index.set_polygons(8, [[[[0.5, 0.5], [0.6, 0.5], [0.5, 0.6]]]])
+        case 3:
+            index.drop(9)
+        case 4:
+            hull.put_many(keys[:3], places[:3] + 0.1)
+        case 5:
+            hull.remove_many(keys[:2000])
+        case 6:
+            hull.put_many(keys[:2000], 1 - places[:2000])
+
+
+def test_crossings_are_found_beside_the_update():
+    """The same as after it, whatever is asked of the index in between."""
+    random = np.random.default_rng(0)
+    places = random.random((20_000, 2))
+    beside, one = (fenced(places, np.random.default_rng(1), crossing=0) for _ in range(2))
+    for turn in range(8):
+        places_of = random.permutation(25_000)[:6000].astype(np.uint64)  # some of them are new
+        places = random.random((6000, 2)) if turn % 2 else np.random.default_rng(turn).random((6000, 2)) * 0.2
+        found = []
+        for hull, index in (beside, one):
+            set_threads(1, beside=hull is beside[0])
+            hull.put_many(places_of, places)
+            change(turn, hull, index, places_of, places)
+            found.append(index.take())
+        assert len(found[0]) > 1000
+        for column in ("fences", "changes", "causes", "keys", "points", "previous", "distances"):
+            assert getattr(found[0], column).tobytes() == getattr(found[1], column).tobytes()
+    for fence in set(range(120)) - {9}:
+        assert sorted(beside[1].inside(fence)) == sorted(one[1].inside(fence))
 
 
 def test_many_callers_share_the_threads():

@@ -20,6 +20,7 @@ struct Crossing {
   std::uint8_t length;  // of the string
   std::int8_t change;   // +1 entered, -1 left, 0 crossed, 2 was inside as an entity of another hull
   std::uint8_t cause;
+  std::uint32_t found;  // its place in a list of what was found
 
   bool turns() const { return change == 1 || change == -1; }
 };

@@ -103,34 +103,41 @@ class Decisions {
 
   // Reports a crossing and notes the new state.
   void cross(std::uint32_t handle, std::uint32_t slot, int change, std::optional<double> distance = {}) {
-    Fence& fence = *zoning_.fences[handle];
-    const Reports::Change* const moved = reports_.change_of(slot);
-    Crossing row{};
-    row.fence = fence.number;
-    row.now = (*zoning_.slots)[slot].place;
-    row.before = moved ? place_before(fence, *moved) : row.now;
-    row.change = static_cast<std::int8_t>(change);
-    if (moved && moved->carried && !fence.own)
-      row.cause = MOVED;
-    else if (moved && moved->fresh)
-      row.cause = APPEARED;
-    else if (!(row.before == row.now))
-      row.cause = MOVED;
-    else
-      row.cause = 0;
-    if (changed(fence) || row.cause == 0) row.cause |= AREA;
-    row.distance = distance ? *distance : change > 0 ? 0 : fence.area->distance_to_boundary(row.now);
-    reports_.append_key(taken, slot, row);
+    const Found found = {handle, slot, change, distance};
+    reports_.append_key(taken, slot, row_of(found));
     try {
-      if (change != 0 && (change > 0) != fence.own)
-        zoning_.members.add(zoning_.subjects[slot].inside, handle);
-      else if (change != 0)
-        zoning_.members.remove(zoning_.subjects[slot].inside, handle);
+      note(found);
     } catch (...) {
       taken.rows.pop_back();
       throw;
     }
-    fence.count += change;
+  }
+
+  // Makes the rows of all that was found, in order, and reports them later.
+  void write_found() {
+    ahead_ = {};
+    for (std::size_t i = 0; i < found[0].size(); ++i) {
+      Crossing row = row_of(found[0][i]);
+      row.found = static_cast<std::uint32_t>(i);
+      reports_.append_key(ahead_, found[0][i].slot, row);
+    }
+    ahead_.sort(zoning_.slots->strings());
+  }
+  void cross_ahead() {
+    taken = std::exchange(ahead_, {});
+    for (std::size_t i = 0; i < taken.rows.size(); ++i) {
+      if (i + Zoning::LOOKAHEAD < taken.rows.size()) {
+        const Found& later = found[0][taken.rows[i + Zoning::LOOKAHEAD].found];
+        prefetch(zoning_.fences[later.fence].get());
+        prefetch(&zoning_.subjects[later.slot]);
+      }
+      try {
+        note(found[0][taken.rows[i].found]);
+      } catch (...) {
+        taken.rows.resize(i);  // the next call finds the others
+        throw;
+      }
+    }
   }
 
   // Reports who was inside as a subject of another index, and is inside.
@@ -183,6 +190,38 @@ class Decisions {
  private:
   static bool changed(const Fence& fence) {
     return fence.given || fence.area != fence.decided || fence.own != fence.decided_own;
+  }
+
+  Crossing row_of(const Found& each) const {
+    const Fence& fence = *zoning_.fences[each.fence];
+    const Reports::Change* const moved = reports_.change_of(each.slot);
+    Crossing row{};
+    row.fence = fence.number;
+    row.now = (*zoning_.slots)[each.slot].place;
+    row.before = moved ? place_before(fence, *moved) : row.now;
+    row.change = static_cast<std::int8_t>(each.change);
+    if (moved && moved->carried && !fence.own)
+      row.cause = MOVED;
+    else if (moved && moved->fresh)
+      row.cause = APPEARED;
+    else if (!(row.before == row.now))
+      row.cause = MOVED;
+    else
+      row.cause = 0;
+    if (changed(fence) || row.cause == 0) row.cause |= AREA;
+    row.distance = each.distance ? *each.distance : each.change > 0 ? 0 : fence.area->distance_to_boundary(row.now);
+    return row;
+  }
+
+  // Notes the new state.
+  void note(const Found& each) {
+    Fence& fence = *zoning_.fences[each.fence];
+    Members& inside = zoning_.subjects[each.slot].inside;
+    if (each.change != 0 && (each.change > 0) != fence.own)
+      zoning_.members.add(inside, each.fence);
+    else if (each.change != 0)
+      zoning_.members.remove(inside, each.fence);
+    fence.count += each.change;
   }
 
   void find(FoundList& found, std::uint32_t handle, std::uint32_t slot, int change,
@@ -265,6 +304,7 @@ class Decisions {
   Zoning& zoning_;
   Reports& reports_;
   std::vector<std::uint32_t> former_, ways_;  // fences of one subject, while they change
+  Crossings ahead_;                           // what was found, until it is taken
 };
 
 }  // namespace dynhull

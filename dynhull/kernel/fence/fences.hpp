@@ -156,6 +156,27 @@ class Fences {
     return reports_.strayed.size() + reports_.absent.size() +
            Zoning::CROWD * (zoning_.waiting.size() + reports_.owners.size());
   }
+  // Whether a batch that moves subjects may be looked at while it takes place, as it alone decides what they cross.
+  bool at_rest() const {
+    return zoning_.zoned && reports_.at_rest() && decisions_.crossable == 0 && decisions_.taken.rows.empty();
+  }
+  // Finds what `take` would, of the one batch that has been reported. If memory does not suffice, `take` finds it.
+  void look_ahead() {
+    try {
+      for (auto& found : decisions_.found) found.clear();
+      reports_.prepare(true);
+      settle_strayed([](std::size_t) {});
+      zoning_.divide_crowded();
+      decisions_.write_found();
+      reports_.ahead = true;
+    } catch (const std::bad_alloc&) {
+    }
+  }
+  // Forgets that batch, which has not taken place after all. Zones may list subjects where they have not come to.
+  void forget_ahead() {
+    zoning_.torn |= !reports_.changes.empty();
+    reports_.begin_again();
+  }
   // After a look that found nothing to decide.
   void rest() { reports_.begin_again(); }
 
@@ -163,6 +184,11 @@ class Fences {
   // vertices. If memory does not suffice, nothing is lost: the next call returns it.
   template <class SlotsAt>
   Crossings take(HullTree& tree, SlotsAt slots_at) {
+    if (std::exchange(reports_.ahead, false)) {
+      decisions_.cross_ahead();
+      reports_.begin_again();
+      return std::exchange(decisions_.taken, {});
+    }
     for (auto& found : decisions_.found) found.clear();
     reports_.prepare(reports_.only_strayed_matter());
     for (const std::uint32_t handle : reports_.recent)
@@ -176,11 +202,7 @@ class Fences {
         decisions_.cross_found(decisions_.found[0]);
       });
     } else {
-      reports_.settle_strayed(
-          [&](const Zoning::Stray& stray, const Zone& zone, std::size_t part) {
-            decisions_.decide(stray.slot, zone, stray.box, decisions_.found[part]);
-          },
-          [&](std::size_t part) { decisions_.cross_found(decisions_.found[part]); });
+      settle_strayed([&](std::size_t part) { decisions_.cross_found(decisions_.found[part]); });
     }
     zoning_.divide_crowded();
     decisions_.decide_waiting();
@@ -230,6 +252,16 @@ class Fences {
 
  private:
   const Fence& fence(std::int64_t number) const { return *zoning_.fences[numbers_.at(number)]; }
+
+  // Lists those that have strayed, and decides what they cross. Calls `then` with each part of what is found.
+  template <class Then>
+  void settle_strayed(Then then) {
+    reports_.settle_strayed(
+        [&](const Zoning::Stray& stray, const Zone& zone, std::size_t part) {
+          decisions_.decide(stray.slot, zone, stray.box, decisions_.found[part]);
+        },
+        then);
+  }
 
   bool arrive(std::uint32_t slot, Departure& departure) {
     Reports::Change* const change = zoning_.there(slot) ? reports_.change_of(slot) : nullptr;

@@ -23,6 +23,7 @@ class Reports {
   // For a batch with `extra` subjects that move or appear.
   void make_room(std::size_t extra) {
     ++batches_;
+    ahead = false;
     zoning_.subjects.reserve(zoning_.slots->end() + extra);
     if (changes.capacity() < changes.size() + extra) forget_merged();
     Zoning::grow(changes, extra);
@@ -30,6 +31,7 @@ class Reports {
   }
   // For `count` subjects that leave, with `bytes` in their keys.
   void make_room_to_leave(std::size_t count, std::size_t bytes) {
+    ahead = false;
     Zoning::grow(absent, count);
     if (gone_keys_.capacity() < gone_keys_.size() + bytes)
       gone_keys_.reserve(std::max(gone_keys_.size() + bytes, 2 * gone_keys_.size()));
@@ -115,6 +117,9 @@ class Reports {
            owners.empty() && !zoning_.torn && !zoning_.everyone;
   }
 
+  // Whether nothing has happened since crossings were last taken.
+  bool at_rest() const { return batches_ == 0 && changes.empty() && only_strayed_matter(); }
+
   // Forgets all changes. Their numbers are not used again until all numbers have been.
   void begin_again() {
     if (changes.size() > (std::size_t{1} << 31) - base_) {
@@ -142,11 +147,12 @@ class Reports {
       zoning_.fences[handle]->listed = false;
     }
     places_.reset();
-    owners_changed = zoning_.everyone = false;
+    owners_changed = zoning_.everyone = ahead = false;
   }
 
   // Lists every subject in the zone where it is. Makes the zones if there are none, or if the index is torn.
   void ready() {
+    ahead = false;
     prepare(false);
     settle_strayed([](const Zoning::Stray&, const Zone&, std::size_t) {}, [](std::size_t) {});
     zoning_.divide_crowded();
@@ -298,6 +304,7 @@ class Reports {
   std::vector<Gone> absent;
   std::vector<std::uint32_t> recent, owners;  // fences set since crossings were last taken; around the own hull
   bool owners_changed = false;
+  bool ahead = false;  // whether what the strayed cross is found, and nothing has been asked or reported since
 
  private:
   std::size_t number_of(const Subject& subject) const { return subject.changed - base_; }

@@ -63,6 +63,7 @@ class Entities {
   bool attach(Fences& fences) {
     if (reports_ != nullptr) return false;
     reports_ = &fences.reports();
+    fences_ = &fences;
     return true;
   }
   void detach() { reports_ = nullptr; }
@@ -89,6 +90,7 @@ class Entities {
     Counts counts;
     const Changes changes(whole_ ? 2 * count : 0);
     Batch<Keys> batch(*this, keys);
+    const bool beside = whole_ && reports_ && Team::beside() && count >= MANY && fences_->at_rest();
     if (reports_) reports_->make_room(count);
     if (only != Only::ALL || ordered)
       for (std::size_t i = 0; i < count; ++i) tree.require(puts.place(i));
@@ -113,15 +115,16 @@ class Entities {
         if (row.moved) changes.set(change++, +1, slot.place);
       }
     }
+    const auto report = [&] { report_moved(batch, puts, changes, count); };
     try {
-      apply(tree, changes, change, counts);
+      beside ? apply_beside(tree, changes, change, counts, report) : apply(tree, changes, change, counts);
     } catch (...) {
       for (std::size_t i = 0; i < count; ++i)
         if (batch[i].slot != NONE) slots_[batch[i].slot].place = puts.place(i);
       throw;
     }
     batch.commit();
-    if (reports_) report_moved(batch, puts, changes, count);
+    if (reports_ && !beside) report();
     rename([&] { rename_moved(batch, puts, changes, count); });
     if (ages_) age(batch, count);
     return counts;
@@ -264,9 +267,10 @@ class Entities {
   }
 
  private:
-  static constexpr std::size_t TOGETHER = 16;   // keys whose cache misses overlap
-  static constexpr std::size_t LOOKAHEAD = 16;  // rows whose slot, or entry, is being prefetched
-  static constexpr std::size_t MOST = 3;        // of so many slots one moves from which on the tree is built anew
+  static constexpr std::size_t TOGETHER = 16;             // keys whose cache misses overlap
+  static constexpr std::size_t LOOKAHEAD = 16;            // rows whose slot, or entry, is being prefetched
+  static constexpr std::size_t MANY = 2 * ROWS_A_THREAD;  // rows worth another thread for the index
+  static constexpr std::size_t MOST = 3;  // of so many slots one moves from which on the tree is built anew
 
   // A NaN that is the time of no entity.
   static constexpr std::uint64_t MARK = 0x7ff8000000000001;
@@ -389,6 +393,22 @@ class Entities {
     rebuild(tree);
   }
 
+  // The same, and reports who has moved; the index finds who crosses, on another thread if there is one.
+  template <class Report>
+  void apply_beside(FramedTree& tree, const Changes& changes, std::size_t count, const Counts& counts,
+                    Report report) const {
+    try {
+      Threads(Threads::Beside()).run(2, [&](std::size_t task) {
+        if (task == 0) return apply(tree, changes, count, counts);
+        report();
+        fences_->look_ahead();
+      });
+    } catch (...) {
+      fences_->forget_ahead();
+      throw;
+    }
+  }
+
   void rebuild(FramedTree& tree) const {
     const Scratch<Point> places(slots_.size());
     std::size_t next = 0;
@@ -479,6 +499,7 @@ class Entities {
   std::unique_ptr<Names> names_;
   std::unique_ptr<Ages> ages_;  // none until the oldest are asked for
   Reports* reports_ = nullptr;  // none, or those of the index that is attached
+  Fences* fences_ = nullptr;    // that index
 };
 
 }  // namespace dynhull

@@ -386,8 +386,9 @@ void add_arrays_and_static_hulls(nb::module_& module) {
 }
 
 void add_threads(nb::module_& module) {
-  module.def("set_threads", &Team::set_limit, "threads"_a,
-             "How many threads one call may use; 0 for one on each processor available to the process.");
+  module.def("set_threads", &Team::set_limit, "threads"_a, "beside"_a,
+             "How many threads one call may use; 0 for one on each processor available to the process. And whether, if "
+             "that is one, one more finds what a put crosses.");
   module.def("threads", &Team::limit, "How many threads one call may use.");
 }
 
