@@ -72,6 +72,7 @@ class ServedRoot:
         self._unanswered: dict[ShardAddress, float] = {}  # since when
         self._away: set[ShardAddress] = set()
         self._closed = False
+        self._begun = False  # whether there is a root, as the last turn of its thread says
         self._starting = self._loop.create_task(self._start(FIRST_PAUSE))
 
     # Requests
@@ -234,7 +235,9 @@ class ServedRoot:
             return
         if turn.opened:
             self._driver.supervisor.succeeded(self._work)
-        if turn.failure is not None and self._starting.done():
+        begun, self._begun = self._begun, turn.messages is not None
+        # The task that has begun it may not have noticed yet. Where none has begun, it tries again itself.
+        if turn.failure is not None and begun:
             self._driver.supervisor.failed(self._work, turn.failure)
             self._starting = self._loop.create_task(self._start(FIRST_PAUSE))
         if turn.messages is None:  # there is no root, and shards are greeted
