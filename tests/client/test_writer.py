@@ -25,6 +25,7 @@ from dynhull_client import (
     ProducerInUseError,
     UnavailableError,
 )
+from dynhull_client._calls import Known
 from dynhull_client._gathering import Gathering
 
 POINTS = np.random.default_rng(3).normal(size=(400, 10, 2))
@@ -283,6 +284,25 @@ def test_batches_that_there_is_never_memory_for_end_a_writer(
         wait_until(writer.put(insert=POINTS[0]).done)
         writer.flush()
     assert failed() > 1
+
+
+def test_without_threads_a_writer_has_not_begun(address: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with HullClient(address) as client:
+        client.create_hull(name)
+        writer, pipeline = client.writer(name, linger=0), client.pipeline()
+        with monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, "start", refuse)
+            with pytest.raises(RuntimeError, match="new thread"):
+                writer._begin(Known(0, ""))
+            with pytest.raises(RuntimeError, match="new thread"):
+                pipeline.count(name, [[0, 0]])
+            pipeline.flush()  # nothing is under way
+        with writer, pipeline:
+            assert writer.put(insert=[[0, 0]]).result(PATIENCE).points == 1
+            assert pipeline.count(name, [[0, 0]]).result(PATIENCE).counts.tolist() == [1]
 
 
 def test_what_a_writer_cannot_do(client: HullClient, name: str) -> None:

@@ -188,6 +188,21 @@ def test_who_reads_while_the_store_hangs_hears_in_time_for_what_it_waits(fleet, 
     same(read_back(reader, len(fleet.records)), fleet.records)
 
 
+def test_without_threads_for_calls_the_store_is_asked_again_later(fleet, monkeypatch):
+    fleet.fill(3)
+    reader = fleet.make_reader()
+
+    def refuse(_):
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(store_calls.Thread, "start", refuse)
+        for _ in range(store_calls.CALLS + 1):  # none of them keeps the place of a call
+            with pytest.raises(StorageError, match="can't start new thread"):
+                reader.batches(1, 0, 1)
+    same(read_back(reader, len(fleet.records)), fleet.records)
+
+
 def test_an_object_that_was_cut_exchanged_or_lost_is_refused_by_its_name(fleet):
     fleet.fill(3)
     first, *_ = objects(fleet)

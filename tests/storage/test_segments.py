@@ -451,6 +451,25 @@ def test_a_disk_that_fails_while_a_part_is_read_is_not_told_as_damage(fleet, mon
     assert storage.key_changes(1, keys, 0, NEWEST)[0] > 0
 
 
+def test_without_threads_segments_are_read_one_after_the_other(tmp_path, monkeypatch):
+    """What is being read by nobody would be waited for for ever, by all who need it."""
+    fleet = Fleet(tmp_path).fill()
+    storage, keys = fleet.make_reader(), PackedKeys.pack(KEYS[:1])
+    monkeypatch.setattr(fleet.archive, "has_parts", False)
+
+    def refuse(_):
+        raise RuntimeError("can't start new thread")
+
+    expected = storage.key_changes(1, keys, 0, NEWEST)
+    with monkeypatch.context() as patch:
+        patch.setattr(filed.Thread, "start", refuse)
+        same(read_back(storage, len(fleet.records)), fleet.records)
+        last, changes = storage.key_changes(1, keys, 0, NEWEST)
+    assert (last, changes.revisions.tolist()) == (expected[0], expected[1].revisions.tolist())
+    same(read_back(storage, len(fleet.records)), fleet.records)
+    fleet.storage.close()
+
+
 def test_what_is_before_a_hole_is_read_of_a_key_and_then_the_hole_is_named(fleet):
     fleet.fill()
     storage, keys = fleet.make_reader(), PackedKeys.pack(KEYS[:1])

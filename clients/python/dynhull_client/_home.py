@@ -1,6 +1,7 @@
 """The process that an object belongs to: a fork copies the object, but neither its threads nor its connection."""
 
 import os
+from threading import Thread
 from weakref import WeakSet
 
 ADVICE = "start processes by 'spawn' or 'forkserver', or fork before a writer, pipeline, watch or ingest is open"
@@ -32,6 +33,16 @@ class Home:
     def begin(self) -> None:
         """Threads of gRPC serve the object from now on."""
         _served.add(self)
+
+    def served_by(self, thread: Thread) -> Thread:
+        """Start a thread that serves the object; RuntimeError where the system has no more, and nothing has begun."""
+        self.begin()
+        try:
+            thread.start()
+        except RuntimeError:
+            self.end()
+            raise
+        return thread
 
     def end(self) -> None:
         """No threads serve it any more."""

@@ -117,12 +117,10 @@ class Pipeline:
                 self._turn.wait_for(lambda: self._closed or not self._questions.full)
             if self._closed:
                 raise RuntimeError(CLOSED)
-            outcome = self._questions.add(call)
             if self._thread is None:
                 name = f"pipeline to {self._connection.address}"
-                self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-                self._home.begin()
-                self._thread.start()
+                self._thread = self._home.served_by(threading.Thread(target=self._run, name=name, daemon=True))
+            outcome = self._questions.add(call)
             self._turn.notify_all()
         return outcome
 

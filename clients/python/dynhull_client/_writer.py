@@ -202,11 +202,10 @@ class Writer:
             return self._window
 
     def _begin(self, begin: Known) -> None:
-        self._window = InFlight(self._writing, begin, Outcome)
+        window = InFlight(self._writing, begin, Outcome)
         name = f"writer to {self._writing.name}"
-        self._thread = threading.Thread(target=self._run, args=(self._window,), name=name, daemon=True)
-        self._home.begin()
-        self._thread.start()
+        self._thread = self._home.served_by(threading.Thread(target=self._run, args=(window,), name=name, daemon=True))
+        self._window = window  # only now: without a thread, what is put would wait for ever
 
     def _hold(self, call: Any) -> None:
         """Have the end of the writer cancel a call."""

@@ -150,7 +150,7 @@ class Filed:
         """
         beside: Future[list[RowsOfKeys | StorageError]] = Future()
         read = partial(self._rows_of_keys, segments[1::2], keys)
-        Thread(target=_settle, args=(beside, read), name="read beside").start()
+        begin_beside(Thread(target=_settle, args=(beside, read), name="read beside"))
         return chain.from_iterable(zip_longest(self._rows_of_keys(segments[::2], keys), beside.result()))
 
     def _rows_of_keys(self, segments: list[StoredSegment], keys: Keys) -> list[RowsOfKeys | StorageError]:
@@ -235,7 +235,7 @@ class Filed:
         reading, begins = self._reading(segment)
         if begins:
             self._ahead = Thread(target=self._read, args=(segment, reading), name="read ahead")
-            self._ahead.start()
+            begin_beside(self._ahead)
 
     @contextmanager
     def _named(self, segment: StoredSegment, end: str) -> Iterator[None]:
@@ -326,6 +326,14 @@ def holes(hulls: Mapping[int, HullRows], files: Set[str]) -> Iterator[Hole]:
                 yield Hole(number, segment.first, segment.last)
             elif segment.file + STATE in files:
                 yield Hole(number, segment.first - 1, segment.first - 1)
+
+
+def begin_beside(thread: Thread) -> None:
+    """Start a thread, or do its work here where the system has no more threads: others wait for what it is to read."""
+    try:
+        thread.start()
+    except RuntimeError:
+        thread.run()
 
 
 def _settle(future: "Future[Found]", function: Callable[[], Found]) -> None:

@@ -210,7 +210,12 @@ class ObjectArchive(Archive):
             raise late
         answer: Future[Result] = Future()
         # It must not keep the process from ending.
-        Thread(target=self._call, args=(function, answer), name="object store", daemon=True).start()
+        calling = Thread(target=self._call, args=(function, answer), name="object store", daemon=True)
+        try:
+            calling.start()
+        except RuntimeError as error:
+            self._places.release()
+            raise OSError(errno.EAGAIN, str(error), what) from None
         try:
             return answer.result(max(0.0, until - monotonic()))
         except TooLongError:
