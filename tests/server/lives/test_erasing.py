@@ -7,6 +7,7 @@ import grpc
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from cases import slow
 from command_line import dynhull
 from server_process import server_process
 
@@ -110,6 +111,7 @@ def test_a_key_is_erased_from_what_can_be_read_of_the_past(tmp_path):
         assert not client.at("fleet", 12).positions([KEYS[0], KEYS[2], KEYS[3]]).present.any()
 
 
+@slow
 def test_what_many_ask_for_at_once_is_answered_to_each(tmp_path):
     """One of them goes away, one names a key that the hull has, one a key that never was, and two the same key."""
     options = "--data", str(tmp_path), *SNAPSHOTS
