@@ -2,9 +2,13 @@
 
 import json
 import re
+import socket
 import subprocess
+import threading
 import time
+from contextlib import closing
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import grpc
 import pytest
@@ -13,12 +17,14 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from metrics import fetch, measured, scrape
 from patience import wait_until
 from peers import program
+from prometheus_client import CollectorRegistry
 from server_process import PATIENCE
 
 from dynhull_client import HullClient, PointMissingError, Quarantine
 from dynhull_proto.v1 import batch_pb2, hull_pb2, points_pb2
 from dynhull_proto.v1 import hull_service_pb2 as pb
 from dynhull_proto.v1.hull_service_pb2_grpc import HullServiceStub
+from dynhull_server.rpc.metrics_page import MOST_CONNECTIONS, MetricsPage
 
 ONE = points_pb2.Points(coordinates=[1, 2])
 
@@ -161,6 +167,21 @@ def test_the_oldest_hulls_under_a_prefix_have_measures() -> None:
         assert not of("tram/a")
         assert of("fleet/b")["revisions_total"] == 0
         assert scrape(address)["dynhull_metrics_hulls_left_out"] == 0
+
+
+def test_connections_for_which_there_was_no_thread_keep_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    page = MetricsPage("127.0.0.1", 0, CollectorRegistry(), None, None, pytest.fail)
+    address = urlsplit(page.url)
+    with closing(page):
+        with monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, "start", refuse)
+            for _ in range(MOST_CONNECTIONS + 1):
+                with socket.create_connection((address.hostname, address.port), PATIENCE) as connection:
+                    assert connection.recv(1) == b""  # it is closed
+        assert fetch(page.url) == ""
 
 
 def test_promtool_has_nothing_to_complain_about() -> None:
