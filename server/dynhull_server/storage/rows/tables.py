@@ -81,7 +81,7 @@ class Reader(Protocol):
     version: int
 
     def count(self, table: str) -> int:
-        """The number of rows of a table."""
+        """The number of rows of a table, or somewhat more: what the progress goes up to."""
 
     def every(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
         """Some columns of all rows of a table, ordered by the number of the row."""

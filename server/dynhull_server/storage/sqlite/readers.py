@@ -53,8 +53,12 @@ class SQLiteReader:
 
     @as_unreadable()
     def count(self, table: str) -> int:
-        """The number of rows of a table."""
-        (rows,) = self._connection.execute(f"SELECT count(*) FROM {table}").fetchone()  # noqa: S608  (ours)
+        """The number of rows of a table, or more where some between its first and its last were dropped.
+
+        To count them SQLite would read the whole table.
+        """
+        first, last = (f"(SELECT {which}(rowid) FROM {table})" for which in ("min", "max"))  # noqa: S608  (ours)
+        (rows,) = self._connection.execute(f"SELECT ifnull({last} - {first} + 1, 0)").fetchone()
         return int(rows)
 
     def every(self, table: str, columns: str) -> Iterator[tuple[Any, ...]]:
