@@ -202,7 +202,7 @@ class Writer:
             return self._window
 
     def _begin(self, begin: Known) -> None:
-        window = InFlight(self._writing, begin, Outcome)
+        window: InFlight[Future[Applied]] = InFlight(self._writing, begin, Outcome)
         name = f"writer to {self._writing.name}"
         self._thread = self._home.served_by(threading.Thread(target=self._run, args=(window,), name=name, daemon=True))
         self._window = window  # only now: without a thread, what is put would wait for ever
