@@ -140,6 +140,7 @@ def test_what_cannot_be_put_right_is_a_hole_of_one_hull_with_its_revisions(fleet
     assert served(fleet) == []  # it has been said; `check` goes on saying it
     storage = fleet.storage
     report = copies.check(fleet.folder / "data", no_progress, fleet.archive.path)
+    assert [each.name for each in report.hulls if not each.whole] == ["fleet"]
     assert any(f"{named} of its past cannot be read" in note for note in report.notes)
     fleet.fill(2)
     assert storage.history(1).first.revision == 0

@@ -386,6 +386,7 @@ def test_no_flipped_bit_cut_or_exchange_of_a_file_goes_unnoticed(tmp_path):
             fleet.archive.read(segment.file + BATCHES, segment.facts.wrote)
     report = copies.check(fleet.folder / "data", no_progress, fleet.archive.path)
     assert ["revisions 1 to" in each and paths[0].name in each for each in report.notes] == [True]
+    assert [each.whole for each in report.hulls] == [False]
 
 
 @pytest.mark.parametrize("blocks", [True, False])

@@ -42,7 +42,7 @@ class HullReport:
     Attributes:
         name: its name.
         summary: its revision, rows and snapshots.
-        whole: whether all of its data is intact.
+        whole: whether all of its data is intact, its past too.
         is_shard: whether it is one of the shards of a hull.
     """
 
@@ -110,7 +110,9 @@ def check(path: Path, progress: Progress, history: str | Path | None = None) -> 
         holes = [
             each for each in holes if each[0].row.number in there and each[1] in there[each[0].row.number].segments
         ]
-    return replace(report, fences=fences, notes=[*report.notes, *(text for _, _, text in holes)])
+    torn = {hull.row.name for hull, _, _ in holes}
+    hulls = [replace(each, whole=each.whole and each.name not in torn) for each in report.hulls]
+    return replace(report, hulls=hulls, fences=fences, notes=[*report.notes, *(text for _, _, text in holes)])
 
 
 def history_size(paths: Sequence[Path]) -> int:
