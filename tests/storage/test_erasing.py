@@ -357,6 +357,32 @@ def at_first(fleet):
     return Kept(2, replayed(Kept(records=fleet.records[:2]), fleet.settings).stored())
 
 
+def killed(fleet):
+    """The storage is that of a server which has started after a kill."""
+    copy = fleet.folder / "copy"
+    for part in ("data", "history"):
+        shutil.copytree(fleet.folder / part, copy / part)
+    fleet.storage.close()
+    fleet.folder = copy
+    fleet.archive = Archive(copy / "history")
+    fleet.storage = SQLiteStorage(copy / "data", archive=fleet.archive)
+    fleet.storage.open(no_progress)
+
+
+@pytest.mark.parametrize("erased", [False, True])
+def test_a_start_after_a_kill_writes_over_nothing_where_nobody_erases(tmp_path, erased):
+    fleet = Fleet(tmp_path).fill(2)
+    if erased:
+        erase(fleet, leave(fleet))
+    killed(fleet)
+    wipes = 0
+    for step in fleet.storage.file_history(fleet.time):
+        wipes += isinstance(step, Wipe)
+        fleet.storage.commit([step], fleet.time)
+    assert wipes == erased
+    fleet.storage.close()
+
+
 def test_a_kill_before_the_log_has_ended_leaves_no_trace_after_the_next_start(tmp_path):
     fleet = Fleet(tmp_path).fill(2)
     until = leave(fleet)
@@ -365,13 +391,7 @@ def test_a_kill_before_the_log_has_ended_leaves_no_trace_after_the_next_start(tm
             break
         fleet.storage.commit([step], fleet.time)
     assert traces(fleet) == ["dynhull.db-wal"]
-    for part in ("data", "history"):
-        shutil.copytree(tmp_path / part, tmp_path / "copy" / part)
-    fleet.storage.close()
-    fleet.folder = tmp_path / "copy"
-    fleet.archive = Archive(fleet.folder / "history")
-    fleet.storage = SQLiteStorage(fleet.folder / "data", archive=fleet.archive)
-    fleet.storage.open(no_progress)
+    killed(fleet)
     fleet.file()
     assert traces(fleet) == []
     same(read_back(fleet.storage, until), without(fleet.records, until))

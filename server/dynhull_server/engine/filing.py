@@ -18,6 +18,7 @@ from ..state.errors import (
     HullUnsuitableError,
     NotStoredError,
     OutcomeUnknownError,
+    RefusedError,
     words_for_callers,
 )
 from ..state.hull import Hull
@@ -180,6 +181,11 @@ class Filing:
                 steps = self._storage.erase(hull.number, requests, until, self._driver.commit_time())
                 await self._driver.commit_steps(steps, self._driver.in_history, PAUSE)
                 gone = await self._driver.on_disk(partial(self._storage.row, hull.number)) is None
+        except (RefusedError, OutcomeUnknownError) as error:
+            if not any(each.erased for each in requests):
+                raise
+            gone = False
+            self._driver.supervisor.failed("history", error)  # the next round does what is left, once it is erased
         finally:
             self._pasts.forget()
         if gone:

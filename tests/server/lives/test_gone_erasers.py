@@ -121,8 +121,53 @@ def test_a_snapshot_that_is_under_way_brings_nothing_back(tmp_path: Path) -> Non
         erased = await erasing
         assert erased is not None
         assert erased.moves == 2
-        assert not [each for each in tmp_path.iterdir() if each.is_file() and b"who is gone" in each.read_bytes()]
+        assert not traces(tmp_path)
         await supervisor.stop()
         await engine.close()
 
     asyncio.run(life())
+
+
+class Unwiped(SQLiteStorage):
+    """The disk is full when free pages are written over for the first time."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, archive=Archive(folder / "history"))
+        self.full = True
+
+    def _write_over_free_pages(self) -> Iterator[Any]:
+        if self.full:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        yield from super()._write_over_free_pages()
+
+
+def test_what_is_erased_is_not_refused_and_its_traces_go_once_that_is_possible(tmp_path: Path) -> None:
+    async def life() -> None:
+        storage, machine = Unwiped(tmp_path), Machine()
+        supervisor = Supervisor(machine.clock, lambda _: None, pytest.fail)
+        engine = Engine(LIMITS, storage, supervisor, machine)
+        await engine.start(lambda *_: None)
+        await engine.hulls.create("fleet", HullSettings("str", history=FOREVER))
+        hull, gone, none = engine.hulls.get("fleet"), PackedKeys.pack(["who is gone"]), PackedKeys.pack([])
+        for keys, removes in ((gone, none), (none, gone)):
+            batch = KeyedBatch("str", keys, np.zeros((len(keys), 2)), removes)
+            await engine.hulls.apply(Write("fleet", batch, engine.driver.time()), create=False)
+        erased = await engine.hulls.filing.erase(hull, gone)
+        assert erased is not None
+        assert erased.moves == 2
+        assert supervisor.fails("history")
+        assert traces(tmp_path)
+        for again in (engine.hulls.filing.round(), engine.hulls.filing.erase(hull, gone)):
+            with pytest.raises(Exception, match="No space left"):
+                await again
+        storage.full = False
+        await engine.hulls.filing.round()
+        assert not traces(tmp_path)
+        await supervisor.stop()
+        await engine.close()
+
+    asyncio.run(life())
+
+
+def traces(folder: Path) -> list[Path]:
+    return [each for each in folder.iterdir() if each.is_file() and b"who is gone" in each.read_bytes()]

@@ -108,7 +108,8 @@ class SQLiteStorage(RowStorage):
                     raise DamagedError(f"{self._folder.database}: {'; '.join(findings.fatal)}: restore a backup")
                 stack.callback(self._disconnect)
                 self._load(findings, version)
-                self._wiping = self._erased = own is not None and own.mode != STOPPED  # keys were perhaps being erased
+                killed = own is not None and own.mode != STOPPED
+                self._wiping = self._erased = killed and any(hull.erasures for hull in self._ledger.hulls.values())
                 self._checkpointer = stack.enter_context(closing(self._folder.connect(OpenMode.WRITE)))
                 self._restart_log(own)
                 self._readers = stack.enter_context(closing(Readers(self._connect_reader)))
