@@ -309,6 +309,7 @@ class ShellServer:
 
     def look_at_past(self) -> None:
         """The past of each hull is as it was, and has the files that it needs, and no others."""
+        self._until(lambda: not len(self._engine.hulls.filing._erasing), "erasures whose callers have gone")
         self._until(lambda: self._storage.files_are_needed(self.time()), "what is to be filed")
         for name in sorted(self.model.alive):
             self.probe(PastReader(self._engine, self.model, self.schedule).probe(name))
