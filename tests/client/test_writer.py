@@ -245,7 +245,7 @@ def test_a_writer_gives_up_a_server_that_stays_away(connect: type[HullClient]) -
 
 
 def out_of_memory(monkeypatch: pytest.MonkeyPatch, times: float) -> Callable[[], int]:
-    """Have the first so many batches not be made; returns how many it were."""
+    """Have the making of the first `times` batches fail; what is returned counts those that have."""
     joined, failed = Gathering.joined, 0
 
     def failing(gathering: Gathering) -> object:

@@ -207,7 +207,7 @@ def test_equal_refusals_of_several(same: Callable[..., Answers], hull: str) -> N
 
 
 def changes(examples: list[bytes], random: np.random.Generator, within: int | None = None) -> Iterator[bytes]:
-    """Messages with a few other bytes, perhaps only within so many at the beginning, of which some end early."""
+    """Messages with up to two changed bytes, among the first `within` if that is given; some end early."""
     for turn in range(20_000):
         data = bytearray(examples[turn % len(examples)])
         for place in random.integers(min(len(data), within or len(data)), size=random.integers(3)):

@@ -22,9 +22,11 @@ Places = npt.NDArray[np.int32]
 
 # Batches of fewer rows than this part of all are put in order alone.
 FEW = 16
-# Who reads all batches in turn has so many rows of them put in order at a time, in memory that is used again: for all
-# of them it would be new, which takes longer than what is done with it. So many readers find what they had.
-PART_ROWS, PARTS = 2**15, 4
+# Rows that are put in order at a time for a reader of all batches: their memory is used again. That for all rows
+# would be new each time, which takes longer than what is done with it.
+PART_ROWS = 2**15
+# Parts in order that are kept, so that several readers find theirs.
+PARTS = 4
 
 
 @dataclass(slots=True)
